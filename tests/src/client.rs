@@ -21,6 +21,11 @@ impl Reply {
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.body).unwrap_or_else(|e| panic!("not JSON ({e}): {}", self.body))
     }
+
+    /// The entries of a page of a list.
+    pub fn items(&self) -> Value {
+        self.json()["items"].take()
+    }
 }
 
 /// Sends a request with a JSON body (empty for none).

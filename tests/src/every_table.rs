@@ -23,11 +23,11 @@ pub async fn fill(database: &Path) {
     let service = Service::start(database, Analytic::default(), 1).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
-    let pair = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
-    let answer = format!("/api/v1/blind/{}/answer", pair["pair"]["token"].as_str().unwrap());
-    assert_eq!(service.post(&answer, &json!({"answer": "first"})).await.status, StatusCode::CREATED);
+    let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    assert_eq!(service.post(&answer, &json!({"answer": "first"})).await.status, StatusCode::OK);
     service.wait_for(study, &[StudyState::Waiting]).await;
-    let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.json();
+    let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
     let retract = format!("/api/v1/preferences/{}/retract", given[0]["id"].as_str().unwrap());
     for (path, body) in [
         (retract, json!({"reason": "mistyped"})),
@@ -88,10 +88,7 @@ pub async fn fill(database: &Path) {
                    select id, hex(zeroblob(32)), 0, 0, 'K', '' from studies limit 1";
     sqlx::query(imports).execute(&mut **writer).await.unwrap();
     commit(writer).await.unwrap();
-    for (path, body) in [
-        (format!("/api/v1/studies/{study}/members"), json!({"kind": "user", "name": "R1"})),
-        (format!("/api/v1/studies/{study}/access"), json!({"restricted": true})),
-    ] {
+    for (path, body) in [(format!("/api/v1/studies/{study}/members"), json!({"kind": "user", "name": "R1"}))] {
         let done = service.post(&path, &body).await;
         assert!(done.status.is_success(), "{path}: {}", done.text);
         if let Some(member) = done.json()["id"].as_str() {
@@ -99,5 +96,7 @@ pub async fn fill(database: &Path) {
             assert_eq!(removed.status, StatusCode::OK, "{}", removed.text);
         }
     }
+    let access = service.put(&format!("/api/v1/studies/{study}/access"), &json!({"restricted": true})).await;
+    assert_eq!(access.status, StatusCode::OK, "{}", access.text);
     service.stop().await;
 }

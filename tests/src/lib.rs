@@ -11,6 +11,7 @@ pub mod callers;
 pub mod certified;
 pub mod cli;
 pub mod client;
+pub mod compatibility;
 pub mod consistent;
 pub mod every_table;
 pub mod explained;

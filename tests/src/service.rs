@@ -16,7 +16,7 @@ use gaitwright_service::workers::{AfterSolves, Certify, Dispatch, Evaluate, Expl
 use gaitwright_store::audit::Actor;
 use gaitwright_store::certificates::{self, CertificateOnRecord};
 use gaitwright_store::feedback::FeedbackRow;
-use gaitwright_store::studies::{Study, StudyState};
+use gaitwright_store::studies::{Chosen, Study, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{
     ReferenceGaitId, Store, StudyId, SubjectId, commit, feedback, reference_gaits, studies, subjects, trials,
@@ -64,6 +64,11 @@ impl Answer {
     /// The body as JSON.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.text).unwrap_or_else(|e| panic!("not JSON ({e}): {}", self.text))
+    }
+
+    /// The entries of a page of a list.
+    pub fn items(&self) -> Value {
+        self.json()["items"].take()
     }
 
     /// The content type.
@@ -263,14 +268,15 @@ impl Service {
         (status, response.into_body().collect().await.unwrap().to_bytes().to_vec())
     }
 
-    /// `GET` with an Accept header.
-    pub async fn fetch_as(&self, path: &str, accept: &str) -> Answer {
-        self.send(Request::get(path).header(header::ACCEPT, accept).body(Body::empty()).unwrap()).await
-    }
-
     /// `POST` of a JSON document.
     pub async fn post(&self, path: &str, body: &Value) -> Answer {
         self.post_text(path, "application/json", &body.to_string()).await
+    }
+
+    /// `PUT` of a JSON document.
+    pub async fn put(&self, path: &str, body: &Value) -> Answer {
+        let request = Request::put(path).header(header::CONTENT_TYPE, "application/json");
+        self.send(request.body(Body::from(body.to_string())).unwrap()).await
     }
 
     /// `POST` of a text.
@@ -294,7 +300,7 @@ impl Service {
 async fn pass_every_gait(store: &Store) -> bool {
     let Ok(mut reader) = store.read().await else { return false };
     let mut waiting = Vec::new();
-    for study in studies::page(&mut reader, Reach::Every, None, 1000).await.unwrap() {
+    for study in studies::page(&mut reader, Reach::Every, Chosen::newest(1000)).await.unwrap() {
         let found = certificates::of_study(&mut reader, study.id).await.unwrap();
         waiting.extend(found.into_iter().filter(|(_, found)| *found == CertificateOnRecord::NotCertified));
     }

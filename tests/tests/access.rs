@@ -42,7 +42,11 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
         for (method, operation) in item.as_object().unwrap() {
             let needed = &operation["security"][0]["token"];
             let method: Method = method.to_uppercase().parse().unwrap();
-            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{file}", "a.svg");
+            let address = path
+                .replace("{id}", UNKNOWN)
+                .replace("{token}", "unknown")
+                .replace("{side}", "first")
+                .replace("{file}", "a.svg");
             for (who, rights) in &callers {
                 let answer = send(&service, who, &method, &address, "application/json", "{}").await;
                 let what = format!("{method} {path} as {who:?}: {} {}", answer.status, answer.text);
@@ -159,7 +163,11 @@ async fn every_page_is_shown_to_those_who_may_see_it() {
             seen.insert(entry.clone());
             let Some(needed) = needed else { continue };
             let method: Method = method.to_uppercase().parse().unwrap();
-            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{file}", "a.svg");
+            let address = path
+                .replace("{id}", UNKNOWN)
+                .replace("{token}", "unknown")
+                .replace("{side}", "first")
+                .replace("{file}", "a.svg");
             for (who, rights) in &callers {
                 let answer = send(&service, who, &method, &address, FORM, "").await;
                 let what = format!("{entry} as {who:?}: {}", answer.status);
@@ -380,7 +388,7 @@ async fn sessions_end_when_idle_when_disabled_and_tokens_when_revoked() {
     for who in [&admin, &clinician, &script] {
         assert_eq!(send(&service, who, &Method::GET, me, "", "").await.status, StatusCode::OK);
     }
-    let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.json();
+    let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.items();
     let id_of = |role: &str| {
         let all = users.as_array().unwrap();
         all.iter().find(|user| user["role"] == role).unwrap()["id"].as_str().unwrap().to_owned()
@@ -398,7 +406,7 @@ async fn sessions_end_when_idle_when_disabled_and_tokens_when_revoked() {
     let all = send(&service, &admin, &Method::GET, "/api/v1/tokens", "", "").await;
     let As::Token(secret) = &script else { panic!() };
     assert!(!all.text.contains(secret.as_str()));
-    let revoke = format!("/api/v1/tokens/{}/revoke", all.json()[0]["id"].as_str().unwrap());
+    let revoke = format!("/api/v1/tokens/{}/revoke", all.items()[0]["id"].as_str().unwrap());
     assert_eq!(send(&service, &admin, &Method::POST, &revoke, json, "").await.status, StatusCode::OK);
     assert_eq!(send(&service, &script, &Method::GET, me, "", "").await.status, StatusCode::UNAUTHORIZED);
 

@@ -423,13 +423,17 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
     ];
     let mut all = Vec::new();
     for (path, form) in paths.iter().filter(|(path, _)| !left_out.contains(&path.as_str())) {
-        let sides = ["/rate/pair/", "/blind/"].iter().any(|part| path.contains(part));
+        let sides = ["/rate/pair/", "/blind-pairs/"].iter().any(|part| path.contains(part));
         for id in if path.contains("{id}") { ids } else { &ids[..1] } {
             for (place, who) in callers.iter().enumerate() {
                 if path.contains("controller.json") || sides && place == 0 {
                     continue;
                 }
-                let address = path.replace("{id}", id).replace("{token}", own).replace("{file}", "rmse.csv");
+                let address = path
+                    .replace("{id}", id)
+                    .replace("{token}", own)
+                    .replace("{side}", "first")
+                    .replace("{file}", "rmse.csv");
                 let answer = match form {
                     Some(form) => send_accepting(service, who, &address, form).await,
                     None => get(service, who, &address).await,
@@ -499,12 +503,12 @@ async fn exchanging_every_order_changes_no_byte_that_is_served_before_unblinding
         service.wait_for(human, &[StudyState::Waiting]).await;
         let mut pair = Value::Null;
         while pair.is_null() {
-            let next = format!("/api/v1/studies/{human}/blind/next");
+            let next = format!("/api/v1/studies/{human}/blind-pairs/next");
             pair = post(&service, &rater, &next, &json!({})).await.json()["pair"].clone();
         }
         own = pair["token"].as_str().unwrap().to_owned();
         if !answer.is_empty() {
-            post(&service, &rater, &format!("/api/v1/blind/{own}/answer"), &json!({"answer": answer})).await;
+            post(&service, &rater, &format!("/api/v1/blind-pairs/{own}/answer"), &json!({"answer": answer})).await;
         }
     }
     let mut sessions = Vec::new();
@@ -514,9 +518,10 @@ async fn exchanging_every_order_changes_no_byte_that_is_served_before_unblinding
         let planned = post(&service, &callers[1], &path, &plan).await;
         let id = planned.json()["id"].as_str().unwrap().to_owned();
         for walk in 1..=3 {
-            post(&service, &rater, &format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
+            post(&service, &rater, &format!("/api/v1/lab-sessions/{id}/walks"), &json!({"walk": walk})).await;
         }
-        post(&service, &rater, &format!("/api/v1/lab/{id}/answers"), &json!({"number": 1, "answer": answer})).await;
+        post(&service, &rater, &format!("/api/v1/lab-sessions/{id}/answers"), &json!({"number": 1, "answer": answer}))
+            .await;
         sessions.push(id);
     }
     // Nothing is being solved or said any more.
@@ -677,7 +682,7 @@ async fn whoever_took_a_controller_file_of_a_study_rates_it_no_longer_blindly() 
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let program = token(&service, &[Right::Rate, Right::Device]).await;
-    let next = format!("/api/v1/studies/{study}/blind/next");
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = post(&service, &program, &next, &json!({})).await.json()["pair"].clone();
     let drawn = sides(&service.store, study).await;
     let plan = NewSession { gait_one: drawn[0].0, gait_two: drawn[0].1, notes: String::new() };
@@ -724,7 +729,7 @@ async fn no_motion_of_a_rater_has_the_bytes_of_an_earlier_one() {
         if present.state == StudyState::Finished {
             break;
         }
-        let next = format!("/api/v1/studies/{study}/blind/next");
+        let next = format!("/api/v1/studies/{study}/blind-pairs/next");
         let pair = post(&service, &rater, &next, &json!({})).await.json()["pair"].clone();
         let Some(token) = pair["token"].as_str() else {
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
@@ -736,13 +741,16 @@ async fn no_motion_of_a_rater_has_the_bytes_of_an_earlier_one() {
         assert_eq!(drawn.len(), 2, "{page}");
         for (place, trial) in [first, second].into_iter().enumerate() {
             let side = ["first", "second"][place];
-            let motion = get(&service, &rater, &format!("/api/v1/blind/{token}/{side}")).await.text;
-            assert_eq!(motion, get(&service, &rater, &format!("/api/v1/blind/{token}/{side}")).await.text);
+            let motion = get(&service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.text;
+            assert_eq!(
+                motion,
+                get(&service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.text
+            );
             motions.entry(trial).or_default().push(motion);
             let picture = drawn[place].split_once("</svg>").unwrap().0;
             pictures.entry(trial).or_default().push(picture.to_owned());
         }
-        post(&service, &rater, &format!("/api/v1/blind/{token}/answer"), &json!({"answer": "second"})).await;
+        post(&service, &rater, &format!("/api/v1/blind-pairs/{token}/answer"), &json!({"answer": "second"})).await;
     }
     let mut again = 0;
     for shown in motions.values().chain(pictures.values()) {

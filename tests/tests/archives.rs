@@ -31,12 +31,12 @@ async fn study() -> (TempDir, Service, StudyId, Vec<u8>) {
     for (path, body) in [
         ("preferences", json!({"trial_a": good[0], "trial_b": good[1], "answer": "b", "author": "K"})),
         ("preferences", json!({"trial_a": good[2], "trial_b": good[0], "answer": "no_difference", "author": "K"})),
-        ("remarks", json!({"first": good[1], "second": good[2], "answer": "unsafe_first", "author": "K"})),
+        ("assessments", json!({"first": good[1], "second": good[2], "answer": "unsafe_first", "author": "K"})),
     ] {
         let done = service.post(&format!("/api/v1/studies/{study}/{path}"), &body).await;
         assert!(done.status.is_success(), "{path}: {}", done.text);
     }
-    let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.json();
+    let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
     let own = given.as_array().unwrap().iter().find(|row| row["author"] == "K").unwrap();
     let retract = format!("/api/v1/preferences/{}/retract", own["id"].as_str().unwrap());
     assert!(service.post(&retract, &json!({"reason": "mistyped"})).await.status.is_success());
@@ -438,7 +438,7 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
     let trail = service.fetch("/api/v1/audit").await.text;
     assert!(!trail.contains("study.export"), "nobody took it through the service yet");
     assert_eq!(
-        service.fetch(&format!("/api/v1/studies/{study}/imports")).await.json(),
+        service.fetch(&format!("/api/v1/studies/{study}/imports")).await.items(),
         json!([]),
         "a study that was made here"
     );
@@ -469,7 +469,7 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
 
     let other = Service::start_as_is(&folder.path().join("c.db"), Consistent::default(), 1).await;
     import(&other.store, &turned(&file)).await.unwrap();
-    let from = other.fetch(&format!("/api/v1/studies/{study}/imports")).await.json();
+    let from = other.fetch(&format!("/api/v1/studies/{study}/imports")).await.items();
     assert_eq!((&from[0]["signed_by"], &from[0]["trusted"]), (&Value::Null, &json!(false)));
     assert_eq!(from[0]["file_sha256"], sha256(&turned(&file)));
     let page = other.fetch(&format!("/studies/{study}")).await.text;
@@ -482,7 +482,7 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
     other.stop().await;
     let again = Service::start_as_is(&folder.path().join("d.db"), Consistent::default(), 1).await;
     import(&again.store, &answer.1).await.unwrap();
-    let from = again.fetch(&format!("/api/v1/studies/{study}/imports")).await.json();
+    let from = again.fetch(&format!("/api/v1/studies/{study}/imports")).await.items();
     assert_eq!(from.as_array().unwrap().len(), 2);
     again.stop().await;
 }
@@ -506,7 +506,7 @@ async fn rows_without_their_gait_are_counted_and_rows_that_are_not_their_hash_ar
     rows.0.retain(|(table, _)| table != "gaits");
     let other = Service::start_as_is(&folder.path().join("b.db"), Consistent::default(), 1).await;
     import(&other.store, &rows.packed()).await.unwrap();
-    let from = other.fetch(&format!("/api/v1/studies/{study}/imports")).await.json();
+    let from = other.fetch(&format!("/api/v1/studies/{study}/imports")).await.items();
     let converged = other.trials(study).await.iter().filter(|trial| trial.gait_rmse_rad.is_some()).count();
     assert_eq!(from[0]["unchecked_rmse"], json!(converged));
     assert!(other.fetch(&format!("/studies/{study}")).await.text.contains("could not be computed anew"));

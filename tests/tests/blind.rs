@@ -26,13 +26,13 @@ async fn waiting(trials: u32) -> (TempDir, Service, StudyId) {
 }
 
 async fn next(service: &Service, study: StudyId) -> Value {
-    let answer = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await;
+    let answer = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await;
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text);
     answer.json()["pair"].clone()
 }
 
 async fn say(service: &Service, pair: &Value, answer: &str) -> StatusCode {
-    let path = format!("/api/v1/blind/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
     service.post(&path, &json!({"answer": answer, "response_ms": 900})).await.status
 }
 
@@ -49,14 +49,15 @@ async fn nothing_that_a_rater_gets_says_which_gait_it_is() {
     for path in [
         "/rate".to_owned(),
         format!("/rate/pair/{token}"),
-        format!("/api/v1/blind/{token}/first"),
-        format!("/api/v1/blind/{token}/second"),
+        format!("/api/v1/blind-pairs/{token}/motions/first"),
+        format!("/api/v1/blind-pairs/{token}/motions/second"),
     ] {
         let answer = service.fetch(&path).await;
         assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
-        if path.contains("/blind/") {
+        if path.contains("/motions/") {
             // Positions and nothing else.
-            assert!(answer.text.chars().all(|c| "[]-.,0123456789".contains(c)), "{}", answer.text);
+            let figures = answer.text.strip_prefix("{\"figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
+            assert!(figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{figures}");
             continue;
         }
         bytes.push_str(&answer.text);
@@ -85,9 +86,9 @@ async fn nothing_that_a_rater_gets_says_which_gait_it_is() {
     }
     // As long, as many figures, the same place at the start.
     let motion = |side: &str| {
-        let path = format!("/api/v1/blind/{token}/{side}");
+        let path = format!("/api/v1/blind-pairs/{token}/motions/{side}");
         let service = &service;
-        async move { service.fetch(&path).await.json() }
+        async move { service.fetch(&path).await.json()["figures"].take() }
     };
     let (first, second) = (motion("first").await, motion("second").await);
     assert_eq!(first.as_array().unwrap().len(), 101);
@@ -103,17 +104,17 @@ async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &s
         if present.state == StudyState::Finished {
             return;
         }
-        let next = format!("/api/v1/studies/{study}/blind/next");
+        let next = format!("/api/v1/studies/{study}/blind-pairs/next");
         let pair = send(service, who, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
         if pair.is_null() {
             // The answer that was just given is being taken in.
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         }
-        let path = format!("/api/v1/blind/{}/answer", pair["token"].as_str().unwrap());
+        let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
         let body = json!({"answer": answer}).to_string();
         let said = send(service, who, &Method::POST, &path, "application/json", &body).await;
-        assert_eq!(said.status, StatusCode::CREATED, "{}", said.text);
+        assert_eq!(said.status, StatusCode::OK, "{}", said.text);
         let again = send(service, who, &Method::POST, &path, "application/json", &body).await;
         assert_eq!(again.status, StatusCode::CONFLICT, "one answer per pair");
     }
@@ -145,16 +146,18 @@ async fn every_answer_of_a_rater_is_heard_also_of_a_pair_that_is_asked_again() {
     assert!(repeats > 0 && shown.iter().all(|p| p.kind != Kind::Null), "{repeats} repeats of {}", shown.len());
 
     let figures = format!("/api/v1/studies/{study}/raters");
-    let before = send(&service, &admin, &Method::GET, &figures, "", "").await.json();
+    let before = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
     assert_eq!(before[0]["first_preferred"], Value::Null, "before unblinding it would tell the order of pairs");
     assert_eq!(before[0]["repeats_agree"]["of"], json!(repeats));
     let unblind = json!({"rater": "a rater", "reason": "the study has ended"}).to_string();
     let path = format!("/api/v1/studies/{study}/unblind");
     let told = send(&service, &admin, &Method::POST, &path, "application/json", &unblind).await;
     assert_eq!(told.status, StatusCode::OK, "{}", told.text);
-    let after = send(&service, &admin, &Method::GET, &figures, "", "").await.json();
+    let after = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
     assert_eq!(after[0]["first_preferred"]["share"], 1.0, "this rater always says first");
-    for (pair, (first, second)) in told.json().as_array().unwrap().iter().zip(sides(&service.store, study).await) {
+    for (pair, (first, second)) in
+        told.json()["pairs"].as_array().unwrap().iter().zip(sides(&service.store, study).await)
+    {
         assert_eq!((&pair["shown_first"], &pair["shown_second"]), (&json!(first), &json!(second)));
         assert_eq!(pair["answer"], "first");
     }
@@ -249,7 +252,7 @@ async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
     let program = callers::token(&service, &[Right::Rate]).await;
     member(&service, study, MemberKind::Token, "[Rate]").await;
     let rater = rater_of(&service, &[study]).await;
-    let next = format!("/api/v1/studies/{study}/blind/next");
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     for (who, unblinded) in [(&clinician, true), (&script, true), (&program, true), (&rater, false)] {
         service.wait_for(study, &[StudyState::Waiting]).await;
         let mut pair = Value::Null;
@@ -259,14 +262,14 @@ async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
         let token = pair["token"].as_str().unwrap();
         let page = send(&service, who, &Method::GET, &format!("/rate/pair/{token}"), "", "").await.text;
         assert_eq!(page.contains("recorded as not blind"), unblinded, "{page}");
-        let path = format!("/api/v1/blind/{token}/answer");
+        let path = format!("/api/v1/blind-pairs/{token}/answer");
         let said = send(&service, who, &Method::POST, &path, "application/json", "{\"answer\": \"second\"}").await;
-        assert_eq!(said.status, StatusCode::CREATED, "{}", said.text);
+        assert_eq!(said.status, StatusCode::OK, "{}", said.text);
         let heard = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
         assert_eq!(heard.unblinded, unblinded, "{who:?}");
     }
     let figures = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
-    let marked: Vec<_> = figures.json().as_array().unwrap().iter().map(|rater| rater["unblinded"].clone()).collect();
+    let marked: Vec<_> = figures.items().as_array().unwrap().iter().map(|rater| rater["unblinded"].clone()).collect();
     assert_eq!(marked, [json!(1), json!(1), json!(1), json!(0)], "by name: {}", figures.text);
     service.stop().await;
 }
@@ -278,11 +281,11 @@ async fn a_rater_who_may_read_by_the_time_of_the_answer_is_recorded_as_not_blind
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
     let json_of = "application/json";
-    let next = format!("/api/v1/studies/{study}/blind/next");
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, json_of, "{}").await.json()["pair"].clone();
     let unblind = json!({"rater": "a rater", "reason": "adverse event"}).to_string();
     send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/unblind"), json_of, &unblind).await;
-    let path = format!("/api/v1/blind/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, json_of, "{\"answer\": \"first\"}").await;
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
     service.stop().await;
@@ -315,7 +318,7 @@ async fn skipped_pairs_are_not_asked_again_and_unsafe_gaits_are_not_shown_again(
         } else {
             "no_difference"
         };
-        assert_eq!(say(&service, &pair, word).await, StatusCode::CREATED);
+        assert_eq!(say(&service, &pair, word).await, StatusCode::OK);
         turn += 1;
     }
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -339,10 +342,10 @@ async fn unblinding_needs_a_reason_is_in_the_audit_trail_and_marks_what_follows(
     let post = async |who: &As, path: &str, body: Value| {
         send(&service, who, &Method::POST, path, "application/json", &body.to_string()).await
     };
-    let next = format!("/api/v1/studies/{study}/blind/next");
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = post(&rater, &next, json!({})).await.json()["pair"].clone();
     let token = pair["token"].as_str().unwrap();
-    post(&rater, &format!("/api/v1/blind/{token}/answer"), json!({"answer": "second"})).await;
+    post(&rater, &format!("/api/v1/blind-pairs/{token}/answer"), json!({"answer": "second"})).await;
     let path = format!("/api/v1/studies/{study}/unblind");
     let refused = post(&admin, &path, json!({"rater": "a rater", "reason": " "})).await;
     assert_eq!(refused.json()["field"], "reason");
@@ -350,7 +353,7 @@ async fn unblinding_needs_a_reason_is_in_the_audit_trail_and_marks_what_follows(
     assert_eq!(unknown.json()["field"], "rater");
     let told = post(&admin, &path, json!({"rater": "a rater", "reason": "adverse event"})).await;
     assert_eq!(told.status, StatusCode::OK);
-    assert_eq!(told.json()[0]["shown_first"], json!(sides(&service.store, study).await[0].0));
+    assert_eq!(told.json()["pairs"][0]["shown_first"], json!(sides(&service.store, study).await[0].0));
     assert!(!told.text.contains(token));
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
     assert_eq!((rows[0].action.as_str(), &rows[0].detail["reason"]), ("study.unblind", &json!("adverse event")));
@@ -371,7 +374,7 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
     let (_folder, service, study) = waiting(6).await;
     let pair = next(&service, study).await;
     let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["token"].as_str().unwrap());
-    assert_eq!(say(&service, &pair, "first").await, StatusCode::CREATED);
+    assert_eq!(say(&service, &pair, "first").await, StatusCode::OK);
     let heard = |rows: &[gaitwright_store::feedback::FeedbackRow]| {
         rows.iter().filter(|row| row.by_rater && row.retraction.is_none()).count()
     };
@@ -379,7 +382,7 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
     let back = service.post_text(&at(&pair, "/take-back"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
     assert_eq!(heard(&service.feedback(study).await), 0);
-    let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.json();
+    let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.items();
     assert_eq!((&figures[0]["shown"], &figures[0]["answered"]), (&json!(1), &json!(0)), "{figures}");
     assert_eq!(service.post_text(&at(&pair, "/take-back"), FORM, "").await.status, StatusCode::CONFLICT);
 
@@ -390,7 +393,7 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
         let pair = next(&service, study).await;
         if !pair.is_null() {
             let answer = if pairs.is_empty() { "cannot_tell" } else { "unsafe_second" };
-            assert_eq!(say(&service, &pair, answer).await, StatusCode::CREATED);
+            assert_eq!(say(&service, &pair, answer).await, StatusCode::OK);
             pairs.push(pair);
         }
     }

@@ -108,8 +108,8 @@ async fn whatever_a_rater_asks_for_says_nothing_of_what_is_rated() {
     let program = token(&service, &[Right::Rate]).await;
     member(&service, study, MemberKind::Token, "[Rate]").await;
     // Another rater's pair, which this one must not see.
-    let other = post(&service, &program, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
-    let own = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let other = post(&service, &program, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
+    let own = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let (other, own) = (other["pair"]["token"].as_str().unwrap(), own["pair"]["token"].as_str().unwrap());
     let pairs = [own, other];
     let secrets = secrets(&service, &[automatic, study]).await;
@@ -120,7 +120,11 @@ async fn whatever_a_rater_asks_for_says_nothing_of_what_is_rated() {
     for (method, path) in addresses() {
         for id in if path.contains("{id}") { &ids[..] } else { &ids[..1] } {
             for token in &pairs[..if path.contains("{token}") { 2 } else { 1 }] {
-                let address = path.replace("{id}", id).replace("{token}", token).replace("{file}", "rmse.csv");
+                let address = path
+                    .replace("{id}", id)
+                    .replace("{token}", token)
+                    .replace("{side}", "first")
+                    .replace("{file}", "rmse.csv");
                 let (kind, bodies): (&str, &[&str]) = match (&method, path.starts_with("/api/")) {
                     (&Method::GET, _) => ("", &[""]),
                     (_, true) => (JSON, &["{}", "{\"walk\": 9}"]),
@@ -148,9 +152,10 @@ fn check(what: &str, answer: &Answer, id: &str, token: &str, secrets: &BTreeSet<
     }
     let bytes = bytes.replace(id, "").replace(token, "");
     // A motion is positions to the millimetre, and nothing else.
-    if answer.status == StatusCode::OK && (what.contains("/first") || what.contains("/second")) {
-        assert!(answer.text.chars().all(|c| "[]-.,0123456789".contains(c)), "{what}");
-        let digits = answer.text.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|n| n.split_once('.'));
+    if answer.status == StatusCode::OK && what.contains("/motions/") {
+        let figures = answer.text.strip_prefix("{\"figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
+        assert!(figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{what}");
+        let digits = figures.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|n| n.split_once('.'));
         assert!(digits.into_iter().all(|(_, decimals)| decimals.len() <= 3), "{what}");
         return;
     }
@@ -195,7 +200,7 @@ async fn a_pair_that_is_asked_again_looks_like_a_new_one_even_where_others_answe
         if present.state == StudyState::Finished {
             break;
         }
-        let next = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await;
+        let next = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await;
         let pair = next.json()["pair"].clone();
         if pair.is_null() {
             // What was answered is being taken in.
@@ -210,10 +215,10 @@ async fn a_pair_that_is_asked_again_looks_like_a_new_one_even_where_others_answe
         kinds.push(shown.kind);
         let token = pair["token"].as_str().unwrap();
         let page = get(&service, &rater, &format!("/rate/pair/{token}")).await;
-        let motion = get(&service, &rater, &format!("/api/v1/blind/{token}/first")).await;
+        let motion = get(&service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/first")).await;
         let path = format!("/rate/pair/{token}");
         let answered = if turn % 2 == 0 {
-            let path = format!("/api/v1/blind/{token}/answer");
+            let path = format!("/api/v1/blind-pairs/{token}/answer");
             post(&service, &rater, &path, &json!({"answer": "first"})).await
         } else {
             send(&service, &rater, &Method::POST, &path, FORM, "answer=first").await
@@ -251,9 +256,9 @@ async fn taking_back_what_somebody_else_took_back_is_no_matter_of_its_kind() {
     let (_folder, service) = service().await;
     let study = waiting(&service, 6).await;
     let (rater, clinician) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Clinician).await);
-    let pair = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let pair = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
-    post(&service, &rater, &format!("/api/v1/blind/{token}/answer"), &json!({"answer": "first"})).await;
+    post(&service, &rater, &format!("/api/v1/blind-pairs/{token}/answer"), &json!({"answer": "first"})).await;
     let heard = service.feedback(study).await.into_iter().find(|row| row.source.as_str() == "subject").unwrap();
     let path = format!("/api/v1/preferences/{}/retract", heard.id);
     let retracted = post(&service, &clinician, &path, &json!({"reason": "wrong person"})).await;

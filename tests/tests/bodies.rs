@@ -30,7 +30,7 @@ fn form(changes: &[(&str, &str)]) -> String {
 #[tokio::test]
 async fn a_device_is_made_of_another_one_and_errors_stand_at_their_field() {
     let (_folder, service) = service().await;
-    let before = service.fetch("/api/v1/devices").await.json();
+    let before = service.fetch("/api/v1/devices").await.items();
     let path = format!("/devices/{}", before[0]["id"].as_str().unwrap());
     let page = service.fetch(&path).await.text;
     assert!(page.contains("name=\"shank_mass_kg\"") && page.contains("0.2 to 15") && page.contains("prosthetic shank"));
@@ -49,7 +49,7 @@ async fn a_device_is_made_of_another_one_and_errors_stand_at_their_field() {
             assert!(input.contains(&format!("value=\"{value}\"")) && input.contains("aria-invalid"), "{input}");
         }
     }
-    assert_eq!(service.fetch("/api/v1/devices").await.json(), before, "nothing was added");
+    assert_eq!(service.fetch("/api/v1/devices").await.items(), before, "nothing was added");
     let made = service.post_text(&path, FORM, &form(&[("name", "light"), ("shank_mass_kg", "2.5")])).await;
     assert_eq!(made.status, StatusCode::SEE_OTHER, "{}", made.text);
     let location = made.headers["location"].to_str().unwrap();
@@ -103,7 +103,7 @@ async fn muscles_of_a_person_are_written_down_and_new_studies_take_them_up() {
     // A fork has the set-up of its parent, whatever was written down since.
     let fork = service.post(&format!("/api/v1/studies/{before}/fork"), &json!({})).await.json();
     assert!(of(fork["id"].as_str().unwrap().parse().unwrap()).await.is_published());
-    assert_eq!(service.post(&api, &json!({})).await.status, StatusCode::CREATED);
+    assert_eq!(service.put(&api, &json!({})).await.status, StatusCode::OK);
     let published = service.study(|new| new.trial_budget = 1).await;
     assert!(of(published).await.is_published());
     service.stop().await;

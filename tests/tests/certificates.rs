@@ -6,12 +6,13 @@
 use axum::http::StatusCode;
 use gait_optimizer::Mesh;
 use gait_optimizer::export::ControllerFile;
-use gaitwright_service::workers::GaitSolver;
-use gaitwright_store::studies::StudyState;
+use gaitwright_service::workers::{GaitCertifier, GaitSolver};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::path::Path;
+use std::time::Duration;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
@@ -99,9 +100,10 @@ fn what_is_no_gait_or_recording_is_refused() {
 #[tokio::test]
 async fn a_trial_gets_its_certificate_once() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start_without_certificates(&folder.path().join("a.db"), GaitSolver).await;
+    let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
     let study = service
         .study(|new| {
+            new.feedback_mode = FeedbackMode::Human;
             new.muscles = false;
             new.trial_budget = 1;
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
@@ -119,6 +121,12 @@ async fn a_trial_gets_its_certificate_once() {
     let early = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
     assert_eq!(early.status, StatusCode::CONFLICT, "{}", early.text);
     assert!(early.text.contains(&format!("POST {address}")), "{}", early.text);
+    let asked = service.post(&address, &json!({})).await;
+    assert_eq!(asked.status, StatusCode::ACCEPTED, "{}", asked.text);
+    let job = asked.headers["location"].to_str().unwrap().to_owned();
+    while service.fetch(&job).await.json()["state"] != "done" {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
     let certificate = service.post(&address, &json!({})).await;
     assert_eq!(certificate.status, StatusCode::OK, "{}", certificate.text);
     let controller = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
@@ -136,7 +144,7 @@ async fn a_trial_gets_its_certificate_once() {
     assert_eq!(service.fetch(&address).await.json(), certificate);
     assert_eq!(service.post(&address, &json!({})).await.json(), certificate);
     let audit = service.fetch("/api/v1/audit").await.text;
-    assert_eq!(audit.matches("trial.certify").count(), 1, "{audit}");
+    assert_eq!(["ask_certificate", "trial.certify"].map(|act| audit.matches(act).count()), [1, 1], "{audit}");
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     let word = if certificate["passed"] == true { ">passed<" } else { ">failed<" };
     assert!(page.contains(word) && page.contains("Largest Poincaré multiplier"), "{page}");

@@ -90,7 +90,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let form = json!({"form": "version 3 of 2026-05-01"});
     scene.one(done, "post /subjects/{id}/consents", &format!("{of_subject}/consents"), form).await;
     let stronger = json!({"sol": {"max_force_n": 4200.0}});
-    scene.one(done, "post /subjects/{id}/muscles", &format!("{of_subject}/muscles"), stronger).await;
+    scene.one(done, "put /subjects/{id}/muscles", &format!("{of_subject}/muscles"), stronger).await;
     let taller = json!({"height_m": 1.81, "body_mass_kg": 70, "reason": "measured again"});
     scene.one(done, "post /subjects/{id}/corrections", &format!("{of_subject}/corrections"), taller).await;
     let why = json!({"reason": "no time"});
@@ -108,6 +108,8 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     while !service.trials(*draft).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
+    let open = service.trials(*draft).await.into_iter().find(|trial| trial.state.is_open()).unwrap();
+    scene.one(done, "post /jobs/{id}/cancel", &format!("{api}/jobs/solve-{}/cancel", open.id), json!({})).await;
     scene.one(done, "post /studies/{id}/stop", &format!("{of_draft}/stop"), json!({"reason": "enough"})).await;
     let cancelled = service.trials(*draft).await.into_iter().find(|trial| trial.state.as_str() == "cancelled").unwrap();
 
@@ -127,12 +129,12 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let retract = format!("{api}/preferences/{}/retract", text(&given["id"]));
     scene.one(done, "post /preferences/{id}/retract", &retract, json!({"reason": "r"})).await;
     let unsafe_one = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_first"});
-    let made = format!("{api}/studies/{finished}/remarks");
-    let made = scene.one(done, "post /studies/{id}/remarks", &made, unsafe_one).await;
-    let retract = format!("{api}/remarks/{}/retract", text(&made["id"]));
-    scene.one(done, "post /remarks/{id}/retract", &retract, json!({"reason": "r"})).await;
+    let made = format!("{api}/studies/{finished}/assessments");
+    let made = scene.one(done, "post /studies/{id}/assessments", &made, unsafe_one).await;
+    let retract = format!("{api}/assessments/{}/retract", text(&made["id"]));
+    scene.one(done, "post /assessments/{id}/retract", &retract, json!({"reason": "r"})).await;
     let again = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_both"});
-    service.post(&format!("{api}/studies/{finished}/remarks"), &again).await;
+    service.post(&format!("{api}/studies/{finished}/assessments"), &again).await;
     for (trial, verdict) in [(&trials[0], "walkable"), (&trials[1], "unsafe"), (&trials[1], "walkable")] {
         let review = format!("{api}/trials/{}/safety-reviews", trial.id);
         let decision = json!({"verdict": verdict, "reason": "looked at the video"});
@@ -144,10 +146,10 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     scene.one(done, "post /studies/{id}/suggestions", &suggest, better).await;
     scene.one(done, "post /backups", &format!("{api}/backups"), json!({})).await;
 
-    let next = format!("{api}/studies/{human}/blind/next");
-    let pair = scene.one(done, "post /studies/{id}/blind/next", &next, json!({})).await;
-    let say = format!("{api}/blind/{}/answer", text(&pair["pair"]["token"]));
-    scene.one(done, "post /blind/{token}/answer", &say, json!({"answer": "first"})).await;
+    let next = format!("{api}/studies/{human}/blind-pairs/next");
+    let pair = scene.one(done, "post /studies/{id}/blind-pairs/next", &next, json!({})).await;
+    let say = format!("{api}/blind-pairs/{}/answer", text(&pair["pair"]["token"]));
+    scene.one(done, "post /blind-pairs/{token}/answer", &say, json!({"answer": "first"})).await;
     let unblind = json!({"rater": "not signed in", "reason": "r"});
     scene.one(done, "post /studies/{id}/unblind", &format!("{api}/studies/{human}/unblind"), unblind).await;
 
@@ -158,9 +160,9 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
         scene.one(done, &format!("post /users/{{id}}/{act}"), &path, json!({})).await;
     }
     let role = format!("{api}/users/{}/role", text(&user["id"]));
-    scene.one(done, "post /users/{id}/role", &role, json!({"role": "rater"})).await;
+    scene.one(done, "put /users/{id}/role", &role, json!({"role": "rater"})).await;
     signed_in(service, Role::Clinician).await;
-    let sessions = service.fetch(&format!("{api}/sessions")).await.json();
+    let sessions = service.fetch(&format!("{api}/sessions")).await.items();
     let end = format!("{api}/sessions/{}/end", text(&sessions[0]["id"]));
     scene.one(done, "post /sessions/{id}/end", &end, json!({})).await;
     let of_finished = format!("{api}/studies/{finished}");
@@ -169,7 +171,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let remove = format!("{api}/study-members/{}/remove", text(&member["id"]));
     scene.one(done, "post /study-members/{id}/remove", &remove, json!({})).await;
     let restricted = json!({"restricted": true});
-    scene.one(done, "post /studies/{id}/access", &format!("{of_finished}/access"), restricted).await;
+    scene.one(done, "put /studies/{id}/access", &format!("{of_finished}/access"), restricted).await;
     // An invitation does three things, and each has its row.
     let invited = service.post(&format!("{of_finished}/invitations"), &json!({"name": "R7"})).await;
     assert!(invited.status.is_success(), "{}", invited.text);
@@ -182,7 +184,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let revoke = format!("{api}/tokens/{}/revoke", text(&token["id"]));
     scene.one(done, "post /tokens/{id}/revoke", &revoke, json!({})).await;
 
-    let mut device = service.fetch(&format!("{api}/devices")).await.json()[0]["definition"].clone();
+    let mut device = service.fetch(&format!("{api}/devices")).await.items()[0]["definition"].clone();
     device["name"] = json!("a heavier one");
     scene.one(done, "post /devices", &format!("{api}/devices"), device).await;
     let row = |k: u32| {
@@ -198,19 +200,28 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let plan = format!("{api}/studies/{finished}/lab-sessions");
     let pair = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
     let session = scene.one(done, "post /studies/{id}/lab-sessions", &plan, pair).await;
-    let (session, lab) = (format!("{api}/lab-sessions/{}", text(&session["id"])), text(&session["id"]).to_owned());
-    scene.one(done, "post /lab/{id}/walks", &format!("{api}/lab/{lab}/walks"), json!({"walk": 1})).await;
+    let session = format!("{api}/lab-sessions/{}", text(&session["id"]));
+    scene.one(done, "post /lab-sessions/{id}/walks", &format!("{session}/walks"), json!({"walk": 1})).await;
     for walk in 2..=3 {
-        scene.service.post(&format!("{api}/lab/{lab}/walks"), &json!({"walk": walk})).await;
+        scene.service.post(&format!("{session}/walks"), &json!({"walk": walk})).await;
     }
     let said = json!({"number": 1, "answer": "first"});
-    scene.one(done, "post /lab/{id}/answers", &format!("{api}/lab/{lab}/answers"), said).await;
-    scene.one(done, "post /lab/{id}/take-back", &format!("{api}/lab/{lab}/take-back"), json!({})).await;
+    scene.one(done, "post /lab-sessions/{id}/answers", &format!("{session}/answers"), said).await;
+    scene.one(done, "post /lab-sessions/{id}/retract-answer", &format!("{session}/retract-answer"), json!({})).await;
     let emg = json!({"walk": 1, "recording": electromyogram(1.0), "reading": {"heel_strike_column": "heel"}});
-    scene.one(done, "post /lab-sessions/{id}/electromyograms", &format!("{session}/electromyograms"), emg).await;
+    scene
+        .one(done, "post /lab-sessions/{id}/measurement-files/emg", &format!("{session}/measurement-files/emg"), emg)
+        .await;
     scene.one(done, "post /lab-sessions/{id}/emg-results", &format!("{session}/emg-results"), json!({})).await;
     let motion = json!({"walk": 1, "recording": motion()});
-    scene.one(done, "post /lab-sessions/{id}/motions", &format!("{session}/motions"), motion).await;
+    scene
+        .one(
+            done,
+            "post /lab-sessions/{id}/measurement-files/motion",
+            &format!("{session}/measurement-files/motion"),
+            motion,
+        )
+        .await;
     scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
     scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;
 

@@ -91,7 +91,7 @@ async fn no_csv_endpoint_gives_a_formula() {
             vec![path]
         };
         for address in addresses {
-            let answer = service.fetch_as(&address, "text/csv").await;
+            let answer = service.fetch(&address).await;
             assert_eq!(answer.status, StatusCode::OK, "{address}: {}", answer.text);
             assert!(answer.content_type().starts_with("text/csv"), "{address}: {}", answer.content_type());
             let rows = cells(&answer.text);
@@ -103,9 +103,9 @@ async fn no_csv_endpoint_gives_a_formula() {
         }
     }
     assert!(asked.len() >= 8, "{asked:?}");
-    let csv = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.json();
+    let csv = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
     assert!(csv.as_array().unwrap().iter().any(|row| row["note"] == FORMULA), "JSON keeps it as it was");
-    let csv = service.fetch_as(&format!("/api/v1/studies/{study}/preferences"), "text/csv").await.text;
+    let csv = service.fetch(&format!("/api/v1/studies/{study}/preferences.csv")).await.text;
     for text in [format!("'{FORMULA}"), "'+1+1".to_owned(), "'@SUM(1)".to_owned(), "'-2+3".to_owned()] {
         assert!(cells(&csv).iter().flatten().any(|cell| *cell == text), "{text}: {csv}");
     }

@@ -201,7 +201,7 @@ async fn a_result_that_comes_late(mut rig: Rig) {
     let study = started(&service).await;
     nothing_is_lost_or_doubled(&service, study).await;
     let first = service.trials(study).await[0].id;
-    let brought = service.fetch(&format!("/api/v1/trials/{first}/attempts")).await.json();
+    let brought = service.fetch(&format!("/api/v1/trials/{first}/attempts")).await.items();
     let brought: Vec<_> = brought.as_array().unwrap().iter().map(|r| (&r["attempt"], &r["taken"])).collect();
     assert_eq!(brought.len(), 2, "{brought:?}");
     assert!(brought[0] == (&1.into(), &false.into()) && brought[1] == (&2.into(), &true.into()), "{brought:?}");

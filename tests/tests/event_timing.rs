@@ -86,12 +86,12 @@ async fn event_streams_tell_no_order_by_what_comes_or_when() {
         heard.lock().unwrap().clear();
         let begun = Instant::now();
         for walk in 1..=3 {
-            post(&service, &rater, &format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
+            post(&service, &rater, &format!("/api/v1/lab-sessions/{id}/walks"), &json!({"walk": walk})).await;
         }
         walks.push(begun.elapsed());
         let asked = Instant::now();
         let said = json!({"number": 1, "answer": "first"});
-        post(&service, &rater, &format!("/api/v1/lab/{id}/answers"), &said).await;
+        post(&service, &rater, &format!("/api/v1/lab-sessions/{id}/answers"), &said).await;
         until_answer.push(asked.elapsed());
         let event = loop {
             let answered = |(_, text): &&(Instant, String)| text.starts_with("event: lab_session_answered");

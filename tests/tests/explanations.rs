@@ -70,8 +70,9 @@ async fn when_a_study_has_ended_every_trial_without_a_gait_is_explained_in_order
     let trials = without_gait(&service, study).await;
     assert!(trials.len() > 2);
     let last = trials.last().unwrap();
-    let coming = service.fetch(&address(last.id)).await;
-    assert_eq!((coming.status, &coming.json()["state"]), (StatusCode::ACCEPTED, &json!("waiting")));
+    assert_eq!(service.fetch(&address(last.id)).await.status, StatusCode::NOT_FOUND);
+    let coming = service.fetch(&format!("/api/v1/jobs/explanation-{}", last.id)).await;
+    assert_eq!(coming.json()["state"], "queued", "{}", coming.text);
     let page = service.fetch(&format!("/trials/{}", last.id)).await.text;
     assert!(page.contains("is found out after other trials of this study") && page.contains("/explain\""), "{page}");
 
@@ -118,7 +119,7 @@ async fn an_explanation_is_made_once_for_whoever_asks() {
         service.send(request)
     };
     let asked = keyed().await;
-    assert_eq!((asked.status, &asked.json()["state"]), (StatusCode::ACCEPTED, &json!("being_made")));
+    assert_eq!((asked.status, &asked.json()["state"]), (StatusCode::ACCEPTED, &json!("queued")));
     let found = explained(&service, trial).await;
     assert_eq!(service.get(study).await.state, StudyState::Running, "beside its solves");
     let again = ask(&service, trial).await;

@@ -46,14 +46,16 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
     let pair = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id});
     let session = service.post(&format!("/api/v1/studies/{}/lab-sessions", studies[0]), &pair).await.json();
     let session = session["id"].as_str().unwrap();
-    service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": 1})).await;
+    service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
     let emg = json!({"walk": 1, "recording": electromyogram(1.0), "reading": {"heel_strike_column": "heel"}});
     let api = format!("/api/v1/lab-sessions/{session}");
-    for (what, body) in
-        [("electromyograms", emg), ("emg-results", json!({})), ("motions", json!({"walk": 1, "recording": motion()}))]
-    {
+    for (what, body) in [
+        ("measurement-files/emg", emg),
+        ("emg-results", json!({})),
+        ("measurement-files/motion", json!({"walk": 1, "recording": motion()})),
+    ] {
         let done = service.post(&format!("{api}/{what}"), &body).await;
-        assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
+        assert!(done.status.is_success(), "{}", done.text);
     }
     for (page, least) in [
         (format!("/studies/{}", studies[0]), 1 + 1),
@@ -93,7 +95,7 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
     }
     let course = format!("/api/v1/studies/{}/figures/course-gait-rmse-of-the-best-action-by-iteration.csv", studies[0]);
     let (_, csv) = file(&service, &course).await;
-    let history = service.fetch(&format!("/api/v1/studies/{}/history", studies[0])).await.json();
+    let history = service.fetch(&format!("/api/v1/studies/{}/history", studies[0])).await.items();
     let csv = String::from_utf8(csv).unwrap();
     let milestones: Vec<_> =
         history.as_array().unwrap().iter().filter(|milestone| !milestone["gait_rmse_rad"].is_null()).collect();

@@ -157,13 +157,13 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
         is_page(&send((field, value)).await, unprocessable, &says.replace('"', "&#34;"));
     }
     is_page(&send(("colour", "red")).await, StatusCode::BAD_REQUEST, "colour");
-    assert_eq!(service.fetch("/api/v1/studies").await.json()["studies"], json!([]), "nothing was started");
+    assert_eq!(service.fetch("/api/v1/studies").await.items(), json!([]), "nothing was started");
     assert_eq!(send(("muscles", "on")).await.status, StatusCode::SEE_OTHER);
     let lowest = json!("lowest_objective");
     let nearest = json!({"nearest_to_reference": {"within_percent": 5.0}});
     assert_eq!(send(("basin_within_percent", "5")).await.status, StatusCode::SEE_OTHER);
-    let made = service.fetch("/api/v1/studies").await.json();
-    for (study, expected) in made["studies"].as_array().unwrap().iter().zip([nearest, lowest]) {
+    let made = service.fetch("/api/v1/studies").await.items();
+    for (study, expected) in made.as_array().unwrap().iter().zip([nearest, lowest]) {
         assert_eq!(study["solve_options"]["basin_choice"], expected, "{study}");
     }
     service.stop().await;
@@ -346,7 +346,7 @@ async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_sid
     for budget in [3, 9] {
         let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (budget, 3)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
-        let history = service.fetch(&format!("/api/v1/studies/{study}/history")).await.json();
+        let history = service.fetch(&format!("/api/v1/studies/{study}/history")).await.items();
         let history = history.as_array().unwrap();
         let order: Vec<_> = service
             .feedback(study)

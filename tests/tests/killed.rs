@@ -52,7 +52,7 @@ fn splitmix(state: &mut u64) -> u64 {
 }
 
 fn start_study(address: &str) -> String {
-    let subjects = get(address, "/api/v1/subjects").unwrap().json();
+    let subjects = get(address, "/api/v1/subjects").unwrap().items();
     let subject = subjects.as_array().unwrap().iter().find(|s| s["pseudonym"] == "paper-1").unwrap()["id"].clone();
     let made = post(address, "/api/v1/studies", &json!({"subject_id": subject, "trial_budget": TRIALS, "seed": 11}));
     made.unwrap().json()["id"].as_str().unwrap().to_owned()
@@ -82,8 +82,8 @@ fn certificates_of(address: &str, study: &str) -> (Value, Value) {
 
 /// What each trial without a gait is said to need, once the service is done.
 fn explained(address: &str, study: &str) -> Vec<String> {
-    let page = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().json();
-    let without_gait = page["trials"].as_array().unwrap().iter().filter(|trial| trial["state"] == "not_converged");
+    let trials = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().items();
+    let without_gait = trials.as_array().unwrap().iter().filter(|trial| trial["state"] == "not_converged");
     without_gait.map(|trial| sentences(address, trial["id"].as_str().unwrap())).collect()
 }
 
@@ -100,8 +100,8 @@ fn sentences(address: &str, trial: &str) -> String {
 
 /// Everything but identifiers and times.
 fn essence(address: &str, study: &str) -> Vec<String> {
-    let page = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().json();
-    let trials = page["trials"].as_array().unwrap();
+    let trials = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().items();
+    let trials = trials.as_array().unwrap();
     let number = |id: &Value| trials.iter().find(|t| t["id"] == *id).map(|t| t["number"].clone());
     trials
         .iter()
@@ -114,18 +114,18 @@ fn essence(address: &str, study: &str) -> Vec<String> {
 
 /// Every subject, page by page.
 fn pseudonyms(address: &str) -> Vec<String> {
-    let (mut found, mut before) = (Vec::new(), String::new());
+    let (mut found, mut cursor) = (Vec::new(), String::new());
     loop {
-        let page = get(address, &format!("/api/v1/subjects?limit=1000{before}")).unwrap().json();
-        let page = page.as_array().unwrap();
-        found.extend(page.iter().map(|subject| subject["pseudonym"].as_str().unwrap().to_owned()));
-        let Some(last) = page.last() else { return found };
-        before = format!("&before={}", last["id"].as_str().unwrap());
+        let page = get(address, &format!("/api/v1/subjects?limit=1000{cursor}")).unwrap().json();
+        let subjects = page["items"].as_array().unwrap();
+        found.extend(subjects.iter().map(|subject| subject["pseudonym"].as_str().unwrap().to_owned()));
+        let Some(next) = page["next"].as_str() else { return found };
+        cursor = format!("&cursor={next}");
     }
 }
 
 fn labels(address: &str, study: &str) -> usize {
-    let answers = get(address, &format!("/api/v1/studies/{study}/preferences")).unwrap().json();
+    let answers = get(address, &format!("/api/v1/studies/{study}/preferences")).unwrap().items();
     answers.as_array().unwrap().len()
 }
 

@@ -56,7 +56,7 @@ fn id(session: &Value) -> &str {
 async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
-    let (api, lab) = (format!("/api/v1/lab-sessions/{}", id(&session)), format!("/api/v1/lab/{}", id(&session)));
+    let api = format!("/api/v1/lab-sessions/{}", id(&session));
     assert_eq!((&session["state"], &session["number"]), (&json!("planned"), &json!(1)));
     let conditions = |session: &Value| -> Vec<Value> {
         session["walks"].as_array().unwrap().iter().map(|walk| walk["condition"].clone()).collect()
@@ -67,14 +67,14 @@ async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
         (2, StatusCode::CONFLICT),
         (0, StatusCode::UNPROCESSABLE_ENTITY),
         (4, StatusCode::UNPROCESSABLE_ENTITY),
-        (1, StatusCode::CREATED),
+        (1, StatusCode::OK),
         (1, StatusCode::CONFLICT),
-        (2, StatusCode::CREATED),
+        (2, StatusCode::OK),
     ] {
-        let walked = service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
+        let walked = service.post(&format!("{api}/walks"), &json!({"walk": walk})).await;
         assert_eq!(walked.status, status, "walk {walk}: {}", walked.text);
     }
-    assert_eq!(service.fetch(&lab).await.json()["walk"], 3);
+    assert_eq!(service.fetch(&format!("{api}/next-walk")).await.json()["walk"], 3);
     assert_eq!(service.fetch(&api).await.json()["state"], "under_way");
 
     let without = service.post(&format!("{api}/unblind"), &json!({"reason": " "})).await;
@@ -82,7 +82,7 @@ async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
     let told = service.post(&format!("{api}/unblind"), &json!({"reason": "adverse event"})).await;
     assert_eq!(told.status, StatusCode::OK, "{}", told.text);
     assert_eq!(service.post(&format!("{api}/unblind"), &json!({"reason": "r"})).await.status, StatusCode::CONFLICT);
-    service.post(&format!("{lab}/walks"), &json!({"walk": 3, "note": "tired"})).await;
+    service.post(&format!("{api}/walks"), &json!({"walk": 3, "note": "tired"})).await;
     let told = service.fetch(&api).await.json();
     let row: LabSessionId = id(&session).parse().unwrap();
     let drawn =
@@ -94,7 +94,7 @@ async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
 
     assert_eq!(service.post(&format!("{api}/close"), &json!({"note": "done"})).await.json()["state"], "closed");
     assert_eq!(service.post(&format!("{api}/close"), &json!({})).await.status, StatusCode::CONFLICT);
-    assert!(service.fetch(&lab).await.json()["walk"].is_null());
+    assert!(service.fetch(&format!("{api}/next-walk")).await.json()["walk"].is_null());
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 6).await.unwrap();
     let acts: Vec<_> = trail.iter().map(|row| row.action.trim_start_matches("lab_session.")).collect();
     assert_eq!(acts, ["close", "walk", "unblind", "walk", "walk", "plan"]);
@@ -112,7 +112,11 @@ async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let mut bytes = String::new();
-    for path in ["/lab".to_owned(), format!("/lab/{}", id(&session)), format!("/api/v1/lab/{}", id(&session))] {
+    for path in [
+        "/lab".to_owned(),
+        format!("/lab/{}", id(&session)),
+        format!("/api/v1/lab-sessions/{}/next-walk", id(&session)),
+    ] {
         let answer = service.fetch(&path).await;
         assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
         bytes.push_str(&answer.text);
@@ -132,7 +136,7 @@ async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
     let mut seen = Vec::new();
     while seen.len() < 4 || seen.iter().all(|(order, _)| *order) || seen.iter().all(|(order, _)| !*order) {
         let session = planned(&service, study, &trials).await;
-        let lab = format!("/api/v1/lab/{}", id(&session));
+        let lab = format!("/api/v1/lab-sessions/{}", id(&session));
         for walk in 1..=3 {
             service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
         }
@@ -197,7 +201,7 @@ async fn each_walk_gets_the_controller_file_of_its_own_gait() {
 
 async fn walked(service: &Service, study: StudyId, trials: &[Trial]) -> (String, String) {
     let session = planned(service, study, trials).await;
-    let lab = format!("/api/v1/lab/{}", id(&session));
+    let lab = format!("/api/v1/lab-sessions/{}", id(&session));
     let early = service.post(&format!("{lab}/answers"), &json!({"number": 1, "answer": "first"})).await;
     assert!(early.status == StatusCode::CONFLICT && early.text.contains("walk 1 was not recorded"), "{}", early.text);
     for walk in 1..=3 {
@@ -217,20 +221,20 @@ async fn heard(service: &Service, study: StudyId) -> Vec<FeedbackRow> {
 async fn what_the_person_who_walked_says_is_heard_when_the_order_is_told() {
     let (_folder, service, study, trials) = finished().await;
     let (lab, session) = walked(&service, study, &trials).await;
-    assert_eq!(service.fetch(&lab).await.json()["asks"], 1);
+    assert_eq!(service.fetch(&format!("{lab}/next-walk")).await.json()["asks"], 1);
     let answers = format!("{lab}/answers");
     for (body, status) in [
         (json!({"number": 1, "answer": "withdrawn"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 2, "answer": "first"}), StatusCode::CONFLICT),
-        (json!({"number": 1, "answer": "first"}), StatusCode::CREATED),
+        (json!({"number": 1, "answer": "first"}), StatusCode::OK),
         // Sent twice it counts once; another one does not replace it.
-        (json!({"number": 1, "answer": "first"}), StatusCode::CREATED),
+        (json!({"number": 1, "answer": "first"}), StatusCode::OK),
         (json!({"number": 1, "answer": "second"}), StatusCode::CONFLICT),
     ] {
         let said = service.post(&answers, &body).await;
         assert_eq!(said.status, status, "{body}: {}", said.text);
     }
-    let back = service.post(&format!("{lab}/take-back"), &json!({})).await.json();
+    let back = service.post(&format!("{lab}/retract-answer"), &json!({})).await.json();
     assert_eq!((&back["asks"], &back["answer"]), (&json!(2), &Value::Null));
     let said = json!({"number": 2, "answer": "second", "note": "softer"});
     let seen = service.post(&answers, &said).await.json();
@@ -248,7 +252,7 @@ async fn what_the_person_who_walked_says_is_heard_when_the_order_is_told() {
     let pseudonym = service.fetch(&format!("/api/v1/studies/{study}")).await.json()["subject_id"].clone();
     let pseudonym = service.fetch(&format!("/api/v1/subjects/{}", pseudonym.as_str().unwrap())).await.json();
     assert_eq!((json!(rows[0].author), rows[0].note.as_str()), (pseudonym["pseudonym"].clone(), "softer"));
-    assert_eq!(service.post(&format!("{lab}/take-back"), &json!({})).await.status, StatusCode::CONFLICT);
+    assert_eq!(service.post(&format!("{lab}/retract-answer"), &json!({})).await.status, StatusCode::CONFLICT);
     service.stop().await;
 }
 
@@ -257,8 +261,8 @@ async fn a_walk_that_was_unsafe_closes_both_gaits_until_the_order_says_which() {
     let (_folder, service, study, trials) = finished().await;
     let (lab, session) = walked(&service, study, &trials).await;
     let said = json!({"number": 1, "answer": "unsafe_second", "note": "stumbled"});
-    assert_eq!(service.post(&format!("{lab}/answers"), &said).await.status, StatusCode::CREATED);
-    assert_eq!(service.post(&format!("{lab}/take-back"), &json!({})).await.status, StatusCode::CONFLICT);
+    assert_eq!(service.post(&format!("{lab}/answers"), &said).await.status, StatusCode::OK);
+    assert_eq!(service.post(&format!("{lab}/retract-answer"), &json!({})).await.status, StatusCode::CONFLICT);
     let gaits = converged(&trials);
     let closed = async || {
         let mut closed = Vec::new();
@@ -280,8 +284,8 @@ async fn a_walk_that_was_unsafe_closes_both_gaits_until_the_order_says_which() {
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let (_, of_walk_three) = row.walked().unwrap();
     assert_eq!(closed().await, [gaits[0].id == of_walk_three, gaits[1].id == of_walk_three]);
-    let remarks = service.fetch(&format!("/api/v1/studies/{study}/remarks")).await.json();
-    assert_eq!((&remarks[0]["answer"], &remarks[0]["note"]), (&json!("unsafe_second"), &json!("stumbled")));
+    let assessments = service.fetch(&format!("/api/v1/studies/{study}/assessments")).await.items();
+    assert_eq!((&assessments[0]["answer"], &assessments[0]["note"]), (&json!("unsafe_second"), &json!("stumbled")));
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert_eq!(page.matches(">unsafe</a> by ").count(), 1, "{page}");
     service.stop().await;
@@ -313,7 +317,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
         "{}",
         refused.text
     );
-    assert_eq!(service.fetch(&path).await.json(), json!([]));
+    assert_eq!(service.fetch(&path).await.items(), json!([]));
 
     let body = format!("gait_one={}&gait_two={}&notes=", gaits[0].id, gaits[1].id);
     let made = service.post_text(&form, FORM, &body).await;
@@ -322,7 +326,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     assert!(shown.contains("one of the two gaits: blinded") && shown.contains("without the device"), "{shown}");
     let lab = page.replace("lab-sessions", "lab");
     assert_eq!(service.post_text(&lab, FORM, "walk=1&note=").await.status, StatusCode::SEE_OTHER);
-    assert!(service.fetch(&lab).await.text.contains("Walk 2"));
+    assert!(service.fetch(&format!("{lab}/next-walk")).await.text.contains("Walk 2"));
     assert_eq!(service.post_text(&format!("{page}/close"), FORM, "note=").await.status, StatusCode::SEE_OTHER);
     let again = service.post_text(&format!("{page}/close"), FORM, "note=").await;
     assert!(again.status == StatusCode::CONFLICT && again.text.contains("the session is closed"), "{}", again.text);
@@ -335,17 +339,17 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
 async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     let (folder, service, study, trials) = finished_by(Consistent::default()).await;
     let session = planned(&service, study, &trials).await;
-    service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
     for walk in 2..=3 {
-        service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": walk})).await;
+        service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": walk})).await;
     }
     for (number, answer) in [(1, "first"), (2, "unsafe_first")] {
         let said = json!({"number": number, "answer": answer});
-        service.post(&format!("/api/v1/lab/{}/answers", id(&session)), &said).await;
-        service.post(&format!("/api/v1/lab/{}/take-back", id(&session)), &json!({})).await;
+        service.post(&format!("/api/v1/lab-sessions/{}/answers", id(&session)), &said).await;
+        service.post(&format!("/api/v1/lab-sessions/{}/retract-answer", id(&session)), &json!({})).await;
     }
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
-    service.post(&format!("{api}/electromyograms"), &with_heel(1, &electromyogram(1.0))).await;
+    service.post(&format!("{api}/measurement-files/emg"), &with_heel(1, &electromyogram(1.0))).await;
     let emg = service.post(&format!("{api}/emg-results"), &json!({})).await.json();
     service.post(&format!("{api}/unblind"), &json!({"reason": "all were walked"})).await;
     let file = exported(&service.store, study).await;
@@ -384,7 +388,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
-    let bring = format!("{api}/electromyograms");
+    let bring = format!("{api}/measurement-files/emg");
     let early = service.post(&bring, &with_heel(1, &electromyogram(1.0))).await;
     assert!(
         early.status == StatusCode::CONFLICT && early.text.contains("walk 1 was not recorded yet"),
@@ -392,7 +396,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
         early.text
     );
     for walk in 1..=3 {
-        service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": walk})).await;
+        service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": walk})).await;
     }
     assert!(service.fetch(&format!("{api}/emg-results")).await.json().is_null());
     assert_eq!(service.post(&format!("{api}/emg-results"), &json!({})).await.status, StatusCode::CONFLICT);
@@ -403,7 +407,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
     let same = service.post(&bring, &with_heel(3, &electromyogram(1.5))).await;
     assert!(same.status == StatusCode::CONFLICT && same.text.contains("already uploaded for walk 2"), "{}", same.text);
     let done = service.post(&format!("{api}/emg-results"), &json!({})).await;
-    assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
+    assert_eq!(done.status, StatusCode::OK, "{}", done.text);
     let walks = done.json()["result"]["walks"].as_array().unwrap().clone();
     let used: Vec<_> = walks.iter().map(|walk| walk["walk"].clone()).collect();
     assert_eq!(used, [json!(1), json!(2)], "the newest recording of each walk");
@@ -448,13 +452,13 @@ async fn a_recording_is_given_out_as_it_was_brought() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
-    service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
     // What reading drops is kept: comments, ends of lines, blank lines at the end.
     let file = format!("# Größe 1,8 m\r\n{}\r\n\r\n", electromyogram(1.0).trim_end().replace('\n', "\r\n"));
-    let kept = service.post(&format!("{api}/electromyograms"), &with_heel(1, &file)).await;
+    let kept = service.post(&format!("{api}/measurement-files/emg"), &with_heel(1, &file)).await;
     assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);
     let kept = kept.json();
-    let path = format!("/api/v1/lab-recordings/{}/file", id(&kept));
+    let path = format!("/api/v1/measurement-files/{}/content", id(&kept));
     let answer = service.fetch(&path).await;
     assert_eq!((answer.status, answer.text.as_bytes()), (StatusCode::OK, file.as_bytes()));
     assert_eq!(answer.headers["etag"], format!("\"{}\"", kept["raw_sha256"].as_str().unwrap()));
@@ -462,7 +466,7 @@ async fn a_recording_is_given_out_as_it_was_brought() {
     let name = answer.headers["content-disposition"].to_str().unwrap();
     assert!(name.starts_with("attachment; filename=\"walk-1-electromyogram-"), "{name}");
     assert!(service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text.contains(&format!("href=\"{path}\"")));
-    let unknown = service.fetch(&format!("/api/v1/lab-recordings/{study}/file")).await;
+    let unknown = service.fetch(&format!("/api/v1/measurement-files/{study}/content")).await;
     assert_eq!(unknown.status, StatusCode::NOT_FOUND, "{}", unknown.text);
     service.stop().await;
 }
@@ -472,7 +476,7 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
-    service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
     let whole = electromyogram(1.0);
     let half = &whole[..whole.find("\n1.5,").unwrap() + 9];
     for (body, expected) in [
@@ -487,7 +491,7 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
         (json!({"walk": 1, "recording": whole, "reading": {"form": "opensim"}}), "endheader"),
         (json!({"walk": 1, "recording": whole, "reading": {"form": "c3d"}}), "form"),
     ] {
-        let refused = service.post(&format!("{api}/electromyograms"), &body).await;
+        let refused = service.post(&format!("{api}/measurement-files/emg"), &body).await;
         assert!(refused.status.is_client_error(), "{expected}: {}", refused.text);
         assert!(refused.text.contains(expected), "{expected}: {}", refused.text);
     }
@@ -499,7 +503,7 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
     ] {
         let mut body = json!({"walk": 1, "recording": motion()});
         body.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
-        let refused = service.post(&format!("{api}/motions"), &body).await;
+        let refused = service.post(&format!("{api}/measurement-files/motion"), &body).await;
         assert!(refused.status.is_client_error() && refused.text.contains(expected), "{expected}: {}", refused.text);
     }
     let page = format!("/lab-sessions/{}", id(&session));
@@ -509,9 +513,9 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
     for typed in ["<details open>", ">time_s,TA_L</textarea>", "value=\"heel\"", "value=\"TA\""] {
         assert!(refused.text.contains(typed), "{typed} comes back: {}", refused.text);
     }
-    assert_eq!(service.fetch(&format!("{api}/recordings")).await.json(), json!([]), "nothing was kept");
+    assert_eq!(service.fetch(&format!("{api}/measurement-files")).await.items(), json!([]), "nothing was kept");
     service.post(&format!("{api}/close"), &json!({})).await;
-    let closed = service.post(&format!("{api}/electromyograms"), &with_heel(1, &whole)).await;
+    let closed = service.post(&format!("{api}/measurement-files/emg"), &with_heel(1, &whole)).await;
     assert!(closed.status == StatusCode::CONFLICT && closed.text.contains("the session is closed"), "{}", closed.text);
     service.stop().await;
 }
@@ -522,7 +526,7 @@ async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
     let session = planned(&service, study, &trials).await;
     let (api, page) = (format!("/api/v1/lab-sessions/{}", id(&session)), format!("/lab-sessions/{}", id(&session)));
     for walk in 1..=2 {
-        service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": walk})).await;
+        service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": walk})).await;
     }
     let recording = motion().replace('\n', "%0A").replace(',', "%2C");
     for walk in 1..=2 {
@@ -530,7 +534,7 @@ async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
         let kept = service.post_text(&format!("{page}/motions"), FORM, &form).await;
         assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     }
-    let cycles = service.fetch(&format!("{api}/limit-cycles")).await.json();
+    let cycles = service.fetch(&format!("{api}/limit-cycles")).await.items();
     let joints: Vec<_> = cycles[1]["joints"].as_array().unwrap().iter().map(|joint| &joint["joint"]).collect();
     assert_eq!((joints, &cycles[1]["cutoff_hz"]), (vec![&json!("knee_R"), &json!("ankle_R")], &json!(6.0)));
     let before = service.fetch(&page).await.text;

@@ -19,12 +19,12 @@ async fn ten_thousand_trials_slow_no_page_and_no_list() {
     assert!(slow.is_empty(), "{slow:?}");
     let api = format!("/api/v1/studies/{study}");
     // Every trial can be had, page by page.
-    let (mut after, mut seen) = (0, 0);
+    let (mut cursor, mut seen) = (String::new(), 0);
     loop {
-        let page = service.fetch(&format!("{api}/trials?limit=1000&after={after}")).await.json();
-        seen += page["trials"].as_array().unwrap().len();
-        match page["next"].as_u64() {
-            Some(next) => after = next,
+        let page = service.fetch(&format!("{api}/trials?limit=1000{cursor}")).await.json();
+        seen += page["items"].as_array().unwrap().len();
+        match page["next"].as_str() {
+            Some(next) => cursor = format!("&cursor={next}"),
             None => break,
         }
     }

@@ -75,12 +75,12 @@ const SETS_UP: Door = Door::None("sets up subjects, devices, references, users o
 fn door_of(operation: &str) -> Option<Door> {
     Some(match operation {
         "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => Door::Preference,
-        "post /api/v1/studies/{id}/remarks" => Door::Note,
-        "post /api/v1/blind/{token}/answer" | "post /rate/pair/{token}" => Door::RaterAnswer,
-        "post /api/v1/studies/{id}/blind/next" | "post /rate/{id}" => Door::RaterPair,
+        "post /api/v1/studies/{id}/assessments" => Door::Note,
+        "post /api/v1/blind-pairs/{token}/answer" | "post /rate/pair/{token}" => Door::RaterAnswer,
+        "post /api/v1/studies/{id}/blind-pairs/next" | "post /rate/{id}" => Door::RaterPair,
         "post /api/v1/studies/{id}/lab-sessions" | "post /studies/{id}/lab" => Door::Plan,
-        "post /api/v1/lab/{id}/walks" | "post /lab/{id}" => Door::Walk,
-        "post /api/v1/lab/{id}/answers" | "post /lab/{id}/answer" => Door::WalkAnswer,
+        "post /api/v1/lab-sessions/{id}/walks" | "post /lab/{id}" => Door::Walk,
+        "post /api/v1/lab-sessions/{id}/answers" | "post /lab/{id}/answer" => Door::WalkAnswer,
         "get /api/v1/trials/{id}/controller.json" => Door::DeviceFile,
         "get /api/v1/lab-sessions/{id}/controller.json" => Door::WalkFile,
         "get /api/v1/studies/{id}/recommendation" | "get /api/v1/studies/{id}/recommendation.csv" => {
@@ -93,11 +93,10 @@ fn door_of(operation: &str) -> Option<Door> {
             Door::None("decides about a report; `safety_review.rs` holds its rules")
         }
         "post /api/v1/preferences/{id}/retract"
-        | "post /api/v1/remarks/{id}/retract"
+        | "post /api/v1/assessments/{id}/retract"
         | "post /studies/{id}/retract"
-        | "post /api/v1/lab/{id}/take-back"
+        | "post /api/v1/lab-sessions/{id}/retract-answer"
         | "post /lab/{id}/take-back"
-        | "post /api/v1/blind/{token}/take-back"
         | "post /rate/pair/{token}/take-back" => RETRACTS,
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
             Door::None("the lab evaluates a trial by itself; figures, and no person's answer")
@@ -113,6 +112,7 @@ fn door_of(operation: &str) -> Option<Door> {
             "/process",
             "/motions",
             "/electromyograms",
+            "/measurement-files",
         ]
         .iter()
         .any(|part| operation.contains(part)) =>
@@ -210,7 +210,7 @@ impl Scene {
         match rule {
             Rule::Safety => {
                 let report = json!({"first": first, "second": self.equal, "answer": "unsafe_first", "author": "S"});
-                self.post(&format!("/api/v1/studies/{}/remarks", self.study), &report).await;
+                self.post(&format!("/api/v1/studies/{}/assessments", self.study), &report).await;
                 (first, second)
             }
             Rule::Certificate => {
@@ -241,7 +241,7 @@ impl Scene {
         let planned = self.post(&format!("/api/v1/studies/{}/lab-sessions", self.study), &body).await.json();
         let id = planned["id"].as_str().unwrap().to_owned();
         for walk in 1..=walks {
-            self.post(&format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
+            self.post(&format!("/api/v1/lab-sessions/{id}/walks"), &json!({"walk": walk})).await;
         }
         id
     }
@@ -261,9 +261,9 @@ async fn knock(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session
             let body = format!("a={a}&b={b}&answer=a&source=clinician&author=K&note=&key={key}");
             service.post_text(&format!("/studies/{study}/compare"), FORM, &body).await
         }
-        "post /api/v1/studies/{id}/remarks" => {
+        "post /api/v1/studies/{id}/assessments" => {
             let body = json!({"first": a, "second": b, "answer": "cannot_tell", "author": "K"});
-            service.post(&format!("/api/v1/studies/{study}/remarks"), &body).await
+            service.post(&format!("/api/v1/studies/{study}/assessments"), &body).await
         }
         "post /api/v1/studies/{id}/lab-sessions" => {
             service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &json!({"gait_one": a, "gait_two": b})).await
@@ -273,8 +273,8 @@ async fn knock(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session
                 .post_text(&format!("/studies/{study}/lab"), FORM, &format!("gait_one={a}&gait_two={b}&notes="))
                 .await
         }
-        "post /api/v1/lab/{id}/walks" => {
-            service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": 2})).await
+        "post /api/v1/lab-sessions/{id}/walks" => {
+            service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 2})).await
         }
         "post /lab/{id}" => service.post_text(&format!("/lab/{session}"), FORM, "walk=2&note=").await,
         "get /api/v1/trials/{id}/controller.json" => {
@@ -405,11 +405,11 @@ async fn a_pair_that_was_shown_is_not_answered_after_a_rule_closes_it() {
         let token = scene.token().await;
         scene.close(rule).await;
         let before = scene.service.feedback(scene.study).await.len();
-        let answer = format!("/api/v1/blind/{token}/answer");
+        let answer = format!("/api/v1/blind-pairs/{token}/answer");
         let refused = scene.service.post(&answer, &json!({"answer": "first"})).await;
         assert_eq!(refused.status, statuses[0], "{rule:?}: {}", refused.text);
         assert_eq!(scene.service.feedback(scene.study).await.len(), before, "{rule:?}");
-        let next = scene.service.post(&format!("/api/v1/studies/{}/blind/next", scene.study), &json!({})).await;
+        let next = scene.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", scene.study), &json!({})).await;
         assert_eq!(next.status, statuses[1], "{rule:?}: {}", next.text);
         assert!(
             next.status != StatusCode::OK || next.json()["pair"]["token"] != json!(token),
@@ -437,7 +437,8 @@ impl Rated {
     }
 
     async fn token(&self) -> String {
-        let next = self.service.post(&format!("/api/v1/studies/{}/blind/next", self.study), &json!({})).await.json();
+        let next =
+            self.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", self.study), &json!({})).await.json();
         next["pair"]["token"].as_str().unwrap().to_owned()
     }
 
@@ -448,7 +449,7 @@ impl Rated {
         match rule {
             Rule::Safety => {
                 let report = json!({"first": gaits[0], "second": gaits[1], "answer": "unsafe_both", "author": "S"});
-                self.service.post(&format!("/api/v1/studies/{}/remarks", self.study), &report).await;
+                self.service.post(&format!("/api/v1/studies/{}/assessments", self.study), &report).await;
             }
             Rule::Certificate => {
                 // Nobody certifies it again before the answer comes.
@@ -476,7 +477,7 @@ async fn a_walkers_answer_about_a_gait_reported_unsafe_meanwhile_is_kept_and_not
     let session = scene.session(3).await;
     scene.violate(Rule::Safety).await;
     let before = scene.service.feedback(scene.study).await.len();
-    scene.post(&format!("/api/v1/lab/{session}/answers"), &json!({"number": 1, "answer": "first"})).await;
+    scene.post(&format!("/api/v1/lab-sessions/{session}/answers"), &json!({"number": 1, "answer": "first"})).await;
     scene.post(&format!("/api/v1/lab-sessions/{session}/unblind"), &json!({"reason": "done"})).await;
     assert_eq!(scene.service.feedback(scene.study).await.len(), before, "the learner hears nothing");
     let rows = lab_sessions::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();

@@ -1,6 +1,7 @@
 //! The description of the REST interface: complete, committed, and what the service really does.
 //!
-//! `GAITWRIGHT_WRITE_OPENAPI=1 cargo test -p gaitwright-tests --test openapi` writes the committed file anew.
+//! `GAITWRIGHT_WRITE_OPENAPI=1 cargo test -p gaitwright-tests --test openapi` accepts additions: it writes the committed
+//! file anew. What breaks clients needs `GAITWRIGHT_WRITE_OPENAPI=breaks`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -10,6 +11,7 @@ use gait_optimizer::Violation;
 use gaitwright_http::openapi;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::compatibility::{Difference, compare};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,11 +21,16 @@ use std::path::Path;
 fn the_committed_description_is_that_of_the_code() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/openapi.json");
     let text = openapi::text().unwrap();
-    if std::env::var_os("GAITWRIGHT_WRITE_OPENAPI").is_some() {
+    let committed = std::fs::read_to_string(&file).unwrap();
+    let [old, new]: [Value; 2] = [&committed, &text].map(|text| serde_json::from_str(text).unwrap());
+    let Difference { breaks, additions } = compare(&old, &new);
+    let accepted = std::env::var("GAITWRIGHT_WRITE_OPENAPI").unwrap_or_default();
+    assert!(breaks.is_empty() || accepted == "breaks", "this breaks the clients of the REST interface: {breaks:#?}");
+    if accepted.is_empty() {
+        assert!(committed == text, "server/openapi.json is not up to date; additions: {additions:#?}");
+    } else {
         std::fs::write(&file, &text).unwrap();
     }
-    let committed = std::fs::read_to_string(&file).unwrap_or_default();
-    assert!(committed == text, "server/openapi.json is not up to date: `cargo run -- openapi > server/openapi.json`");
 }
 
 #[test]
@@ -92,18 +99,19 @@ async fn every_change_sent_twice_with_a_key_happens_once_or_refuses_the_key_as_d
         "studies" => json!({"subject_id": subject, "start": false}),
         "extend" => json!({"trial_budget": 7}),
         "preferences" => json!({"trial_a": trial, "trial_b": other, "answer": "a"}),
-        "remarks" => json!({"first": trial, "second": other, "answer": "cannot_tell"}),
+        "assessments" => json!({"first": trial, "second": other, "answer": "cannot_tell"}),
         "users" => json!({"name": "K", "role": "clinician"}),
         "tokens" => json!({"name": "t", "scopes": ["read"]}),
         "invitations" => json!({"name": "guest"}),
-        "restriction" => json!({"restricted": true}),
+        "access" => json!({"restricted": true}),
         _ => json!({}),
     };
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let (mut repeated, mut refused) = (0, 0);
     for (path, item) in document["paths"].as_object().unwrap() {
         for (method, operation) in item.as_object().unwrap().iter().filter(|(method, _)| *method != "get") {
-            let address = path.replace("{id}", &id_of(path)).replace("{token}", &"0".repeat(64));
+            let address =
+                path.replace("{id}", &id_of(path)).replace("{token}", &"0".repeat(64)).replace("{side}", "first");
             let send = async || {
                 let request = Request::builder().method(method.to_uppercase().as_str()).uri(&address);
                 let request =
@@ -138,8 +146,10 @@ async fn settings_at_the_ends_of_their_described_ranges_are_accepted() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let subject = service.subject().await;
     let mut tried = 0;
-    for group in ["gait_settings", "solve_options", "learner"] {
-        let schema = &document["components"]["schemas"]["NewStudy"]["properties"][group];
+    for (group, component) in
+        [("gait_settings", "GaitSettings"), ("solve_options", "SolveOptions"), ("learner", "LearnerSettings")]
+    {
+        let schema = &document["components"]["schemas"][component];
         assert_eq!(schema["additionalProperties"], false, "{group}");
         for (name, field) in schema["properties"].as_object().unwrap() {
             assert_ne!(field["type"], "string", "{group}.{name}: its words are not named");
@@ -295,8 +305,8 @@ async fn what_is_answered_has_the_properties_that_the_description_names() {
 
     let mut description = Description::read();
     let (study, script, trial) = (study.to_string(), script.to_string(), trials[0].id.to_string());
-    let device = service.fetch("/api/v1/devices").await.json()[0]["id"].as_str().unwrap().to_owned();
-    let reference = service.fetch("/api/v1/reference-gaits").await.json()[0]["id"].as_str().unwrap().to_owned();
+    let device = service.fetch("/api/v1/devices").await.items()[0]["id"].as_str().unwrap().to_owned();
+    let reference = service.fetch("/api/v1/reference-gaits").await.items()[0]["id"].as_str().unwrap().to_owned();
     let subject = service.subject().await.to_string();
     for (path, id) in [
         ("/subjects", ""),
@@ -343,6 +353,35 @@ async fn what_is_answered_has_the_properties_that_the_description_names() {
         assert!(description.seen.contains(shape), "{shape} was not seen among {:?}", description.seen);
     }
     service.stop().await;
+}
+
+/// Every list is a page, and every page is asked for in the same way.
+#[test]
+fn every_list_has_the_same_envelope_and_the_same_parameters() {
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut lists = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            let what = format!("{method} {path}");
+            for (status, answer) in operation["responses"].as_object().unwrap() {
+                let schema = &answer["content"]["application/json"]["schema"];
+                assert_ne!(schema["type"], "array", "{what} {status} answers a bare list");
+            }
+            let schema = &operation["responses"]["200"]["content"]["application/json"]["schema"];
+            let Some(name) = schema["$ref"].as_str().and_then(|name| name.strip_prefix("#/components/schemas/")) else {
+                continue;
+            };
+            let parameters = operation["parameters"].as_array().cloned().unwrap_or_default();
+            let paging: Vec<&Value> =
+                parameters.iter().filter(|one| ["cursor", "limit"].contains(&one["name"].as_str().unwrap())).collect();
+            let fields = document["components"]["schemas"][name]["properties"].as_object();
+            let fields: Vec<&String> = fields.into_iter().flat_map(serde_json::Map::keys).collect();
+            let is_page = fields == ["items", "next"];
+            assert_eq!((name.ends_with("Page"), paging.len()), (is_page, if is_page { 2 } else { 0 }), "{what}");
+            lists += usize::from(is_page);
+        }
+    }
+    assert!(lists > 20, "{lists}");
 }
 
 /// Generators make a method of each: `list_studies`, `withdraw_consent`.
@@ -420,13 +459,20 @@ async fn devices_and_muscles_are_accepted_exactly_where_they_fit_the_description
     let subject = service.subject().await;
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut drawn = Drawn { state: 1, drawn: 0 };
-    for path in ["/api/v1/devices", "/api/v1/subjects/{id}/muscles"] {
-        let schema = &document["paths"][path]["post"]["requestBody"]["content"]["application/json"]["schema"];
+    let muscles = "/api/v1/subjects/{id}/muscles";
+    for (method, path, component) in
+        [("post", "/api/v1/devices", "DeviceDefinition"), ("put", muscles, "MuscleParameters")]
+    {
+        let schema = &document["components"]["schemas"][component];
         let address = path.replace("{id}", &subject.to_string());
+        let send = async |body: &Value| match method {
+            "put" => service.put(&address, body).await,
+            _ => service.post(&address, body).await,
+        };
         for _ in 0..100 {
             let body = drawn.value(schema);
-            let answer = service.post(&address, &body).await;
-            assert_eq!(answer.status, StatusCode::CREATED, "{path}: {body}: {}", answer.text);
+            let answer = send(&body).await;
+            assert!(answer.status.is_success(), "{path}: {body}: {}", answer.text);
         }
         // Every number beyond either end of its range is refused by name.
         let mut refused = 0;
@@ -446,7 +492,7 @@ async fn devices_and_muscles_are_accepted_exactly_where_they_fit_the_description
                         Some(group) => body[group] = json!({ name: beyond }),
                         None => body[name] = json!(beyond),
                     }
-                    let answer = service.post(&address, &body).await;
+                    let answer = send(&body).await;
                     assert_eq!(answer.status, StatusCode::UNPROCESSABLE_ENTITY, "{path}: {body}: {}", answer.text);
                     assert!(answer.json()["field"].as_str().unwrap().ends_with(name.as_str()), "{}", answer.text);
                     refused += 1;

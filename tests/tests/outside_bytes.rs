@@ -222,13 +222,13 @@ async fn cursors_and_identifiers() {
     let target = Target::set().await;
     let study = &target.study;
     let paths = [
-        format!("/api/v1/studies/{study}/trials?after="),
-        format!("/api/v1/studies/{study}/preferences?after="),
-        "/api/v1/studies?before=".to_owned(),
-        "/api/v1/subjects?before=".to_owned(),
-        "/api/v1/audit?before=".to_owned(),
+        format!("/api/v1/studies/{study}/trials?cursor="),
+        format!("/api/v1/studies/{study}/preferences?cursor="),
+        "/api/v1/studies?cursor=".to_owned(),
+        "/api/v1/subjects?cursor=".to_owned(),
+        "/api/v1/audit?cursor=".to_owned(),
         "/api/v1/subjects?limit=".to_owned(),
-        "/api/v1/compare?ids=".to_owned(),
+        "/api/v1/study-comparison?ids=".to_owned(),
         "/api/v1/trials/".to_owned(),
         "/studies/".to_owned(),
         "/static/".to_owned(),

@@ -50,7 +50,7 @@ async fn a_study_without_a_gait_has_no_best_trial() {
     assert!(trials.iter().all(|trial| trial.state == TrialState::NotConverged));
     assert_eq!(ranked(&service, study).await, []);
     let api = format!("/api/v1/studies/{study}");
-    assert_eq!(service.fetch(&format!("{api}/history")).await.json(), json!([]));
+    assert_eq!(service.fetch(&format!("{api}/history")).await.items(), json!([]));
     assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(!page.contains("the best so far") && !page.contains(">best<"), "{page}");

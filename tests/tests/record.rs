@@ -64,7 +64,7 @@ async fn a_repeated_request_has_one_effect_and_the_same_answer() {
     let study = json!({"subject_id": first.json()["id"], "trial_budget": 1, "start": false});
     let made = post_with_key(&service, "/api/v1/studies", "key-3", &study).await;
     assert_eq!(post_with_key(&service, "/api/v1/studies", "key-3", &study).await.text, made.text);
-    assert_eq!(service.fetch("/api/v1/studies").await.json()["studies"].as_array().unwrap().len(), 1);
+    assert_eq!(service.fetch("/api/v1/studies").await.items().as_array().unwrap().len(), 1);
     let start = format!("/api/v1/studies/{}/start", made.json()["id"].as_str().unwrap());
     let started = post_with_key(&service, &start, "key-4", &json!({})).await;
     assert_eq!(post_with_key(&service, &start, "key-4", &json!({})).await.text, started.text);

@@ -38,7 +38,7 @@ async fn a_recording_becomes_the_reference_of_a_study() {
     assert_eq!(service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json()["id"], near["id"]);
 
     let subject = service.subject().await;
-    let matches = service.fetch(&format!("/api/v1/subjects/{subject}/reference-gaits")).await.json();
+    let matches = service.fetch(&format!("/api/v1/subjects/{subject}/reference-gaits")).await.items();
     let names: Vec<_> =
         matches.as_array().unwrap().iter().map(|m| m["reference_gait"]["name"].as_str().unwrap()).collect();
     assert_eq!(names[..2], ["near", "far"]);
@@ -66,7 +66,7 @@ async fn a_recording_becomes_the_reference_of_a_study() {
 #[tokio::test]
 async fn what_is_not_whole_imports_nothing_and_says_where() {
     let (_folder, service) = service().await;
-    let before = service.fetch("/api/v1/reference-gaits").await.json();
+    let before = service.fetch("/api/v1/reference-gaits").await.items();
     let text = recording();
     let (half, _) = text.split_at(text.find("\n1,0.1,").unwrap() + 12);
     for (change, expected) in [
@@ -87,7 +87,7 @@ async fn what_is_not_whole_imports_nothing_and_says_where() {
         assert!(refused.status.is_client_error(), "{change}: {}", refused.text);
         assert!(refused.text.contains(expected), "{expected}: {}", refused.text);
     }
-    assert_eq!(service.fetch("/api/v1/reference-gaits").await.json(), before);
+    assert_eq!(service.fetch("/api/v1/reference-gaits").await.items(), before);
     service.stop().await;
 }
 

@@ -44,7 +44,7 @@ async fn health_answers_while_eight_requests_compute() {
     let begun = Instant::now();
     let slow: Vec<_> = (0..8)
         .map(|_| {
-            let (address, path) = (address.clone(), format!("/api/v1/compare?ids={one},{other}"));
+            let (address, path) = (address.clone(), format!("/api/v1/study-comparison?ids={one},{other}"));
             std::thread::spawn(move || client::get(&address, &path).map(|reply| reply.status))
         })
         .collect();

@@ -27,7 +27,7 @@ async fn converged(service: &Service, study: StudyId) -> Vec<TrialId> {
 }
 
 async fn safety_reports(service: &Service, study: StudyId) -> Vec<Value> {
-    let all = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.json();
+    let all = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
     all.as_array().unwrap().clone()
 }
 
@@ -42,9 +42,9 @@ async fn waits_at_home(service: &Service) -> bool {
 #[tokio::test]
 async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record() {
     let (_folder, service, study) = started(FeedbackMode::Human, 4).await;
-    let pair = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
-    let answer = format!("/api/v1/blind/{}/answer", pair["pair"]["token"].as_str().unwrap());
-    assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::CREATED);
+    let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!(said.len(), 1, "{said:?}");
     assert_eq!((&said[0]["stands"], &said[0]["review"]), (&json!(true), &Value::Null));
@@ -56,7 +56,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     // It stays unsafe: nobody needs to look again, and it can still be lifted.
     let stays =
         decide(&service, &gait, &json!({"verdict": "unsafe", "reason": "the knee buckles", "author": "K1"})).await;
-    assert_eq!((stays.status, &stays.json()["verdict"]), (StatusCode::CREATED, &json!("unsafe")));
+    assert_eq!((stays.status, &stays.json()["verdict"]), (StatusCode::OK, &json!("unsafe")));
     assert!(!waits_at_home(&service).await);
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(shown.contains("K1 looked at it and leaves it so: <q>the knee buckles</q>"), "{shown}");
@@ -64,7 +64,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     assert!(heard.iter().all(|row| row.retraction.is_none()));
 
     let walkable = json!({"verdict": "walkable", "reason": "the video was cut", "author": "K2"});
-    assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
+    assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!((&said[0]["stands"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
@@ -89,7 +89,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     );
     // So it is asked about again.
     service.wait_for(study, &[StudyState::Waiting]).await;
-    let again = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let again = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     assert!(again["pair"].is_object(), "{again}");
     service.stop().await;
 }
@@ -101,7 +101,7 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     let best = recommended().await["trial_id"].clone();
     let other = converged(&service, study).await.into_iter().find(|id| json!(id) != best).unwrap();
     let remark = json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K1"});
-    let remarks = format!("/api/v1/studies/{study}/remarks");
+    let remarks = format!("/api/v1/studies/{study}/assessments");
     service.post(&remarks, &remark).await;
     assert_ne!(recommended().await["trial_id"], best);
     let best_id = best.as_str().unwrap();
@@ -150,14 +150,14 @@ async fn what_was_lifted_in_the_lab_is_said_anew_when_the_order_is_told() {
     let plan = json!({"gait_one": gaits[0], "gait_two": gaits[1]});
     let id = service.post(&sessions, &plan).await.json()["id"].as_str().unwrap().to_owned();
     for walk in 1..=3 {
-        service.post(&format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
+        service.post(&format!("/api/v1/lab-sessions/{id}/walks"), &json!({"walk": walk})).await;
     }
-    service.post(&format!("/api/v1/lab/{id}/answers"), &json!({"number": 1, "answer": "unsafe_first"})).await;
+    service.post(&format!("/api/v1/lab-sessions/{id}/answers"), &json!({"number": 1, "answer": "unsafe_first"})).await;
     assert_eq!(safety_reports(&service, study).await.len(), 2, "which of the two would tell the order");
     for gait in &gaits[..2] {
         let lifted =
             decide(&service, gait, &json!({"verdict": "walkable", "reason": "he stumbled over a cable"})).await;
-        assert_eq!(lifted.status, StatusCode::CREATED, "{}", lifted.text);
+        assert_eq!(lifted.status, StatusCode::OK, "{}", lifted.text);
     }
     let planned = service.post(&sessions, &plan).await;
     assert_eq!(planned.status, StatusCode::CREATED, "{}", planned.text);

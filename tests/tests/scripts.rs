@@ -153,10 +153,13 @@ async fn a_finished_study_is_extended_forked_and_compared() {
     assert_eq!((&fork["forked_from"], &fork["seed"], &fork["trial_budget"]), (&json!(study), &json!(9), &json!(5)));
     let forked: StudyId = fork["id"].as_str().unwrap().parse().unwrap();
     service.wait_for(forked, &[StudyState::Finished]).await;
-    let both = service.fetch(&format!("/api/v1/compare?ids={study},{forked}")).await.json();
+    let both = service.fetch(&format!("/api/v1/study-comparison?ids={study},{forked}")).await.items();
     assert_eq!((&both[0]["id"], &both[1]["trials"]["total"]), (&json!(study), &json!(5)));
     assert!(both[0]["best_gait_rmse_rad"].is_f64());
-    assert_eq!(service.fetch(&format!("/api/v1/compare?ids={study}")).await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert_eq!(
+        service.fetch(&format!("/api/v1/study-comparison?ids={study}")).await.status,
+        StatusCode::UNPROCESSABLE_ENTITY
+    );
     service.stop().await;
 }
 

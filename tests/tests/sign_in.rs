@@ -38,7 +38,15 @@ async fn status(service: &Service, who: &As) -> StatusCode {
 }
 
 async fn post(service: &Service, who: &As, path: &str, body: &Value) -> (StatusCode, Value) {
-    let answer = send(service, who, &Method::POST, path, JSON, &body.to_string()).await;
+    change(service, who, &Method::POST, path, body).await
+}
+
+async fn put(service: &Service, who: &As, path: &str, body: &Value) -> (StatusCode, Value) {
+    change(service, who, &Method::PUT, path, body).await
+}
+
+async fn change(service: &Service, who: &As, method: &Method, path: &str, body: &Value) -> (StatusCode, Value) {
+    let answer = send(service, who, method, path, JSON, &body.to_string()).await;
     (answer.status, serde_json::from_str(&answer.text).unwrap_or_default())
 }
 
@@ -206,8 +214,9 @@ async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
     let (ada, link) = user(&service, "Ada", Role::Admin).await;
     let disable = format!("/api/v1/users/{admin}/disable");
     let demote = format!("/api/v1/users/{admin}/role");
-    for (path, body) in [(&disable, json!({})), (&demote, json!({"role": "clinician"}))] {
-        let (refused, problem) = post(&service, &me, path, &body).await;
+    let demoted = json!({"role": "clinician"});
+    for (method, path, body) in [(Method::POST, &disable, &json!({})), (Method::PUT, &demote, &demoted)] {
+        let (refused, problem) = change(&service, &me, &method, path, body).await;
         assert_eq!(refused, StatusCode::CONFLICT, "{path}");
         assert!(problem["detail"].as_str().unwrap().contains("last administrator who can sign in"), "{problem}");
     }
@@ -236,8 +245,8 @@ async fn role_changes_hold_from_the_next_request_and_are_audited() {
         send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status,
         StatusCode::FORBIDDEN
     );
-    assert_eq!(post(&service, &ada_session, &role, &json!({"role": "admin"})).await.0, StatusCode::FORBIDDEN);
-    let (done, changed) = post(&service, &admin, &role, &json!({"role": "clinician"})).await;
+    assert_eq!(put(&service, &ada_session, &role, &json!({"role": "admin"})).await.0, StatusCode::FORBIDDEN);
+    let (done, changed) = put(&service, &admin, &role, &json!({"role": "clinician"})).await;
     assert_eq!((done, &changed["role"]), (StatusCode::OK, &json!("clinician")));
     assert_eq!(send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status, StatusCode::OK);
     let form = format!("act=role&id={ada}&role=rater");
@@ -255,7 +264,7 @@ async fn role_changes_hold_from_the_next_request_and_are_audited() {
             json!({"name": "Ada", "before": "rater", "role": "clinician"})
         ]
     );
-    let (unknown, problem) = post(&service, &admin, &role, &json!({"role": "king"})).await;
+    let (unknown, problem) = put(&service, &admin, &role, &json!({"role": "king"})).await;
     assert!(unknown.is_client_error() && problem["detail"].as_str().unwrap().contains("role"), "{problem}");
     service.stop().await;
 }
@@ -316,7 +325,9 @@ async fn sessions_are_listed_and_ended_one_by_one() {
     let phone = session_of(&sign_in_from(&service, [10, 0, 0, 2], None, "Ada", RIGHT).await);
     let list = |who: As| {
         let service = &service;
-        async move { send(service, &who, &Method::GET, "/api/v1/sessions", "", "").await.json().as_array().unwrap().clone() }
+        async move {
+            send(service, &who, &Method::GET, "/api/v1/sessions", "", "").await.items().as_array().unwrap().clone()
+        }
     };
     let own = list(desk.clone()).await;
     assert_eq!(own.len(), 2, "{own:?}");
@@ -475,13 +486,13 @@ async fn event_streams_end_with_what_allowed_them() {
 
     let done = send(&service, &sessions[0], &Method::POST, "/sign-out", FORM, "").await;
     assert_eq!(done.status, StatusCode::SEE_OTHER);
-    let live = send(&service, &sessions[1], &Method::GET, "/api/v1/sessions", "", "").await.json();
+    let live = send(&service, &sessions[1], &Method::GET, "/api/v1/sessions", "", "").await.items();
     let ended = format!("/api/v1/sessions/{}/end", live[0]["id"].as_str().unwrap());
     assert_eq!(post(&service, &root, &ended, &json!({})).await.0, StatusCode::OK);
     let user = |number: usize, what: &str| format!("/api/v1/users/{}/{what}", ids[number]);
     assert_eq!(post(&service, &root, &user(2, "disable"), &json!({})).await.0, StatusCode::OK);
     assert_eq!(post(&service, &root, &user(3, "role"), &json!({"role": "rater"})).await.0, StatusCode::OK);
-    let tokens = send(&service, &root, &Method::GET, "/api/v1/tokens", "", "").await.json();
+    let tokens = send(&service, &root, &Method::GET, "/api/v1/tokens", "", "").await.items();
     let revoke = format!("/api/v1/tokens/{}/revoke", tokens[0]["id"].as_str().unwrap());
     assert_eq!(post(&service, &root, &revoke, &json!({})).await.0, StatusCode::OK);
     let idle = streams.pop().unwrap();

@@ -34,7 +34,15 @@ struct Closed {
 }
 
 async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Value {
-    let answer = send(service, who, &Method::POST, path, JSON, &body.to_string()).await;
+    change(service, who, &Method::POST, path, body).await
+}
+
+async fn put(service: &Service, who: &As, path: &str, body: &Value) -> Value {
+    change(service, who, &Method::PUT, path, body).await
+}
+
+async fn change(service: &Service, who: &As, method: &Method, path: &str, body: &Value) -> Value {
+    let answer = send(service, who, method, path, JSON, &body.to_string()).await;
     assert!(answer.status.is_success(), "{path}: {} {}", answer.status, answer.text);
     answer.json()
 }
@@ -52,30 +60,33 @@ impl Closed {
         let gaits: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
         let (a, b) = (gaits[0].id, gaits[1].id);
         let api = format!("/api/v1/studies/{study}");
-        let remark = json!({"first": a, "second": gaits[2].id, "answer": "cannot_tell"});
-        let remark = post(&service, &admin, &format!("{api}/remarks"), &remark).await;
+        let assessment = json!({"first": a, "second": gaits[2].id, "answer": "cannot_tell"});
+        let assessment = post(&service, &admin, &format!("{api}/assessments"), &assessment).await;
         let pair = json!({"trial_a": a, "trial_b": b, "answer": "a"});
         let preference = post(&service, &admin, &format!("{api}/preferences"), &pair).await;
         let session = json!({"gait_one": a, "gait_two": b});
         let session = post(&service, &admin, &format!("{api}/lab-sessions"), &session).await;
         let session = session["id"].as_str().unwrap().to_owned();
-        post(&service, &admin, &format!("/api/v1/lab/{session}/walks"), &json!({"walk": 1})).await;
+        post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
         let measured = json!({"walk": 1, "recording": motion()});
-        let brought = post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/motions"), &measured).await;
+        let brought =
+            post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &measured)
+                .await;
         member(&service, study, MemberKind::User, "a admin").await;
-        post(&service, &admin, &format!("{api}/access"), &json!({"restricted": true})).await;
-        let listed = send(&service, &admin, &Method::GET, &format!("{api}/members"), "", "").await.json();
+        put(&service, &admin, &format!("{api}/access"), &json!({"restricted": true})).await;
+        let listed = send(&service, &admin, &Method::GET, &format!("{api}/members"), "", "").await.items();
         let id = |value: &Value| value["id"].as_str().unwrap().to_owned();
         let names = BTreeMap::from([
             ("studies", study.to_string()),
             ("rate", study.to_string()),
             ("trials", a.to_string()),
+            ("jobs", format!("solve-{a}")),
             ("preferences", id(&preference)),
-            ("remarks", id(&remark)),
+            ("assessments", id(&assessment)),
             ("lab-sessions", session.clone()),
             ("lab", session),
-            ("lab-recordings", id(&brought)),
-            ("study-members", id(&listed["members"][0])),
+            ("measurement-files", id(&brought)),
+            ("study-members", id(&listed[0])),
         ]);
         Self { _folder: folder, service, admin, study, names }
     }
@@ -238,7 +249,7 @@ async fn lists_show_a_restricted_study_to_its_members_alone() {
     let (other, who) = (open, &outsiders.iter().find(|(_, name, ..)| *name == "read").unwrap().0);
     let study = closed.study;
     for path in [
-        format!("/api/v1/compare?ids={other},{{}}"),
+        format!("/api/v1/study-comparison?ids={other},{{}}"),
         format!("/studies/compare?a={other}&b={{}}"),
         format!("/studies/{other}/figures?other={{}}"),
         format!("/api/v1/studies/{other}/figures/rmse.csv?other={{}}"),
@@ -264,7 +275,7 @@ async fn asking() -> (TempDir, Service, StudyId, As) {
 async fn rater_reaches_assigned_studies_alone_until_removed() {
     let (_folder, service, study, rater) = asking().await;
     let clinician = signed_in(&service, Role::Clinician).await;
-    let next = format!("/api/v1/studies/{study}/blind/next");
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let list = send(&service, &rater, &Method::GET, "/rate", "", "").await;
     assert!(list.text.contains("You are not assigned to a study yet. Ask"), "{}", list.text);
     assert_eq!(send(&service, &rater, &Method::POST, &next, JSON, "{}").await.status, StatusCode::NOT_FOUND);
@@ -285,8 +296,8 @@ async fn rater_reaches_assigned_studies_alone_until_removed() {
     let pair = post(&service, &rater, &next, &json!({})).await;
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     let doors = [
-        (Method::GET, format!("/api/v1/blind/{token}/first")),
-        (Method::GET, format!("/api/v1/blind/{token}/second")),
+        (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/first")),
+        (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/second")),
         (Method::GET, format!("/rate/pair/{token}")),
     ];
     for (method, path) in &doors {
@@ -298,7 +309,7 @@ async fn rater_reaches_assigned_studies_alone_until_removed() {
     post(&service, &clinician, &remove, &json!({})).await;
     let twice = send(&service, &clinician, &Method::POST, &remove, JSON, "{}").await;
     assert_eq!(twice.status, StatusCode::CONFLICT, "{}", twice.text);
-    let (answer, body) = (format!("/api/v1/blind/{token}/answer"), r#"{"answer": "first"}"#);
+    let (answer, body) = (format!("/api/v1/blind-pairs/{token}/answer"), r#"{"answer": "first"}"#);
     let form = format!("/rate/pair/{token}");
     for (method, path) in &doors {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::NOT_FOUND, "{path}");
@@ -325,8 +336,10 @@ async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restrict
     let path = format!("/api/v1/studies/{study}");
     let status = async |who: &As, path: &str| send(&service, who, &Method::GET, path, "", "").await.status;
     assert_eq!(status(&script, &path).await, StatusCode::OK);
-    let access = post(&service, &clinician, &format!("{path}/access"), &json!({"restricted": true})).await;
-    assert_eq!((&access["restricted"], &access["members"][0]["name"]), (&json!(true), &json!("a clinician")));
+    let access = put(&service, &clinician, &format!("{path}/access"), &json!({"restricted": true})).await;
+    assert_eq!(access, json!({"restricted": true}));
+    let members = send(&service, &clinician, &Method::GET, &format!("{path}/members"), "", "").await.items();
+    assert_eq!(members[0]["name"], "a clinician");
     assert_eq!(status(&script, &path).await, StatusCode::NOT_FOUND);
     assert_eq!(status(&clinician, &path).await, StatusCode::OK);
 
@@ -334,11 +347,13 @@ async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restrict
     let fork = post(&service, &clinician, &format!("{path}/fork"), &json!({})).await;
     let fork = format!("/api/v1/studies/{}", fork["id"].as_str().unwrap());
     assert_eq!(status(&script, &fork).await, StatusCode::NOT_FOUND);
-    let members = send(&service, &clinician, &Method::GET, &format!("{fork}/members"), "", "").await.json();
-    let names: Vec<_> = members["members"].as_array().unwrap().iter().map(|member| &member["name"]).collect();
-    assert_eq!((&members["restricted"], names), (&json!(true), vec![&json!("a clinician")]), "raters are not copied");
+    let members = send(&service, &clinician, &Method::GET, &format!("{fork}/members"), "", "").await.items();
+    let names: Vec<_> = members.as_array().unwrap().iter().map(|member| &member["name"]).collect();
+    assert_eq!(names, [&json!("a clinician")], "raters are not copied");
+    let access = send(&service, &clinician, &Method::GET, &format!("{fork}/access"), "", "").await.json();
+    assert_eq!(access["restricted"], true);
 
-    post(&service, &clinician, &format!("{path}/access"), &json!({"restricted": false})).await;
+    put(&service, &clinician, &format!("{path}/access"), &json!({"restricted": false})).await;
     assert_eq!(status(&script, &path).await, StatusCode::OK);
     service.stop().await;
 }
@@ -350,7 +365,7 @@ async fn event_stream_ends_for_whoever_is_removed() {
     let As::Session(secret) = signed_in(&service, Role::Clinician).await else { panic!("a session") };
     let added = member(&service, study, MemberKind::User, "a clinician").await;
     let path = format!("/api/v1/studies/{study}");
-    post(&service, &admin, &format!("{path}/access"), &json!({"restricted": true})).await;
+    put(&service, &admin, &format!("{path}/access"), &json!({"restricted": true})).await;
     let request = Request::get(format!("{path}/events"))
         .header(header::COOKIE, format!("gaitwright_session={secret}"))
         .body(Body::empty())
@@ -392,8 +407,8 @@ async fn rater_is_invited_with_assignment_and_link_in_one_step() {
     assert_eq!(refused.status, StatusCode::FORBIDDEN);
     let added = send(&service, &clinician, &Method::POST, &page, FORM, "act=add&who=user+a+rater").await;
     assert_eq!(added.status, StatusCode::SEE_OTHER, "{}", added.text);
-    let listed = send(&service, &clinician, &Method::GET, &format!("/api/v1{page}"), "", "").await.json();
-    let names: Vec<_> = listed["members"].as_array().unwrap().iter().map(|member| &member["name"]).collect();
+    let listed = send(&service, &clinician, &Method::GET, &format!("/api/v1{page}"), "", "").await.items();
+    let names: Vec<_> = listed.as_array().unwrap().iter().map(|member| &member["name"]).collect();
     assert_eq!(names, ["R7", "R8", "a rater"]);
     let remove = format!("act=remove&member={}", listed["members"][2]["id"].as_str().unwrap());
     let removed = send(&service, &clinician, &Method::POST, &page, FORM, &remove).await;
@@ -421,8 +436,9 @@ async fn study_that_is_made_restricted_is_never_open() {
         let address = format!("/api/v1/studies/{study}");
         assert_eq!(send(&service, &clinician, &Method::GET, &address, "", "").await.status, StatusCode::OK);
         assert_eq!(send(&service, &other, &Method::GET, &address, "", "").await.status, StatusCode::NOT_FOUND);
-        let access = send(&service, &clinician, &Method::GET, &format!("{address}/members"), "", "").await.json();
-        assert_eq!((&access["restricted"], access["members"].as_array().unwrap().len()), (&json!(true), 1), "{access}");
+        let access = send(&service, &clinician, &Method::GET, &format!("{address}/access"), "", "").await.json();
+        let members = send(&service, &clinician, &Method::GET, &format!("{address}/members"), "", "").await.items();
+        assert_eq!((&access["restricted"], members.as_array().unwrap().len()), (&json!(true), 1), "{members}");
     }
     service.stop().await;
 }
@@ -478,7 +494,7 @@ async fn trial_of_another_study_is_answered_as_one_that_does_not_exist() {
         let mut all = Vec::new();
         for (path, body) in [
             ("preferences", json!({"trial_a": gaits[0], "trial_b": id, "answer": "a"})),
-            ("remarks", json!({"first": gaits[0], "second": id, "answer": "cannot_tell"})),
+            ("assessments", json!({"first": gaits[0], "second": id, "answer": "cannot_tell"})),
             ("lab-sessions", json!({"gait_one": gaits[0], "gait_two": id})),
             ("suggestions", json!({"over": id, "bounds": {"a6": 0.2}})),
         ] {

@@ -32,9 +32,9 @@ if (box) {
 
   /** @param {string} side @returns {Promise<Place[][]>} */
   const load = async (side) => {
-    const reply = await fetch(`/api/v1/blind/${box.dataset.pair}/${side}`);
+    const reply = await fetch(`/api/v1/blind-pairs/${box.dataset.pair}/motions/${side}`);
     if (!reply.ok) throw new Error(`${reply.status}`);
-    return reply.json();
+    return (await reply.json()).figures;
   };
 
   /** @param {HTMLCanvasElement} canvas @param {Place[][]} motion @param {number} phase */

@@ -35,7 +35,7 @@ def main():
         else:
             client.tell_converged(trial["id"], gait_rmse_rad=rmse)
         print(f"trial {trial['number']}: {'stumbled' if rmse is None else f'{rmse:.4f} rad'}")
-    best = client.history(study)[-1]
+    best = list(client.history(study))[-1]
     print(f"best: trial {best['number']}, {best['gait_rmse_rad']:.4f} rad")
 
 

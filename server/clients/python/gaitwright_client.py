@@ -90,12 +90,22 @@ class Client:
                     raise
                 time.sleep(0.2 * 2**attempt)
 
+    def pages(self, name, id=None, filters=None):
+        """Every entry of a list, page by page."""
+        query = dict(filters or {})
+        while True:
+            page = self.call(name, id, query=query)
+            yield from page["items"]
+            if page["next"] is None:
+                return
+            query["cursor"] = page["next"]
+
     # who and what
     def me(self):
         return self.call("me")
 
     def subjects(self):
-        return self.call("subjects")
+        return self.pages("subjects")
 
     def add_subject(self, pseudonym, height_m, body_mass_kg, notes=""):
         body = {"pseudonym": pseudonym, "height_m": height_m, "body_mass_kg": body_mass_kg, "notes": notes}
@@ -103,7 +113,7 @@ class Client:
 
     # studies
     def studies(self):
-        return self.call("studies")["studies"]
+        return self.pages("studies")
 
     def study(self, study):
         return self.call("study", study)
@@ -134,16 +144,11 @@ class Client:
         return self.call("fork", study, differs)
 
     def history(self, study):
-        return self.call("history", study)
+        return self.pages("history", study)
 
     # trials
-    def trials(self, study):
-        """Every trial, page by page."""
-        after = 0
-        while after is not None:
-            page = self.call("trials", study, query={"after": after})
-            yield from page["trials"]
-            after = page.get("next")
+    def trials(self, study, **filters):
+        return self.pages("trials", study, filters)
 
     def trial(self, trial):
         return self.call("trial", trial)
@@ -175,7 +180,7 @@ class Client:
         return self.call("prefer", study, {"trial_a": trial_a, "trial_b": trial_b, "answer": answer, **more})
 
     def preferences(self, study):
-        return self.call("preferences", study)
+        return self.pages("preferences", study)
 
     def retract(self, preference, reason):
         return self.call("retract", preference, {"reason": reason})

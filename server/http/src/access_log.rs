@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 use uuid::Uuid;
 
 /// Routes that show nothing of a subject.
-pub const NO_SUBJECT_DATA: [&str; 28] = [
+pub const NO_SUBJECT_DATA: [&str; 30] = [
     "/static/{*path}",
     "/health",
     "/ready",
@@ -47,7 +47,9 @@ pub const NO_SUBJECT_DATA: [&str; 28] = [
     "/api/v1/me",
     "/api/v1/sessions",
     "/api/v1/users",
+    "/api/v1/users/{id}",
     "/api/v1/tokens",
+    "/api/v1/tokens/{id}",
     "/api/v1/jobs",
     "/api/v1/workers",
     "/api/v1/devices",

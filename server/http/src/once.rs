@@ -71,8 +71,40 @@ impl<P: Permission> Once<P> {
         Ok(app.write().await?)
     }
 
+    /// Answers 201 with something that was made and its address.
+    pub(crate) async fn created<T: Serialize>(
+        &self,
+        app: &AppState,
+        writer: LentWriter<'_>,
+        location: String,
+        body: &T,
+    ) -> Result<Response, Refusal> {
+        self.finish(app, writer, StatusCode::CREATED, Some(location), body).await
+    }
+
+    /// Answers 200: something that was there already is changed.
+    pub(crate) async fn done<T: Serialize>(
+        &self,
+        app: &AppState,
+        writer: LentWriter<'_>,
+        body: &T,
+    ) -> Result<Response, Refusal> {
+        self.finish(app, writer, StatusCode::OK, None, body).await
+    }
+
+    /// Answers 202 with the job that does the work and its address.
+    pub(crate) async fn accepted<T: Serialize>(
+        &self,
+        app: &AppState,
+        writer: LentWriter<'_>,
+        location: String,
+        body: &T,
+    ) -> Result<Response, Refusal> {
+        self.finish(app, writer, StatusCode::ACCEPTED, Some(location), body).await
+    }
+
     /// Keeps the answer, makes the effect durable and tells the scheduler.
-    pub(crate) async fn finish<T: Serialize>(
+    async fn finish<T: Serialize>(
         &self,
         app: &AppState,
         mut writer: LentWriter<'_>,

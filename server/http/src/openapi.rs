@@ -1,15 +1,15 @@
 //! Generates the OpenAPI 3.1 description of the REST interface from the handlers.
 //!
 //! What holds for every operation is added here, so that no handler can forget it: the problem documents, the
-//! Idempotency-Key of every change whose answer holds no secret, the rules of values, the ways to say who calls.
+//! parameters of pages, the Idempotency-Key of every change whose answer holds no secret, the rules of values, the ways
+//! to say who calls.
 
+use super::paging::{DEFAULT_LIMIT, LARGEST_LIMIT};
 use super::problem::{PROBLEM_JSON, Problem};
 use super::{api, openapi_rules};
-use serde_json::Value;
-use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
-use utoipa::openapi::schema::{ObjectBuilder, Type};
+use serde_json::{Map, Value, json};
+use utoipa::openapi::OpenApi;
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityScheme};
-use utoipa::openapi::{ContentBuilder, OpenApi, Ref, RefOr, Required, ResponseBuilder};
 use utoipa::{OpenApi as _, PartialSchema, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 
@@ -19,8 +19,9 @@ use utoipa_axum::router::OpenApiRouter;
         title = "Gaitwright",
         description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
                        not a medical device.\n\nLengths are metres, masses kilograms, angles radians unless a name says \
-                       otherwise, times RFC 3339 in UTC.",
-        license(name = "MIT OR Apache-2.0")
+                       otherwise, times RFC 3339 in UTC.\n\nA list is answered by pages: `items`, and in `next` the \
+                       `cursor` of the next page.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/"))
 )]
@@ -29,8 +30,11 @@ struct Described;
 /// Marks an operation whose response contains a secret. It takes no Idempotency-Key.
 const SHOWN_ONCE: &str = "x-shown-once";
 
-/// The description of every route below `/api/v1`.
-pub fn document() -> OpenApi {
+/// The start of the name that a page has in the description as utoipa makes it: `Page_Trial`.
+const PAGE: &str = "Page_";
+
+/// Every route below `/api/v1` as its handler describes it.
+fn document() -> OpenApi {
     let (_, mut document) =
         OpenApiRouter::with_openapi(Described::openapi()).nest("/api/v1", api::routes()).split_for_parts();
     let components = document.components.get_or_insert_default();
@@ -39,29 +43,28 @@ pub fn document() -> OpenApi {
     components.security_schemes.insert("token".to_owned(), SecurityScheme::Http(token.build()).into());
     let cookie = ApiKeyValue::with_description("gaitwright_session", "Session of a signed-in user");
     components.security_schemes.insert("session".to_owned(), SecurityScheme::ApiKey(ApiKey::Cookie(cookie)).into());
-    for (path, item) in &mut document.paths.paths {
-        let has_parameters = path.contains('{');
-        for operation in [&mut item.get].into_iter().flatten() {
-            complete(operation, false, has_parameters);
-        }
-        for operation in [&mut item.post, &mut item.patch].into_iter().flatten() {
-            complete(operation, true, has_parameters);
-        }
-    }
     document
 }
 
-/// The document with the rules of values.
+/// The description.
 ///
 /// # Errors
 /// When it cannot be written as JSON.
 pub(super) fn value() -> Result<Value, serde_json::Error> {
     let mut value = serde_json::to_value(document())?;
+    refer_to_entries(&mut value);
+    let mut value = name_pages(value);
     openapi_rules::state(&mut value);
+    let schemas = value["components"]["schemas"].clone();
+    for (_, item) in value["paths"].as_object_mut().into_iter().flatten() {
+        for (method, operation) in item.as_object_mut().into_iter().flatten() {
+            complete(operation, method != "get", &schemas);
+        }
+    }
     Ok(value)
 }
 
-/// The document as it is served and committed.
+/// The description as it is served and committed.
 ///
 /// # Errors
 /// When it cannot be written as JSON.
@@ -71,51 +74,109 @@ pub fn text() -> Result<String, serde_json::Error> {
     Ok(text)
 }
 
+/// A page has its entries by name, and not once more in full.
+fn refer_to_entries(document: &mut Value) {
+    for (name, schema) in document["components"]["schemas"].as_object_mut().into_iter().flatten() {
+        if let (Some(entry), Some(items)) = (name.strip_prefix(PAGE), schema.pointer_mut("/properties/items/items")) {
+            *items = json!({ "$ref": format!("{}{entry}", openapi_rules::SCHEMAS) });
+        }
+    }
+}
+
+/// Calls a page of trials `TrialPage`, as a programmer would.
+fn name_pages(value: Value) -> Value {
+    let named = |name: &str| name.strip_prefix(PAGE).map(|entry| format!("{entry}Page"));
+    match value {
+        Value::Object(fields) => {
+            let fields = fields.into_iter().map(|(name, value)| (named(&name).unwrap_or(name), name_pages(value)));
+            Value::Object(fields.collect())
+        }
+        Value::Array(items) => items.into_iter().map(name_pages).collect(),
+        Value::String(text) => {
+            let page = text.strip_prefix(openapi_rules::SCHEMAS).and_then(named);
+            Value::String(page.map_or(text, |page| format!("{}{page}", openapi_rules::SCHEMAS)))
+        }
+        other => other,
+    }
+}
+
 /// Adds what every operation may answer and take.
-fn complete(operation: &mut Operation, changes: bool, names_something: bool) {
-    let protected = operation.security.is_some();
+fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
+    let shown_once = operation.get(SHOWN_ONCE).is_some();
+    let is_page = operation
+        .pointer("/responses/200/content/application~1json/schema/$ref")
+        .is_some_and(|reference| reference.as_str().is_some_and(|reference| reference.ends_with("Page")));
+    let mut parameters = operation["parameters"].as_array().cloned().unwrap_or_default();
+    let takes = |place: &str, parameters: &[Value]| parameters.iter().any(|parameter| parameter["in"] == place);
+    let if_match = parameters.iter().any(|parameter| parameter["name"] == "If-Match");
+    if is_page {
+        parameters.push(json!({
+            "name": "cursor", "in": "query", "required": false, "schema": { "type": "string" },
+            "description": "`next` of the page before; the first page without it"
+        }));
+        parameters.push(json!({
+            "name": "limit", "in": "query", "required": false,
+            "schema": { "type": "integer", "format": "int32", "minimum": 1, "maximum": LARGEST_LIMIT, "default": DEFAULT_LIMIT },
+            "description": "Most entries of the page"
+        }));
+    }
+    if changes && !shown_once {
+        parameters.push(json!({
+            "name": "Idempotency-Key", "in": "header", "required": false,
+            "schema": { "type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[!-~]([ -~]*[!-~])?$" },
+            "description": "Sent twice with the same key, a request has one effect and the same answer"
+        }));
+    }
+    let body = operation.pointer("/requestBody/content/application~1json/schema");
+    let (has_body, has_rules) = (body.is_some(), body.is_some_and(|schema| openapi_rules::has_rules(schema, schemas)));
     let mut problems = vec![("500", "The program failed; nothing was changed"), ("503", "Too slow or shutting down")];
-    if operation.parameters.is_some() || changes {
+    if !parameters.is_empty() || changes {
         problems.push(("400", "The request cannot be read"));
     }
-    if protected {
-        problems.push(("401", "Sign in first"));
-        problems.push(("403", "Not allowed"));
+    // A host name that the service does not answer to is refused before anything else.
+    problems.push(("403", "Not allowed"));
+    match operation.get("security") {
+        Some(_) => problems.push(("401", "Sign in first")),
+        None => operation["security"] = json!([]),
     }
-    let names_several = operation
-        .parameters
-        .iter()
-        .flatten()
-        .any(|parameter| matches!(parameter, RefOr::T(parameter) if parameter.name == "ids"));
-    if names_something || names_several || changes {
+    if takes("path", &parameters) {
         problems.push(("404", "Not found"));
     }
-    if changes || operation.parameters.is_some() {
-        problems.push(("409", "Not possible in the present state"));
-    }
     if changes {
+        problems.push(("409", "Not possible in the present state"));
+        problems.push(("507", "The disk is full"));
+    }
+    if if_match {
         problems.push(("412", "It was changed since it was read"));
+    }
+    if has_body {
         problems.push(("413", "The body is too large"));
         problems.push(("415", "Unsupported media type"));
     }
-    if changes || operation.parameters.is_some() {
+    if is_page || has_rules {
         problems.push(("422", "A field is not acceptable"));
     }
-    for (status, description) in problems {
-        let content = ContentBuilder::new().schema(Some(Ref::from_schema_name(Problem::name()))).build();
-        let response = ResponseBuilder::new().description(description).content(PROBLEM_JSON, content).build();
-        operation.responses.responses.entry(status.to_owned()).or_insert_with(|| response.into());
+    if !parameters.is_empty() {
+        operation["parameters"] = Value::Array(parameters);
     }
-    let shown_once = operation.extensions.as_ref().is_some_and(|extensions| extensions.contains_key(SHOWN_ONCE));
-    if changes && !shown_once {
-        let text = ObjectBuilder::new().schema_type(Type::String).min_length(Some(1)).max_length(Some(200)).build();
-        let key = ParameterBuilder::new()
-            .name("Idempotency-Key")
-            .parameter_in(ParameterIn::Header)
-            .required(Required::False)
-            .description(Some("Sent twice with the same key, a request has one effect and the same answer"))
-            .schema(Some(text))
-            .build();
-        operation.parameters.get_or_insert_default().push(key.into());
+    let Some(responses) = operation["responses"].as_object_mut() else { return };
+    for (status, description) in problems {
+        responses.entry(status).or_insert_with(|| json!({ "description": description }));
+    }
+    for status in ["201", "202"] {
+        if let Some(response) = responses.get_mut(status) {
+            response["headers"]["Location"] =
+                json!({ "description": "Address of what was made", "schema": { "type": "string" } });
+        }
+    }
+    answer_problems(responses);
+}
+
+/// Every refusal and failure is answered with a problem document.
+fn answer_problems(responses: &mut Map<String, Value>) {
+    let problem =
+        json!({ PROBLEM_JSON: { "schema": { "$ref": format!("{}{}", openapi_rules::SCHEMAS, Problem::name()) } } });
+    for (_, response) in responses.iter_mut().filter(|(status, _)| status.starts_with(['4', '5'])) {
+        response["content"] = problem.clone();
     }
 }

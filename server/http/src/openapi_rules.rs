@@ -10,6 +10,7 @@ use gait_optimizer::{Device, GaitSettings, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::document;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::plan::LARGEST_SEED;
+use gaitwright_store::listing::SORTS;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
@@ -28,10 +29,13 @@ const NAMES: [(&str, &str, u32); 11] = [
     ("Change", "name", 120),
     ("Fork", "name", 120),
     ("Ask", "worker", 80),
-    ("Answer", "author", 80),
-    ("RemarkToMake", "author", 80),
+    ("NewPreference", "author", 80),
+    ("NewAssessment", "author", 80),
     ("Suggestion", "author", 80),
 ];
+
+/// Where schemas are in a description.
+pub(super) const SCHEMAS: &str = "#/components/schemas/";
 
 /// What a schema cannot say of a recording.
 const RECORDING: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five joint angles over at least \
@@ -55,7 +59,7 @@ pub(super) fn state(document: &mut Value) {
         }
         add(schemas, "NewConsent", "form", &json!({ "pattern": needed }));
         for component in
-            ["Answer", "RemarkToMake", "Suggestion", "RaterAnswer", "NewLabAnswer", "RecordedWalk", "Closing"]
+            ["NewPreference", "NewAssessment", "Suggestion", "RaterAnswer", "NewLabAnswer", "RecordedWalk", "Closing"]
         {
             add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
@@ -69,12 +73,15 @@ pub(super) fn state(document: &mut Value) {
         let pseudonym = r"^(?!(.*[0-9]){6})[A-Za-z0-9_.:/#+()\-][A-Za-z0-9 _.:/#+()\-]*$";
         add(schemas, "NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
         add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": ["read", "run", "answer", "rate"] } }));
-        for component in ["Answer", "RemarkToMake", "Suggestion"] {
-            let people = json!({ "type": ["string", "null"], "enum": ["subject", "clinician", "script", null] });
-            set(schemas, component, "source", people);
+        let people =
+            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who says so" });
+        schemas.insert("PersonSource".to_owned(), people);
+        for component in ["NewPreference", "NewAssessment", "Suggestion"] {
+            let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
+            set(schemas, component, "source", one);
         }
-        let remarks = json!({ "enum": ["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"] });
-        set(schemas, "RemarkToMake", "answer", remarks);
+        let assessments = json!({ "enum": ["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"] });
+        set(schemas, "NewAssessment", "answer", assessments);
         let said = json!({ "enum": [
             "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both",
         ] });
@@ -114,72 +121,70 @@ pub(super) fn state(document: &mut Value) {
         for field in ["base_bounds", "search_space"] {
             describe(schemas, field);
         }
-        set(
-            schemas,
-            "NewStudy",
-            "gait_settings",
-            settings(GaitSettings::default(), |s: &GaitSettings| s.validate().err().map(Error::from)),
-        );
-        set(
-            schemas,
-            "NewStudy",
-            "solve_options",
-            settings(SolveOptions::default(), |s: &SolveOptions| s.validate().err().map(Error::from)),
-        );
-        set(
-            schemas,
-            "NewStudy",
-            "learner",
-            settings(LearnerSettings::default(), |s: &LearnerSettings| s.validate().err().map(Error::Learner)),
-        );
-    }
-    let muscles = muscles();
-    if let Some(present) =
-        document.pointer_mut("/components/schemas/NewStudy/properties/gait_settings/properties/muscles")
-    {
-        *present = muscles.clone();
-    }
-    let device = device(&one_line);
-    for (path, part, schema) in [
-        ("devices", "post/requestBody", device),
-        ("subjects~1{id}~1muscles", "post/requestBody", muscles.clone()),
-        ("subjects~1{id}~1muscles", "post/responses/201", muscles.clone()),
-        ("subjects~1{id}~1muscles", "get/responses/200", muscles),
-    ] {
-        let place = format!("/paths/~1api~1v1~1{path}/{part}/content/application~1json/schema");
-        if let Some(present) = document.pointer_mut(&place) {
-            *present = schema;
+        let mut gait = settings(GaitSettings::default(), |s: &GaitSettings| s.validate().err().map(Error::from));
+        if let Some(muscles) = gait.pointer_mut("/properties/muscles") {
+            *muscles = json!({ "$ref": format!("{SCHEMAS}MuscleParameters") });
+        }
+        let solve = settings(SolveOptions::default(), |s: &SolveOptions| s.validate().err().map(Error::from));
+        let learner =
+            settings(LearnerSettings::default(), |s: &LearnerSettings| s.validate().err().map(Error::Learner));
+        for (name, schema) in [
+            ("GaitSettings", gait),
+            ("SolveOptions", solve),
+            ("LearnerSettings", learner),
+            ("MuscleParameters", muscles()),
+            ("DeviceDefinition", device(&one_line)),
+        ] {
+            put(schemas, name, schema);
         }
     }
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
-        for (path, item) in paths {
+        for (_, item) in paths {
             let operations = item.as_object_mut().into_iter().flatten();
             for parameter in
                 operations.filter_map(|(_, operation)| operation.get_mut("parameters")?.as_array_mut()).flatten()
             {
-                state_parameter(path, parameter);
+                state_parameter(parameter);
             }
         }
     }
 }
 
-fn state_parameter(path: &str, parameter: &mut Value) {
+fn state_parameter(parameter: &mut Value) {
     let rule = match parameter.get("name").and_then(Value::as_str).unwrap_or_default() {
-        "limit" => json!({ "minimum": 1, "maximum": if path == "/api/v1/studies" { 200 } else { 1000 } }),
         "rate_hz" => json!({ "minimum": 10, "maximum": 5000 }),
         "walk" => json!({ "minimum": 2, "maximum": 3 }),
         "after" | "Last-Event-ID" => json!({ "minimum": 0 }),
+        "sort" => {
+            let names: Vec<String> = SORTS.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
+            json!({ "enum": names })
+        }
         "token" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => {
             let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
             json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })
         }
-        "Idempotency-Key" => json!({ "pattern": "^[!-~]([ -~]*[!-~])?$" }),
         "right" | "down" => json!({ "enum": TunedBounds::NAMES }),
         _ => return,
     };
     if let Some(schema) = parameter.get_mut("schema").and_then(Value::as_object_mut) {
         merge(schema, &rule);
+    }
+}
+
+/// Whether a schema says more of values than their types: a value of the right type can be refused.
+pub(super) fn has_rules(schema: &Value, schemas: &Value) -> bool {
+    const RULES: [&str; 8] =
+        ["minimum", "maximum", "minLength", "maxLength", "pattern", "minItems", "maxItems", "x-depends"];
+    match schema {
+        Value::Object(fields) => {
+            let named = fields.get("$ref").and_then(Value::as_str).and_then(|name| name.strip_prefix(SCHEMAS));
+            named.is_some_and(|name| has_rules(&schemas[name], schemas))
+                || RULES.iter().any(|rule| fields.contains_key(*rule))
+                || fields.values().any(|part| has_rules(part, schemas))
+        }
+        Value::Array(parts) => parts.iter().any(|part| has_rules(part, schemas)),
+        _ => false,
     }
 }
 
@@ -214,6 +219,13 @@ fn set(schemas: &mut Map<String, Value>, component: &str, field: &str, mut schem
     if let Value::Object(schema) = schema {
         *present = schema;
     }
+}
+
+/// Puts a schema in place of a component; what is said of the component stays.
+fn put(schemas: &mut Map<String, Value>, component: &str, mut schema: Value) {
+    let Some(present) = schemas.get_mut(component) else { return };
+    schema["description"] = present["description"].take();
+    *present = schema;
 }
 
 /// Says of a field what a schema cannot: how its parts depend on each other.

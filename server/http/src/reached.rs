@@ -9,10 +9,11 @@ use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
 use gaitwright_service::access::{Permission, Reach};
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::job::JobId;
 use gaitwright_store::{
-    Connection, DeviceId, FeedbackId, LabRecordingId, LabSessionId, MemberId, ReferenceGaitId, RemarkId, SessionId,
-    StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, feedback, lab_recordings, lab_sessions,
-    members, remarks, trials,
+    AssessmentId, Connection, DeviceId, FeedbackId, LabSessionId, MeasurementFileId, MemberId, ReferenceGaitId,
+    SessionId, StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, assessments, feedback,
+    lab_sessions, measurement_files, members, trials,
 };
 use serde::Deserialize;
 use std::fmt::Display;
@@ -46,13 +47,18 @@ of_study!(TrialId, "trial", async |db: &mut Connection, id| StoreResult::Ok(tria
 of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult::Ok(
     feedback::get(db, id).await?.study_id
 ));
-of_study!(RemarkId, "remark", async |db: &mut Connection, id| StoreResult::Ok(remarks::get(db, id).await?.study_id));
+of_study!(AssessmentId, "assessment", async |db: &mut Connection, id| StoreResult::Ok(
+    assessments::get(db, id).await?.study_id
+));
+of_study!(JobId, "job", async |db: &mut Connection, id: JobId| StoreResult::Ok(
+    trials::get(db, id.trial).await?.study_id
+));
 of_study!(MemberId, "member", async |db: &mut Connection, id| StoreResult::Ok(members::get(db, id).await?.study_id));
 of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
     StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
 });
-of_study!(LabRecordingId, "recording", async |db: &mut Connection, id| {
-    let session = lab_recordings::get(db, id).await?.session_id;
+of_study!(MeasurementFileId, "recording", async |db: &mut Connection, id| {
+    let session = measurement_files::get(db, id).await?.session_id;
     StoreResult::Ok(lab_sessions::get(db, session).await?.study_id)
 });
 

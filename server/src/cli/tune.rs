@@ -57,8 +57,8 @@ impl Tune {
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         let subject = catalogue::subject_with(&mut writer, subject).await?;
-        let device = device::add(&mut writer, &Actor::terminal(), &device).await?;
-        let reference = recording::add(&mut writer, &Actor::terminal(), &reference).await?;
+        let (device, _) = device::add(&mut writer, &Actor::terminal(), &device).await?;
+        let (reference, _) = recording::add(&mut writer, &Actor::terminal(), &reference).await?;
         commit(writer).await?;
         let new = NewStudy {
             device_id: Some(device.id),

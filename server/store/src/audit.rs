@@ -1,6 +1,6 @@
 //! The audit trail: who did what, when and why, as a chain of hashes that detects later changes.
 
-use super::{Connection, Instant, StoreResult, UserId, json, now};
+use super::{Connection, Instant, StoreResult, UserId, json, now, schema};
 use serde::Serialize;
 use serde_json::{Value, json};
 use sqlx::Row;
@@ -78,6 +78,7 @@ pub struct AuditRow {
     /// Object of the action, such as `study 0190...`.
     pub object: String,
     /// What exactly, with the reason where there is one.
+    #[schema(value_type = schema::AuditDetail)]
     pub detail: Value,
     /// Hash of the previous row.
     pub previous: String,

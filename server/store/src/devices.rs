@@ -1,6 +1,6 @@
 //! Stored devices: models of powered prostheses.
 
-use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json, now};
+use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json, now, schema};
 use gait_optimizer::Device as Definition;
 use serde::Serialize;
 use sqlx::Row;
@@ -15,7 +15,7 @@ pub struct Device {
     /// Name shown to people.
     pub name: String,
     /// The device itself.
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::DeviceDefinition)]
     pub definition: Definition,
     /// Time of creation.
     pub created_at: Instant,

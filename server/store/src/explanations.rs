@@ -1,7 +1,9 @@
 //! Stored infeasibility explanations, and requests for them.
 
 use super::audit::Actor;
+use super::members::{binds, reached};
 use super::{Connection, Instant, StoreResult, StudyId, TrialId, json, now};
+use crate::reach::Reach;
 use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
 use std::collections::BTreeSet;
@@ -73,6 +75,28 @@ pub async fn request(db: &mut Connection, trial: TrialId, actor: &Actor) -> Stor
 pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
     let found = sqlx::query("select 1 from explanation_requests where trial_id = ?").bind(trial).fetch_optional(db);
     Ok(found.await?.is_some())
+}
+
+/// The trials whose explanations were asked for and are not there, of studies that a caller reaches and of subjects who did
+/// not withdraw, with their studies.
+///
+/// # Errors
+/// What the database reports.
+pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(TrialId, StudyId)>> {
+    let (every, open, principal) = binds(reach);
+    let rows = sqlx::query(concat!(
+        "select r.trial_id, t.study_id from explanation_requests r join trials t on t.id = r.trial_id \
+         join studies s on s.id = t.study_id \
+         where r.trial_id not in (select trial_id from explanations) \
+         and s.subject_id not in (select subject_id from withdrawn_subjects) and ",
+        reached!("t.study_id")
+    ))
+    .bind(every)
+    .bind(open)
+    .bind(principal)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(|row| Ok((row.try_get("trial_id")?, row.try_get("study_id")?))).collect()
 }
 
 /// The trial whose explanation was asked for first, of those that have none and whose subjects did not withdraw; none of

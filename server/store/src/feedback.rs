@@ -93,7 +93,6 @@ pub struct FeedbackRow {
     /// The study.
     pub study_id: StudyId,
     /// What was said.
-    #[serde(flatten)]
     pub said: FeedbackContent,
     /// Source.
     pub source: Source,

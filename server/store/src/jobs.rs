@@ -9,6 +9,7 @@ use crate::reach::Reach;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// The exclusive right to run a job until the lease expires.
@@ -33,22 +34,22 @@ pub struct Troubles {
     pub losses: u32,
 }
 
-/// A job that is not done.
-#[derive(Debug, Clone, Serialize, ToSchema)]
-pub struct Job {
+/// A solve that has not ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct OpenSolve {
     /// Its trial.
+    #[serde(skip)]
     pub trial_id: TrialId,
     /// Its study.
+    #[serde(skip)]
     pub study_id: StudyId,
-    /// `queued`, or `leased` to a worker.
-    pub state: String,
     /// How often a worker was to start it.
     pub attempts: u32,
     /// Attempts that ended with a panic or an error.
     pub failures: u32,
     /// Attempts whose worker stopped responding.
     pub losses: u32,
-    /// Who has it.
+    /// Who has it; null while it is queued.
     pub worker: Option<String>,
     /// End of the lease, unless it is renewed.
     pub lease_until: Option<Instant>,
@@ -56,38 +57,55 @@ pub struct Job {
     pub created_at: Instant,
 }
 
-/// At most `limit` jobs that are not done, of studies that a caller reaches, in the order of queueing.
+/// The solves that have not ended, of studies that a caller reaches.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Job>> {
+pub async fn open(db: &mut Connection, reach: Reach) -> StoreResult<Vec<OpenSolve>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(
         "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id where j.state <> 'done' and ",
-        reached!("t.study_id"),
-        " order by j.created_at, j.id limit ?4"
+        reached!("t.study_id")
     ))
     .bind(every)
     .bind(open)
     .bind(principal)
-    .bind(limit)
     .fetch_all(db)
     .await?;
-    rows.iter()
-        .map(|row| {
-            Ok(Job {
-                trial_id: row.try_get("trial_id")?,
-                study_id: row.try_get("study_id")?,
-                state: row.try_get("state")?,
-                attempts: row.try_get("attempts")?,
-                failures: row.try_get("failures")?,
-                losses: row.try_get("losses")?,
-                worker: row.try_get("worker")?,
-                lease_until: row.try_get("lease_until")?,
-                created_at: row.try_get("created_at")?,
-            })
-        })
-        .collect()
+    rows.iter().map(open_solve).collect()
+}
+
+/// The solve of a trial, unless it has ended.
+///
+/// # Errors
+/// What the database reports.
+pub async fn open_of(db: &mut Connection, trial: TrialId) -> StoreResult<Option<OpenSolve>> {
+    let sql = "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id \
+               where j.state <> 'done' and j.trial_id = ?";
+    sqlx::query(sql).bind(trial).fetch_optional(db).await?.as_ref().map(open_solve).transpose()
+}
+
+fn open_solve(row: &SqliteRow) -> StoreResult<OpenSolve> {
+    Ok(OpenSolve {
+        trial_id: row.try_get("trial_id")?,
+        study_id: row.try_get("study_id")?,
+        attempts: row.try_get("attempts")?,
+        failures: row.try_get("failures")?,
+        losses: row.try_get("losses")?,
+        worker: row.try_get("worker")?,
+        lease_until: row.try_get("lease_until")?,
+        created_at: row.try_get("created_at")?,
+    })
+}
+
+/// How many jobs each worker has.
+///
+/// # Errors
+/// What the database reports.
+pub async fn by_worker(db: &mut Connection) -> StoreResult<BTreeMap<String, u32>> {
+    let sql = "select worker, count(*) as jobs from jobs where state <> 'done' and worker is not null group by worker";
+    let rows = sqlx::query(sql).fetch_all(db).await?;
+    rows.iter().map(|row| Ok((row.try_get("worker")?, row.try_get("jobs")?))).collect()
 }
 
 /// Queues the solve of a trial.

@@ -13,6 +13,7 @@ pub mod allocations;
 pub mod anchor;
 pub mod archive;
 pub mod archived_allocations;
+pub mod assessments;
 pub mod audit;
 pub mod backup;
 pub mod certificates;
@@ -32,12 +33,12 @@ pub mod imports;
 pub mod jobs;
 mod json;
 pub mod lab_answers;
-pub mod lab_recordings;
 pub mod lab_sessions;
 mod lent;
 pub mod listing;
 mod log;
 mod many_rows;
+pub mod measurement_files;
 pub mod members;
 mod migrations;
 mod ownership;
@@ -46,7 +47,6 @@ pub mod presentations;
 pub mod quarantine;
 pub mod reach;
 pub mod reference_gaits;
-pub mod remarks;
 pub mod restore;
 pub mod results;
 pub mod rights;
@@ -70,8 +70,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabRecordingId, LabSessionId, MemberId, PresentationId,
-    ReferenceGaitId, RemarkId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    AssessmentId, DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabSessionId, MeasurementFileId, MemberId,
+    PresentationId, ReferenceGaitId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use migrations::FORM;

@@ -112,7 +112,7 @@ impl Judgement {
     }
 
     /// Whether a person says so, and not which gait is better.
-    pub fn is_remark(self) -> bool {
+    pub fn is_assessment(self) -> bool {
         self == Self::CannotTell || self.is_about_safety()
     }
 
@@ -326,11 +326,12 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Pr
 ///
 /// # Errors
 /// What the database reports.
-pub async fn remarks_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
-    let remarks: Vec<&str> = Judgement::ALL.iter().filter(|said| said.is_remark()).map(|said| said.as_str()).collect();
-    let remarks = remarks.join("', '");
+pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
+    let assessments: Vec<&str> =
+        Judgement::ALL.iter().filter(|said| said.is_assessment()).map(|said| said.as_str()).collect();
+    let assessments = assessments.join("', '");
     let sql = format!(
-        "{SELECT} where p.study_id = ? and a.answer in ('{remarks}') and r.presentation_id is null order by p.id"
+        "{SELECT} where p.study_id = ? and a.answer in ('{assessments}') and r.presentation_id is null order by p.id"
     );
     let rows = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(study).fetch_all(db).await?;
     rows.iter().map(Presentation::from_row).collect()

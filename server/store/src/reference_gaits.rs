@@ -1,6 +1,6 @@
 //! Stored reference gaits, which Gait RMSE is measured against.
 
-use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json, now};
+use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json, now, schema};
 use gait_optimizer::ReferenceGait as Definition;
 use serde::Serialize;
 use sqlx::Row;
@@ -15,7 +15,7 @@ pub struct ReferenceGait {
     /// Name shown to people.
     pub name: String,
     /// The reference gait itself.
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::ReferenceGaitDocument)]
     pub definition: Definition,
     /// Time of creation.
     pub created_at: Instant,

@@ -1,6 +1,6 @@
 //! Stored results of attempts, including results that arrived too late.
 
-use super::{Connection, Instant, StoreResult, TrialId, json, now};
+use super::{Connection, Instant, StoreResult, TrialId, json, now, schema};
 use gait_optimizer::{SolveReport, SolveStatus};
 use serde::Serialize;
 use sqlx::Row;
@@ -16,10 +16,10 @@ pub struct AttemptResult {
     /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
     pub taken: bool,
     /// How the solve ended.
-    #[schema(value_type = String)]
+    #[schema(value_type = schema::SolveStatus)]
     pub status: SolveStatus,
     /// All figures of the solve, where they are finite.
-    #[schema(value_type = Option<Object>)]
+    #[schema(value_type = Option<schema::SolveReport>)]
     pub report: Option<SolveReport>,
     /// Time of arrival.
     pub received_at: Instant,

@@ -1,6 +1,60 @@
 //! OpenAPI schemas of types of other crates. These types are never constructed.
 
+use serde_json::Value;
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
+
+/// A document whose fields the description does not list.
+macro_rules! document {
+    ($(#[$says:meta])* $name:ident) => {
+        $(#[$says])*
+        #[derive(Debug, ToSchema)]
+        pub struct $name(pub BTreeMap<String, Value>);
+    };
+}
+
+document! {
+    /// A gait as the optimiser writes it: `format_version` says in which layout.
+    GaitDocument
+}
+document! {
+    /// What `gaitwright solve --problem` reads: subject, device, bounds, settings, reference gait, limits, start.
+    SolveProblem
+}
+document! {
+    /// What the controller of a device reads; it explains its fields.
+    ControllerFile
+}
+document! {
+    /// A reference gait: joint angles over the cycle, of whom, and how it was made.
+    ReferenceGaitDocument
+}
+document! {
+    /// What exactly was changed; its fields depend on the action.
+    AuditDetail
+}
+
+// The rules of these come from the crates that read them.
+document! {
+    /// Settings of the gait problem.
+    GaitSettings
+}
+document! {
+    /// Limits of one solve.
+    SolveOptions
+}
+document! {
+    /// Settings of the learner.
+    LearnerSettings
+}
+document! {
+    /// How muscles differ from the published table.
+    MuscleParameters
+}
+document! {
+    /// A device: measures of the prosthesis, each with its range.
+    DeviceDefinition
+}
 
 /// Height and mass of a subject.
 #[derive(Debug, ToSchema)]
@@ -172,4 +226,302 @@ pub struct Iteration {
     pub step: f64,
     /// Initial guess it belongs to.
     pub guess: u64,
+}
+
+/// How a solve ended.
+#[derive(Debug, ToSchema)]
+#[schema(rename_all = "snake_case")]
+pub enum SolveStatus {
+    /// Every row and bound is satisfied.
+    Converged,
+    /// A local minimum of the violation: no gait near it.
+    Infeasible,
+    /// No further progress.
+    Stalled,
+    /// The limit of iterations.
+    IterationLimit,
+    /// The limit of time.
+    TimeLimit,
+    /// Somebody cancelled it.
+    Cancelled,
+}
+
+/// What a solve started from.
+#[derive(Debug, ToSchema)]
+#[schema(rename_all = "snake_case")]
+pub enum StartedFrom {
+    /// Its own cold start.
+    Cold,
+    /// The warm start that was given.
+    Warm,
+    /// A cold start after the given warm start did not converge.
+    ColdAfterWarm,
+}
+
+/// The figures of one solve.
+#[derive(Debug, ToSchema)]
+pub struct SolveReport {
+    /// How it ended.
+    pub status: SolveStatus,
+    /// What it started from.
+    pub started_from: StartedFrom,
+    /// Interior-point iterations over all phases.
+    pub iterations: u64,
+    /// Objective: cost of transport plus regularisation.
+    pub objective: f64,
+    /// Mechanical cost of transport, dimensionless.
+    pub cost_of_transport: f64,
+    /// Gait RMSE: sum over the five human coordinates, rad.
+    pub gait_rmse_rad: f64,
+    /// Its parts: torso, `hip_L`, `knee_L`, `ankle_L`, `hip_R`.
+    pub gait_rmse_parts_rad: Vec<f64>,
+    /// Largest violation of a constraint row or bound, scaled.
+    pub max_violation: f64,
+    /// How well the conditions of a local optimum are met; null where that is not known.
+    pub optimality: Option<Optimality>,
+    /// How many bounds at nodes are tightened so that the gait keeps them between the nodes too.
+    pub tightened_bounds: u64,
+    /// Wall time, s.
+    pub seconds_total: f64,
+    /// Evaluating functions and derivatives, s.
+    pub seconds_evaluation: f64,
+    /// Linear algebra, s.
+    pub seconds_linear_algebra: f64,
+    /// Its parts; null where they are not known.
+    pub linear_algebra: Option<LinearAlgebra>,
+    /// Number of variables.
+    pub variables: u64,
+    /// Number of equality rows.
+    pub equalities: u64,
+    /// Number of inequality rows.
+    pub inequalities: u64,
+    /// Mean walking speed, m/s.
+    pub speed_m_s: f64,
+    /// Stride length, m.
+    pub stride_length_m: f64,
+    /// Durations of the eight domains, s.
+    pub durations_s: Vec<f64>,
+    /// Hip velocity of the four impact-free runs, m/s.
+    pub vhip_m_s: Vec<f64>,
+    /// Everything that was tried, in order.
+    pub attempts: Vec<SolveAttempt>,
+}
+
+/// One thing that a solve tried.
+#[derive(Debug, ToSchema)]
+pub struct SolveAttempt {
+    /// What, in words.
+    pub strategy: String,
+    /// How it ended.
+    pub status: SolveStatus,
+    /// Iterations over its phases.
+    pub iterations: u64,
+    /// Wall time, s.
+    pub seconds: f64,
+    /// Objective where it ended.
+    pub objective: f64,
+    /// Gait RMSE where it ended, rad.
+    pub gait_rmse_rad: f64,
+    /// Why it could not be carried through; empty when it could.
+    pub reason: String,
+    /// Which local optimum it ended in, from 1; null where it did not converge.
+    pub basin: Option<u64>,
+    /// Whether it is the answer.
+    pub chosen: bool,
+}
+
+/// First-order conditions of a local optimum.
+#[derive(Debug, ToSchema)]
+pub struct Optimality {
+    /// Largest entry of the Lagrangian's gradient.
+    pub dual_infeasibility: f64,
+    /// Largest product of a distance to a bound and its multiplier.
+    pub complementarity: f64,
+    /// Last barrier parameter.
+    pub barrier: f64,
+}
+
+/// What the linear algebra of a solve took.
+#[derive(Debug, ToSchema)]
+pub struct LinearAlgebra {
+    /// Analysing the structure of matrices, s.
+    pub seconds_analysis: f64,
+    /// Assembling and factorising, s.
+    pub seconds_factorisation: f64,
+    /// Substitutions, residuals and refinement, s.
+    pub seconds_solves: f64,
+    /// Numerical factorisations.
+    pub factorisations: u64,
+    /// Forward-backward substitutions.
+    pub substitutions: u64,
+    /// Times that another method was asked.
+    pub fallbacks: u64,
+}
+
+/// A certificate: what an independent simulation of a gait found.
+#[derive(Debug, ToSchema)]
+pub struct Certificate {
+    /// Version of this layout and of its checks.
+    pub format_version: u32,
+    /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
+    pub passed: bool,
+    /// Why not; empty when passed.
+    pub objections: Vec<String>,
+    /// Every quantity with its worst value and its limit.
+    pub checks: Vec<CertificateCheck>,
+    /// How the simulation ended early; null where it did not.
+    pub fall: Option<String>,
+    /// The stride-to-stride map.
+    pub return_map: Option<ReturnMap>,
+    /// The same with a hip velocity that the controller leaves alone.
+    pub free_hip_return_map: Option<ReturnMap>,
+    /// Pushes that are recovered; only of a stable gait.
+    pub pushes: Option<Pushes>,
+}
+
+/// The worst value of a quantity.
+#[derive(Debug, ToSchema)]
+pub struct CertificateCheck {
+    /// What was measured.
+    pub name: String,
+    /// Unit of value and limit; empty: dimensionless.
+    pub unit: String,
+    /// Worst value; null where it could not be determined, which does not pass.
+    pub value: Option<f64>,
+    /// Largest allowed value; null: reported without a judgement.
+    pub limit: Option<f64>,
+    /// Domain and time of the stride where the worst value is.
+    pub place: String,
+}
+
+/// What the stride-to-stride map says of a gait.
+#[derive(Debug, ToSchema)]
+pub struct ReturnMap {
+    /// Largest change of the state over one stride from the gait's own first state, rad and rad/s.
+    pub gait_residual: f64,
+    /// The same at the fixed point of the closed loop near it.
+    pub fixed_point_residual: f64,
+    /// Largest distance from the gait's first state to the fixed point, rad and rad/s.
+    pub fixed_point_distance: f64,
+    /// Multipliers from variational equations and saltation, largest first.
+    pub multipliers: Vec<Multiplier>,
+    /// Largest modulus of them.
+    pub largest: f64,
+    /// Largest modulus of the multipliers from differences of simulated domains.
+    pub largest_by_differences: f64,
+    /// What the differences resolve.
+    pub differences_resolve: f64,
+    /// What a stride leaves of a change of all velocities in proportion.
+    pub speed_kept: f64,
+    /// What the stride turns such a change into in other directions, over its size.
+    pub speed_leak: f64,
+}
+
+/// A multiplier of the stride-to-stride map.
+#[derive(Debug, ToSchema)]
+pub struct Multiplier {
+    /// Real part.
+    pub real: f64,
+    /// Imaginary part.
+    pub imaginary: f64,
+}
+
+/// Largest changes of the hip's forward velocity that are recovered, m/s.
+#[derive(Debug, ToSchema)]
+pub struct Pushes {
+    /// Forwards.
+    pub forwards_m_s: f64,
+    /// Backwards.
+    pub backwards_m_s: f64,
+}
+
+/// Joint positions of one leg: forward and up, m.
+#[derive(Debug, ToSchema)]
+pub struct LegPoints {
+    /// Knee.
+    pub knee: Vec<f64>,
+    /// Ankle.
+    pub ankle: Vec<f64>,
+    /// Heel.
+    pub heel: Vec<f64>,
+    /// Toe.
+    pub toe: Vec<f64>,
+}
+
+/// Positions of the body at an instant: forward and up, m.
+#[derive(Debug, ToSchema)]
+pub struct StickFigure {
+    /// Time from the start of the stride, s.
+    pub time_s: f64,
+    /// Hip.
+    pub hip: Vec<f64>,
+    /// Shoulder.
+    pub shoulder: Vec<f64>,
+    /// Left (intact) leg.
+    pub left: LegPoints,
+    /// Right (prosthetic) leg.
+    pub right: LegPoints,
+}
+
+/// Angle and velocity of a joint, sample after sample.
+#[derive(Debug, ToSchema)]
+pub struct PhasePortrait {
+    /// Name of the joint.
+    pub joint: String,
+    /// Angle, rad.
+    pub angle_rad: Vec<f64>,
+    /// Velocity, rad/s.
+    pub velocity_rad_s: Vec<f64>,
+}
+
+/// Activity of a channel at 0, 1, ..., 100 % of the gait cycle, mean over strides.
+#[derive(Debug, ToSchema)]
+pub struct CycleActivity {
+    /// Name of the channel.
+    pub channel: String,
+    /// Mean.
+    pub mean: Vec<f64>,
+    /// Standard deviation over strides; zero for one stride.
+    pub standard_deviation: Vec<f64>,
+    /// How many strides.
+    pub strides: u64,
+}
+
+/// EMG RMSE of a walk and its parts, in shares of the peak of normal walking.
+#[derive(Debug, ToSchema)]
+pub struct EmgRmse {
+    /// Sum of the parts.
+    pub total: f64,
+    /// RMS difference of each channel of normal walking, in its order.
+    pub parts: Vec<f64>,
+    /// What makes the comparison doubtful; absent: nothing.
+    pub remarks: Option<Vec<String>>,
+}
+
+/// The activation of the muscle of a channel over the gait cycle.
+#[derive(Debug, ToSchema)]
+pub struct ModelActivity {
+    /// Name of the channel.
+    pub channel: String,
+    /// Name of the muscle.
+    pub muscle: String,
+    /// Activation at 0, 1, ..., 100 % of the cycle, 0 to 1.
+    pub activation: Vec<f64>,
+    /// RMS difference of activation and measured activity.
+    pub rms_difference: f64,
+    /// Correlation over the cycle; null where one of them is constant.
+    pub correlation: Option<f64>,
+}
+
+/// How EMG recordings are filtered; what is left out has its default.
+#[derive(Debug, ToSchema)]
+pub struct EmgSettings {
+    /// Lower edge of the band-pass, Hz.
+    pub band_low_hz: Option<f64>,
+    /// Upper edge of the band-pass, Hz; below half the sampling rate.
+    pub band_high_hz: Option<f64>,
+    /// Edge of the low-pass that makes the envelope, Hz.
+    pub envelope_hz: Option<f64>,
+    /// Order of both filters: 2, 4, 6 or 8.
+    pub order: Option<u64>,
 }

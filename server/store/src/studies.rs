@@ -142,10 +142,10 @@ pub struct StudyPlan {
     /// Whether to solve with muscles (C1-C12) or without (C1-C4).
     pub muscles: bool,
     /// Settings of the gait problem; boxed, as plans pass through many futures.
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::SolveOptions)]
     pub solve_options: SolveOptions,
     /// Values of bounds that are not tuned.
     #[schema(value_type = schema::Bounds)]
@@ -154,7 +154,7 @@ pub struct StudyPlan {
     #[schema(value_type = schema::SearchSpace)]
     pub search_space: SearchSpace,
     /// Settings of the learner.
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::LearnerSettings)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
     pub feedback_mode: FeedbackMode,
@@ -287,18 +287,40 @@ pub async fn get(db: &mut Connection, id: StudyId) -> StoreResult<Study> {
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "study", id: id.to_string() })
 }
 
-/// At most `limit` studies older than `before` that a caller reaches, newest first.
+/// Which studies of those that a caller reaches.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Chosen {
+    /// Of this subject.
+    pub subject: Option<SubjectId>,
+    /// In this state.
+    pub state: Option<StudyState>,
+    /// Older than this one.
+    pub before: Option<StudyId>,
+    /// At most so many.
+    pub limit: u32,
+}
+
+impl Chosen {
+    /// The newest ones.
+    pub fn newest(limit: u32) -> Self {
+        Self { limit, ..Self::default() }
+    }
+}
+
+/// Studies that a caller reaches, newest first.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn page(db: &mut Connection, reach: Reach, before: Option<StudyId>, limit: u32) -> StoreResult<Vec<Study>> {
+pub async fn page(db: &mut Connection, reach: Reach, chosen: Chosen) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!(
         "select * from studies where ",
         reached!("id"),
-        " and (?4 is null or id < ?4) order by id desc limit ?5"
+        " and (?4 is null or id < ?4) and (?5 is null or subject_id = ?5) and (?6 is null or state = ?6) \
+         order by id desc limit ?7"
     );
-    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(before).bind(limit);
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(chosen.before).bind(chosen.subject);
+    let query = query.bind(chosen.state.map(StudyState::as_str)).bind(chosen.limit);
     query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 

@@ -95,7 +95,7 @@ pub struct Trial {
     /// State.
     pub state: TrialState,
     /// How the solve ended.
-    #[schema(value_type = Option<String>)]
+    #[schema(value_type = Option<schema::SolveStatus>)]
     pub status: Option<SolveStatus>,
     /// Gait RMSE of a converged gait, rad. The report has that of a last iterate.
     pub gait_rmse_rad: Option<f64>,
@@ -110,7 +110,7 @@ pub struct Trial {
     /// Wall time of the solve, s.
     pub seconds_total: Option<f64>,
     /// All figures of the solve.
-    #[schema(value_type = Option<Object>)]
+    #[schema(value_type = Option<schema::SolveReport>)]
     pub report: Option<SolveReport>,
     /// Most violated rows, worst first.
     #[schema(value_type = Vec<schema::Violation>)]

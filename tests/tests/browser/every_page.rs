@@ -87,13 +87,13 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let session = session["id"].as_str().unwrap();
     for walk in 1..=2 {
         let walked = json!({"walk": walk, "note": "slow at first"});
-        site.service.post(&format!("/api/v1/lab/{session}/walks"), &walked).await;
+        site.service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &walked).await;
         let emg = electromyogram(f64::from(walk));
         let emg = json!({"walk": walk, "recording": emg, "reading": {"heel_strike_column": "heel"}});
-        site.service.post(&format!("/api/v1/lab-sessions/{session}/electromyograms"), &emg).await;
+        site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/emg"), &emg).await;
     }
     let joints = json!({"walk": 2, "recording": motion()});
-    site.service.post(&format!("/api/v1/lab-sessions/{session}/motions"), &joints).await;
+    site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &joints).await;
     site.service.post(&format!("/api/v1/lab-sessions/{session}/emg-results"), &json!({})).await;
     // One that waits for what the person who walked says, and one in which that was said.
     let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
@@ -102,21 +102,21 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
         let session = session["id"].as_str().unwrap().to_owned();
         for walk in 1..=3 {
-            site.service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": walk})).await;
+            site.service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": walk})).await;
         }
         walked.push(session);
     }
     let said = json!({"number": 1, "answer": "second", "note": "softer at the heel"});
-    site.service.post(&format!("/api/v1/lab/{}/answers", walked[1]), &said).await;
+    site.service.post(&format!("/api/v1/lab-sessions/{}/answers", walked[1]), &said).await;
     let told = format!("/api/v1/lab-sessions/{}/unblind", walked[1]);
     site.service.post(&told, &json!({"reason": "every walk was recorded"})).await;
     let unsafe_one = converged[2].id;
     let remark = json!({"first": unsafe_one, "second": converged[3].id, "answer": "unsafe_first", "author": "K1",
         "note": "stumbled twice"});
-    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     let lifted = converged[4].id;
     let remark = json!({"first": lifted, "second": converged[3].id, "answer": "unsafe_first", "author": "K1"});
-    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     let decision = json!({"verdict": "walkable", "author": "K2", "reason": "walked slowly, with a harness"});
     site.service.post(&format!("/api/v1/trials/{lifted}/safety-reviews"), &decision).await;
     people(site).await;

@@ -115,7 +115,7 @@ async fn browser_in_the_lab_answers_without_scripts_and_in_two_tabs() {
     let site = Site::start(Analytic::default()).await;
     let (study, session) = planned(&site).await;
     for walk in 1..=3 {
-        site.service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": walk})).await;
+        site.service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": walk})).await;
     }
     let at = site.at(&format!("/lab/{session}"));
     let (plain, other) = (browser.open_without_scripts(&at).await, browser.open(&at).await);
@@ -188,7 +188,7 @@ async fn browser_staff_look_at_what_was_called_unsafe_and_decide() {
     let gait = trials.iter().find(|trial| format!("trial {}", trial.number) == best).unwrap().id;
     let other = trials.iter().find(|trial| trial.state == TrialState::Converged && trial.id != gait).unwrap().id;
     let remark = json!({"first": gait, "second": other, "answer": "unsafe_first", "author": "R7"});
-    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     watched.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;
 
     // From the home page to the decision.

@@ -68,7 +68,7 @@ async fn browser_leaves_alone_what_is_typed_when_something_is_recorded() {
     gaits.retain(|trial| trial.state == gaitwright_store::trials::TrialState::Converged);
     let remark =
         serde_json::json!({"first": gaits[0].id, "second": gaits[1].id, "answer": "unsafe_first", "author": "K1"});
-    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     page.wait_for("[data-part=state] [role=alert]").await;
     let typed = "`${window.field.value} ${document.querySelector('#more') === window.field}`";
     assert_eq!(page.value(typed).await, "67 true");
@@ -176,11 +176,11 @@ async fn browser_checks_a_new_study_while_it_is_typed() {
     page.wait_until("document.querySelector('[data-outlook]').textContent.includes('2 of 2')").await;
     assert_eq!(page.count("[aria-invalid]").await, 0);
     // Nothing was made by asking.
-    assert_eq!(site.service.fetch("/api/v1/studies").await.json()["studies"].as_array().unwrap().len(), 0);
+    assert_eq!(site.service.fetch("/api/v1/studies").await.items().as_array().unwrap().len(), 0);
     page.click("button[type=submit]").await;
     page.wait_for("[data-part=state] .state.finished").await;
-    let studies = site.service.fetch("/api/v1/studies").await.json();
-    assert_eq!(studies["studies"][0]["search_space"]["dimensions"].as_array().map(Vec::len), Some(1), "{studies}");
+    let studies = site.service.fetch("/api/v1/studies").await.items();
+    assert_eq!(studies[0]["search_space"]["dimensions"].as_array().map(Vec::len), Some(1), "{studies}");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }
@@ -286,7 +286,7 @@ async fn browser_says_the_values_of_a_point_beside_the_pointer() {
     let study = site.service.study(|new| new.trial_budget = 6).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
-    let history = site.service.fetch(&format!("/api/v1/studies/{study}/history")).await.json();
+    let history = site.service.fetch(&format!("/api/v1/studies/{study}/history")).await.items();
     let last = history.as_array().unwrap().last().unwrap();
     page.point_at("[data-part=history] svg circle.dot.c0:last-of-type").await;
     page.wait_for(".readout:not([hidden])").await;

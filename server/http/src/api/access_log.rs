@@ -1,12 +1,11 @@
 //! The access log, to read.
 
 use crate::AppState;
-use crate::extract::Params;
 use crate::may::May;
-use crate::pages_of::{checked, linked_with};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
+use axum::Json;
 use axum::extract::State;
-use axum::response::Response;
 use gaitwright_service::access::Administer;
 use gaitwright_store::SubjectId;
 use gaitwright_store::access_log::{self, AccessRow};
@@ -15,16 +14,13 @@ use serde::Deserialize;
 /// Which rows.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Choice {
-    before: Option<i64>,
-    limit: Option<String>,
+pub(super) struct Filter {
     #[serde(default)]
     contains: String,
-    subject: Option<SubjectId>,
+    subject_id: Option<SubjectId>,
 }
 
-/// `GET /access-log`: who saw or exported data of subjects, and who was refused; newest first, by pages. The `Link` header
-/// has the address of the next one.
+/// `GET /access-log`: who saw or exported data of subjects, and who was refused; newest first.
 #[utoipa::path(
     get,
     path = "/access-log",
@@ -32,27 +28,19 @@ pub(super) struct Choice {
     tag = "operation",
     params(
         ("contains" = Option<String>, Query, max_length = 200, description = "Rows with these characters in kind, actor, address, object, study or pseudonym"),
-        ("subject" = Option<SubjectId>, Query, description = "Rows of this subject"),
-        ("before" = Option<i64>, Query, description = "Older than this `seq`"),
-        ("limit" = Option<u32>, Query, minimum = 1, maximum = 1000, description = "At most so many: 1 to 1000")
+        ("subject_id" = Option<SubjectId>, Query, description = "Rows of this subject")
     ),
-    responses((status = 200, description = "A page", body = Vec<AccessRow>)),
+    responses((status = 200, description = "A page", body = Page<AccessRow>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn list(
     _: May<Administer>,
     State(app): State<AppState>,
-    Params(choice): Params<Choice>,
-) -> Result<Response, Refusal> {
-    let limit = checked(choice.limit.as_deref(), 1000)?;
+    paging: Paging<i64, Filter>,
+) -> Result<Json<Page<AccessRow>>, Refusal> {
     app.access.log.write(app.store(), true).await?;
-    let contains = choice.contains.trim();
+    let Filter { contains, subject_id } = &paging.filter;
     let mut reader = app.read().await?;
-    let rows = access_log::page(&mut reader, contains, choice.subject, choice.before, limit + 1).await?;
-    drop(reader);
-    let mut path = vec![("contains", contains.to_owned())];
-    path.extend(choice.subject.map(|subject| ("subject", subject.to_string())));
-    path.retain(|(_, value)| !value.is_empty());
-    let path: Vec<(&str, &str)> = path.iter().map(|(name, value)| (*name, value.as_str())).collect();
-    Ok(linked_with("/api/v1/access-log", &path, rows, limit, |row| row.seq.to_string()))
+    let rows = access_log::page(&mut reader, contains.trim(), *subject_id, paging.after, paging.to_read()).await?;
+    Ok(Json(paging.page(rows, |row| row.seq)?))
 }

@@ -2,6 +2,7 @@
 
 use crate::AppState;
 use crate::may::May;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
@@ -31,7 +32,7 @@ const CHUNK_BYTES: usize = 1 << 16;
     operation_id = "get_study_archive",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "An archive for `gaitwright import`, not signed", body = Vec<u8>, content_type = "application/octet-stream")),
+    responses((status = 200, description = "An archive for `gaitwright import`, not signed", body = Vec<u8>, content_type = "application/octet-stream"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn of_study(
@@ -103,15 +104,16 @@ impl Write for Chunks {
     operation_id = "list_study_imports",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "One import for each record that it came through, the last one into this record; empty: the study was made here", body = Vec<Import>)),
+    responses((status = 200, description = "One import for each record that it came through, the last one into this record; empty: the study was made here", body = Page<Import>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn imports_of_study(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-) -> Result<Json<Vec<Import>>, Refusal> {
+    paging: Paging<usize>,
+) -> Result<Json<Page<Import>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    Ok(Json(imports::of_study(&mut reader, id).await?))
+    Ok(Json(paging.cut_by_place(imports::of_study(&mut reader, id).await?)?))
 }

@@ -4,7 +4,6 @@ use crate::AppState;
 use crate::once::Once;
 use crate::problem::Refusal;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::Administer;
 use gaitwright_service::error::Error;
@@ -76,7 +75,7 @@ async fn to_its_end<T: Send + 'static>(
     path = "/backups",
     operation_id = "create_backup",
     tag = "operation",
-    responses((status = 201, description = "Copied and checked", body = Copy)),
+    responses((status = 200, description = "Copied and checked", body = Copy)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn create(State(app): State<AppState>, once: Once<Administer>) -> Result<Response, Refusal> {
@@ -91,7 +90,7 @@ pub(super) async fn create(State(app): State<AppState>, once: Once<Administer>) 
                 Err(before) => return Ok(before),
             };
             copy.record(&mut writer, &once.actor).await?;
-            once.finish(&app, writer, StatusCode::CREATED, None, &copy).await
+            once.done(&app, writer, &copy).await
         };
         let recorded = recorded.await;
         copy.unless_refused(&app, recorded)

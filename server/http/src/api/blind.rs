@@ -4,17 +4,17 @@ use crate::AppState;
 use crate::blind_motion::{Figure, blind_motion, phase};
 use crate::may::May;
 use crate::once::{Once, OnceWith};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::{Administer, Rate, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, Answered, RaterAnswer, RaterFigures, UnblindedPair};
-use gaitwright_store::{StudyId, TrialId, allocations, gaits, presentations, studies};
+use gaitwright_store::{StudyId, allocations, gaits, presentations, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -38,11 +38,11 @@ pub(super) struct NextPair {
     pair: Option<Pair>,
 }
 
-/// `POST /studies/{id}/blind/next`: the pair that this rater should compare. Asking again before answering gives the
+/// `POST /studies/{id}/blind-pairs/next`: the pair that this rater should compare. Asking again before answering gives the
 /// same one.
 #[utoipa::path(
     post,
-    path = "/studies/{id}/blind/next",
+    path = "/studies/{id}/blind-pairs/next",
     operation_id = "draw_blind_pair",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
@@ -60,87 +60,81 @@ pub(super) async fn next(
     let answering = app.clone();
     let (writer, shown) = blind::next(app.store_mut(), &once.caller, id).await?;
     let pair = shown.map(|shown| Pair {
-        first: format!("/api/v1/blind/{}/first", shown.presentation.token),
-        second: format!("/api/v1/blind/{}/second", shown.presentation.token),
+        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.presentation.token),
+        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.presentation.token),
         token: shown.presentation.token,
         number: shown.presentation.number,
     });
-    once.finish(&answering, writer, StatusCode::OK, None, &NextPair { pair }).await
+    once.done(&answering, writer, &NextPair { pair }).await
 }
 
-/// `GET /blind/{token}/first`: 101 figures over one stride, each ten places: hip, shoulder, then knee, ankle, heel, toe
-/// of the left and of the right leg; forward and up, m. Where in the stride they begin differs from pair to pair, and is the
+/// A motion to compare.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct BlindMotion {
+    /// 101 figures over one stride, each ten places: hip, shoulder, then knee, ankle, heel, toe of the left and of the
+    /// right leg; forward and up, m.
+    #[schema(value_type = Vec<Vec<Vec<f64>>>)]
+    figures: Vec<Figure>,
+}
+
+/// Which motion of a pair.
+#[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Side {
+    First,
+    Second,
+}
+
+/// `GET /blind-pairs/{token}/motions/{side}`: where in the stride a motion begins differs from pair to pair, and is the
 /// same for both motions of a pair.
 #[utoipa::path(
     get,
-    path = "/blind/{token}/first",
-    operation_id = "get_first_blind_motion",
+    path = "/blind-pairs/{token}/motions/{side}",
+    operation_id = "get_blind_motion",
     tag = "blind",
-    params(("token" = String, Path, description = "The pair")),
-    responses((status = 200, description = "The motion", body = Vec<Vec<Vec<f64>>>)),
+    params(
+        ("token" = String, Path, description = "The pair"),
+        ("side" = inline(Side), Path, description = "Which motion of the pair")
+    ),
+    responses((status = 200, description = "The motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
-pub(super) async fn first(
+pub(super) async fn motion(
     may: May<Rate>,
     State(mut app): State<AppState>,
-    Path(token): Path<String>,
-) -> Result<Json<Vec<Figure>>, Refusal> {
-    motion(&mut app, &may, &token, |(first, _)| first).await
-}
-
-/// `GET /blind/{token}/second`: as the first one.
-#[utoipa::path(
-    get,
-    path = "/blind/{token}/second",
-    operation_id = "get_second_blind_motion",
-    tag = "blind",
-    params(("token" = String, Path, description = "The pair")),
-    responses((status = 200, description = "The motion", body = Vec<Vec<Vec<f64>>>)),
-    security(("token" = ["rate"]), ("session" = ["rate"])),
-)]
-pub(super) async fn second(
-    may: May<Rate>,
-    State(mut app): State<AppState>,
-    Path(token): Path<String>,
-) -> Result<Json<Vec<Figure>>, Refusal> {
-    motion(&mut app, &may, &token, |(_, second)| second).await
-}
-
-async fn motion(
-    app: &mut AppState,
-    may: &May<Rate>,
-    token: &str,
-    side: impl Fn((TrialId, TrialId)) -> TrialId,
-) -> Result<Json<Vec<Figure>>, Refusal> {
+    Path((token, side)): Path<(String, Side)>,
+) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
-    let shown = blind::own(&mut reader, &may.caller, token).await?;
-    let gait = gaits::get(&mut reader, side(shown.shown())).await;
+    let shown = blind::own(&mut reader, &may.caller, &token).await?;
+    let (first, second) = shown.shown();
+    let trial = match side {
+        Side::First => first,
+        Side::Second => second,
+    };
+    let gait = gaits::get(&mut reader, trial).await;
     drop(reader);
-    let phase = phase(token);
+    let phase = phase(&token);
     let motion = match gait {
         Ok(gait) => app.compute(move |pool| blind_motion(&gait.unpack(pool)?, phase)).await.map_err(Error::from),
         Err(error) => Err(error.into()),
     };
     let motion = motion.flatten();
     // An error here must not say which trial it was, nor of which person or device.
-    motion
-        .map(Json)
-        .map_err(|error| {
-            tracing::error!(%error, "a gait cannot be shown to a rater");
-            Error::NotFound { what: "the motion of the comparison".to_owned(), id: "with this token".to_owned() }
-        })
-        .map_err(Refusal)
+    motion.map(|figures| Json(BlindMotion { figures })).map_err(|error| {
+        tracing::error!(%error, "a gait cannot be shown to a rater");
+        Refusal(Error::NotFound { what: "the motion of the comparison".to_owned(), id: "with this token".to_owned() })
+    })
 }
 
-/// `POST /blind/{token}/answer`.
+/// `POST /blind-pairs/{token}/answer`.
 #[utoipa::path(
     post,
-    path = "/blind/{token}/answer",
+    path = "/blind-pairs/{token}/answer",
     operation_id = "answer_blind_pair",
     tag = "blind",
     params(("token" = String, Path, description = "The pair")),
     request_body = RaterAnswer,
-    responses((status = 201, description = "Recorded", body = Answered)),
+    responses((status = 200, description = "Recorded", body = Answered)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
@@ -153,7 +147,7 @@ pub(super) async fn answer(
         Err(before) => return Ok(before),
     };
     let (_, answered) = blind::answer(&mut writer, &once.caller, &token, &given).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &answered).await
+    once.done(&app, writer, &answered).await
 }
 
 /// `GET /studies/{id}/raters`: agreement with themselves, position bias of those who were unblinded, answers that were
@@ -164,19 +158,20 @@ pub(super) async fn answer(
     operation_id = "get_rater_agreement",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "One row per rater", body = Vec<RaterFigures>)),
+    responses((status = 200, description = "One row per rater", body = Page<RaterFigures>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn raters(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-) -> Result<Json<Vec<RaterFigures>>, Refusal> {
+    paging: Paging<usize>,
+) -> Result<Json<Page<RaterFigures>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let shown = presentations::of_study(&mut reader, id).await?;
     let sides = allocations::of_unblinded_raters(&mut reader, id).await?;
-    Ok(Json(blind::figures(&shown, &sides)))
+    Ok(Json(paging.cut_by_place(blind::figures(&shown, &sides))?))
 }
 
 /// Who is unblinded, and why.
@@ -190,6 +185,13 @@ pub(super) struct Unblind {
     reason: String,
 }
 
+/// What a rater was shown.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct UnblindedRater {
+    /// Every pair of the rater, in order.
+    pairs: Vec<UnblindedPair>,
+}
+
 /// `POST /studies/{id}/unblind`: shows which gait a rater saw on which side. It is in the audit trail, and what the rater is
 /// shown from now on is marked.
 #[utoipa::path(
@@ -199,7 +201,7 @@ pub(super) struct Unblind {
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Unblind,
-    responses((status = 200, description = "Every pair of the rater, in order", body = Vec<UnblindedPair>)),
+    responses((status = 200, description = "Every pair of the rater, in order", body = UnblindedRater)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
@@ -211,6 +213,6 @@ pub(super) async fn unblind(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let shown = blind::unblind(&mut writer, &once.caller, id, &whose.rater, &whose.reason).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &shown).await
+    let pairs = blind::unblind(&mut writer, &once.caller, id, &whose.rater, &whose.reason).await?;
+    once.done(&app, writer, &UnblindedRater { pairs }).await
 }

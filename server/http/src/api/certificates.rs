@@ -1,5 +1,6 @@
 //! Certificates: a certification of a trial's gait that is independent of its optimisation.
 
+use super::jobs::Job;
 use crate::AppState;
 use crate::may::May;
 use crate::once::Once;
@@ -8,13 +9,14 @@ use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gait_optimizer::certificate::Certificate;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certification;
-use gaitwright_store::{TrialId, certificates};
+use gaitwright_service::studies::job::{JobId, JobKind};
+use gaitwright_service::studies::job_status;
+use gaitwright_store::{TrialId, certificates, schema};
 
 /// `GET /trials/{id}/certificate`: as it was made.
 #[utoipa::path(
@@ -23,7 +25,7 @@ use gaitwright_store::{TrialId, certificates};
     operation_id = "get_certificate",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "The certificate: `passed`, `objections`, `checks`, the stride-to-stride map and pushes", body = Object)),
+    responses((status = 200, description = "The certificate", body = schema::Certificate), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -35,30 +37,35 @@ pub(super) async fn get(
     certificates::find(&mut *app.read().await?, id).await?.map(Json).ok_or_else(missing).map_err(Refusal)
 }
 
-/// `POST /trials/{id}/certificate`: makes it, where it is not made yet.
+/// `POST /trials/{id}/certificate`: has it made, where it is not there yet.
 #[utoipa::path(
     post,
     path = "/trials/{id}/certificate",
     operation_id = "request_certificate",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; its gait has converged")),
-    responses((status = 200, description = "The certificate; making it takes some seconds", body = Object)),
+    responses(
+        (status = 200, description = "It was made before", body = schema::Certificate),
+        (status = 202, description = "The job that makes it, in some seconds", body = Job)
+    ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
-    State(mut app): State<AppState>,
+    State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
     once: Once<Run>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = once.answered_before(&app).await? {
-        return Ok(before);
-    }
-    let begun = certification::begin(&mut *app.read().await?, id).await?;
-    let certificate = certification::certificate(app.store_mut(), begun).await?;
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    certification::record(&mut writer, &once.actor, id, &certificate).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &certificate).await
+    if let Some(certificate) = certification::ask(&mut writer, &once.actor, id).await? {
+        return once.done(&app, writer, &certificate).await;
+    }
+    if !app.scheduler.certify(id) {
+        return Err(Error::NotReady("this service certifies no gaits".to_owned()).into());
+    }
+    let id = JobId { kind: JobKind::Certificate, trial: id };
+    let job = Job::from(job_status::find(&mut writer, &app.scheduler, id).await?);
+    once.accepted(&app, writer, Job::address(id), &job).await
 }

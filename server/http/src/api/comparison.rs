@@ -1,8 +1,8 @@
 //! Several studies side by side.
 
 use crate::AppState;
-use crate::extract::Params;
 use crate::may::May;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Named;
 use axum::Json;
@@ -52,26 +52,30 @@ pub(super) struct Compared {
     solve_seconds: f64,
 }
 
-/// `GET /compare`: several studies side by side, in the order in which they are named.
+/// `GET /study-comparison`: several studies side by side, in the order in which they are named.
 #[utoipa::path(
     get,
-    path = "/compare",
+    path = "/study-comparison",
     operation_id = "compare_studies",
     tag = "studies",
     params(("ids" = String, Query, description = "2 to 20 identifiers of studies, with commas between them")),
-    responses((status = 200, description = "One row per study", body = Vec<Compared>)),
+    responses((status = 200, description = "One row per study", body = Page<Compared>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
     may: May<Read>,
     State(mut app): State<AppState>,
-    Params(which): Params<Which>,
-) -> Result<Json<Vec<Compared>>, Refusal> {
+    paging: Paging<usize, Which>,
+) -> Result<Json<Page<Compared>>, Refusal> {
+    let which = &paging.filter;
     let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
     if !(2..=MOST).contains(&named.len()) {
-        return Err(
-            Error::invalid("ids", which.ids, &format!("2 to {MOST} identifiers, with commas between them")).into()
-        );
+        return Err(Error::invalid(
+            "ids",
+            which.ids.as_str(),
+            &format!("2 to {MOST} identifiers, with commas between them"),
+        )
+        .into());
     }
     let mut rows = Vec::with_capacity(named.len());
     for id in named {
@@ -79,7 +83,7 @@ pub(super) async fn get(
         let id = id.reached(&mut *app.read().await?, may.caller.reach()).await?;
         rows.push(row(&mut app, id).await?);
     }
-    Ok(Json(rows))
+    Ok(Json(paging.cut_by_place(rows)?))
 }
 
 async fn row(app: &mut AppState, id: StudyId) -> Result<Compared, Refusal> {

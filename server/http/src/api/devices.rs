@@ -3,39 +3,48 @@
 use crate::AppState;
 use crate::may::May;
 use crate::once::OnceWith;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gait_optimizer::Device as Definition;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::device;
-use gaitwright_store::DeviceId;
 use gaitwright_store::devices::{self, Device};
+use gaitwright_store::{DeviceId, schema};
+use std::cmp::Reverse;
 
-/// `GET`: all of them.
+/// `GET /devices`: newest first.
 #[utoipa::path(
     get,
     path = "/devices",
     operation_id = "list_devices",
     tag = "devices",
-    responses((status = 200, description = "All of them", body = Vec<Device>)),
+    responses((status = 200, description = "A page", body = Page<Device>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<Device>>, Refusal> {
-    Ok(Json(devices::all(&mut *app.read().await?).await?))
+pub(super) async fn list(
+    _: May<Read>,
+    State(app): State<AppState>,
+    paging: Paging<Reverse<DeviceId>>,
+) -> Result<Json<Page<Device>>, Refusal> {
+    let all = devices::all(&mut *app.read().await?).await?;
+    Ok(Json(paging.cut(all, |one| Reverse(one.id))?))
 }
 
-/// `POST`: adds the device of a data file. The very same file gives the device that is there already.
+/// `POST`: adds the device of a data file.
 #[utoipa::path(
     post,
     path = "/devices",
     operation_id = "create_device",
     tag = "devices",
-    request_body(content = Object, description = "A device file, as `optimizer/data/README.md` describes it"),
-    responses((status = 201, description = "Added", body = Device)),
+    request_body(content = schema::DeviceDefinition, description = "A device file, as `optimizer/data/README.md` describes it"),
+    responses(
+        (status = 200, description = "The very same file was added before", body = Device),
+        (status = 201, description = "Added", body = Device)
+    ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
@@ -46,9 +55,12 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let added = device::add(&mut writer, &once.actor, &definition).await?;
-    let location = format!("/api/v1/devices/{}", added.id);
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &added).await
+    let (device, added) = device::add(&mut writer, &once.actor, &definition).await?;
+    if !added {
+        return once.done(&app, writer, &device).await;
+    }
+    let location = format!("/api/v1/devices/{}", device.id);
+    once.created(&app, writer, location, &device).await
 }
 
 /// `GET {id}`.

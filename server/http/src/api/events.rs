@@ -21,7 +21,6 @@ use serde_json::json;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
-use utoipa::ToSchema;
 
 /// Shortest time between two iterations shown of one solve.
 const THROTTLE: Duration = Duration::from_millis(250);
@@ -42,7 +41,7 @@ pub(super) struct From {
     operation_id = "follow_study_events",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Begin after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "The last event that was seen")),
-    responses((status = 200, description = "Server-sent events. First `study_state`: where the study stands; then what is recorded, with an id, replayed after `Last-Event-ID`; and `progress` of running solves. The stream stays open when the study has ended: it can be extended", body = ServerSentEvent, content_type = "text/event-stream")),
+    responses((status = 200, description = "Server-sent events. First `study_state`: where the study stands; then what is recorded, with an id, replayed after `Last-Event-ID`; and `progress` of running solves. The stream stays open when the study has ended: it can be extended", body = String, content_type = "text/event-stream"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -71,18 +70,6 @@ fn last_seen(headers: &HeaderMap) -> Result<Option<i64>, Error> {
     let text = value.to_str().unwrap_or_default();
     let malformed = || Error::invalid("Last-Event-ID", text, "the id of an event of this stream");
     text.parse().map(Some).map_err(|_| malformed())
-}
-
-/// An event as sent.
-#[derive(ToSchema)]
-#[allow(dead_code, reason = "describes the stream; events are written by axum")]
-pub(super) struct ServerSentEvent {
-    /// What happened: `study_state`, `progress`, or the kind of an event of the record.
-    event: String,
-    /// Its number, to be given as `Last-Event-ID`; `study_state` and `progress` have none.
-    id: Option<String>,
-    /// JSON.
-    data: String,
 }
 
 async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sender<Read>) -> Result<(), Gone> {

@@ -1,5 +1,6 @@
 //! Explanations: which bound must give way where a trial has no gait.
 
+use super::jobs::Job;
 use crate::AppState;
 use crate::may::May;
 use crate::once::Once;
@@ -8,13 +9,14 @@ use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use gait_optimizer::explanation::{BoundAtLimit, Conflict, JointRelaxation, Relaxation};
 use gait_optimizer::{SolveStatus, Violation};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, ExplanationState};
+use gaitwright_service::studies::job::{JobId, JobKind};
+use gaitwright_service::studies::job_status;
 use gaitwright_store::explanations::Explained;
 use gaitwright_store::{Instant, TrialId, schema, trials};
 use serde::Serialize;
@@ -27,7 +29,7 @@ pub(super) struct TrialExplanation {
     /// All of it in sentences, as pages and command line say them.
     sentences: Vec<String>,
     /// How its solve ended.
-    #[schema(value_type = String)]
+    #[schema(value_type = schema::SolveStatus)]
     status: SolveStatus,
     /// What the last iterate violates, worst first.
     #[schema(value_type = Vec<schema::Violation>)]
@@ -75,23 +77,6 @@ impl TrialExplanation {
     }
 }
 
-/// An explanation that is not there yet.
-#[derive(Debug, Serialize, ToSchema)]
-pub(super) struct ComingExplanation {
-    trial_id: TrialId,
-    state: Coming,
-}
-
-/// When it comes.
-#[derive(Debug, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-enum Coming {
-    /// Now, or after those that were asked for before.
-    BeingMade,
-    /// After those of other trials of the study; asked for, before them.
-    Waiting,
-}
-
 /// `GET /trials/{id}/explanation`.
 #[utoipa::path(
     get,
@@ -101,7 +86,7 @@ enum Coming {
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
         (status = 200, description = "The explanation, as it was made", body = TrialExplanation),
-        (status = 202, description = "It is being made, or will be: ask again", body = ComingExplanation),
+        (status = 409, description = "The trial cannot be explained, or the subject withdrew consent")
     ),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -109,22 +94,19 @@ pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
-) -> Result<Response, Refusal> {
+) -> Result<Json<TrialExplanation>, Refusal> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
-    let coming = |state| (StatusCode::ACCEPTED, Json(ComingExplanation { trial_id: id, state })).into_response();
     match explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await? {
-        ExplanationState::Made(made) => Ok(Json(TrialExplanation::new(id, *made)).into_response()),
-        ExplanationState::BeingMade => Ok(coming(Coming::BeingMade)),
-        ExplanationState::Waiting => Ok(coming(Coming::Waiting)),
+        ExplanationState::Made(made) => Ok(Json(TrialExplanation::new(id, *made))),
         ExplanationState::Refused(reason) => Err(explanation::refusal(&trial, &reason).into()),
-        ExplanationState::NotAsked => {
+        ExplanationState::BeingMade | ExplanationState::Waiting | ExplanationState::NotAsked => {
             Err(Error::NotFound { what: "explanation of trial".to_owned(), id: id.to_string() }.into())
         }
     }
 }
 
-/// `POST /trials/{id}/explanation`: has it made, where it is not made yet.
+/// `POST /trials/{id}/explanation`: has it made, where it is not there yet.
 #[utoipa::path(
     post,
     path = "/trials/{id}/explanation",
@@ -132,8 +114,8 @@ pub(super) async fn get(
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; the program solved it, and it did not converge")),
     responses(
-        (status = 200, description = "The explanation, as it was made", body = TrialExplanation),
-        (status = 202, description = "It is being made, behind all solves, in some minutes: get it", body = ComingExplanation),
+        (status = 200, description = "It was made before", body = TrialExplanation),
+        (status = 202, description = "The job that makes it, behind all solves, in some minutes", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -148,8 +130,10 @@ pub(super) async fn create(
     };
     let asked = explanation::ask(&mut writer, &once.actor, id, app.scheduler.explaining(id)).await?;
     if let Some(made) = asked {
-        return once.finish(&app, writer, StatusCode::OK, None, &TrialExplanation::new(id, made)).await;
+        return once.done(&app, writer, &TrialExplanation::new(id, made)).await;
     }
-    let coming = ComingExplanation { trial_id: id, state: Coming::BeingMade };
-    once.finish(&app, writer, StatusCode::ACCEPTED, None, &coming).await
+    app.scheduler.explain_again(id);
+    let id = JobId { kind: JobKind::Explanation, trial: id };
+    let job = Job::from(job_status::find(&mut writer, &app.scheduler, id).await?);
+    once.accepted(&app, writer, Job::address(id), &job).await
 }

@@ -15,7 +15,7 @@ use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::solve_input::PackedInput;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
-use gaitwright_store::{TrialId, consents, gaits, trials};
+use gaitwright_store::{TrialId, consents, gaits, schema, trials};
 use serde::Deserialize;
 
 /// How densely a gait is sampled.
@@ -38,7 +38,7 @@ pub(super) fn two_hundred() -> f64 {
     operation_id = "get_solve_problem",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; what it started from was not dropped")),
-    responses((status = 200, description = "What `gaitwright solve --problem` does again: subject, device, bounds, settings, reference gait, limits, start", body = Object)),
+    responses((status = 200, description = "What `gaitwright solve --problem` solves again", body = schema::SolveProblem), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn problem(
@@ -61,7 +61,7 @@ pub(super) async fn problem(
     operation_id = "get_gait_motion_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
-    responses((status = 200, description = "OpenSim motion file: degrees, OpenSim's signs", body = String, content_type = "text/plain")),
+    responses((status = 200, description = "OpenSim motion file: degrees, OpenSim's signs", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn motion_file(
@@ -87,7 +87,7 @@ pub(super) async fn motion_file(
     operation_id = "get_controller_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; its gait has converged and is certified, and no safety report against it is open"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
-    responses((status = 200, description = "Controller file: curves and phase of every domain, set points of the prosthetic joints; it explains its fields", body = Object)),
+    responses((status = 200, description = "Controller file: curves and phase of every domain, set points of the prosthetic joints", body = schema::ControllerFile), (status = 409, description = "The gait may not be walked with, or the subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn controller(

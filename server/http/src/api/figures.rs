@@ -34,7 +34,7 @@ pub(super) struct Beside<T> {
         ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
         ("other" = Option<StudyId>, Query, description = "A study that is drawn beside it")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -61,7 +61,7 @@ pub(super) async fn of_study(
         ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
         ("other" = Option<TrialId>, Query, description = "A converged trial of the same study that is drawn beside it")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_trial(
@@ -89,7 +89,7 @@ pub(super) async fn of_trial(
         ("id" = LabSessionId, Path, description = "The session"),
         ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_session(
@@ -114,7 +114,7 @@ pub(super) async fn of_session(
         ("right" = Option<String>, Query, description = "The bound of the maps that runs to the right; by default the first one"),
         ("down" = Option<String>, Query, description = "The one that runs downwards; by default the second one")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_belief(

@@ -1,14 +1,14 @@
 //! The best action by iteration.
 
 use crate::AppState;
+use crate::csv_answer::csv_answer;
 use crate::may::May;
-use crate::negotiate::{csv_answer, wants_csv};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::HeaderMap;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
@@ -26,19 +26,16 @@ use std::sync::Arc;
     operation_id = "get_study_history",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "By iteration; CSV where `Accept` asks for it", content((Vec<Milestone> = "application/json"), (String = "text/csv")))),
+    responses((status = 200, description = "A page, by iteration", body = Page<Milestone>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-    headers: HeaderMap,
-) -> Result<Response, Refusal> {
-    if wants_csv(&headers) {
-        return table(&mut app, id).await;
-    }
-    Ok(Json(read(&mut app, id).await?).into_response())
+    paging: Paging<usize>,
+) -> Result<Json<Page<Milestone>>, Refusal> {
+    Ok(Json(paging.cut_by_place(read(&mut app, id).await?)?))
 }
 
 /// `GET /studies/{id}/history.csv`.
@@ -48,7 +45,7 @@ pub(super) async fn of_study(
     operation_id = "get_study_history_csv",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "By iteration", body = String, content_type = "text/csv")),
+    responses((status = 200, description = "By iteration", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(

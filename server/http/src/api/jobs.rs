@@ -1,30 +1,139 @@
-//! What waits to be solved, what is being solved, and by whom.
+//! Jobs, and who does them.
 
 use crate::AppState;
 use crate::may::May;
+use crate::once::Once;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
+use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use gaitwright_service::access::{Reach, Read};
-use gaitwright_store::jobs::{self, Job};
-use serde::Serialize;
+use axum::response::Response;
+use gaitwright_service::access::{Read, Run};
+use gaitwright_service::studies::job::{JobId, JobKind, JobState};
+use gaitwright_service::studies::job_status::{self, JobStatus};
+use gaitwright_store::jobs::{self, OpenSolve};
+use gaitwright_store::{StudyId, TrialId};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// Jobs listed at most.
-const MOST: u32 = 1000;
+/// Work that the service does in the background.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Job {
+    /// Identifier.
+    #[schema(value_type = String)]
+    id: JobId,
+    /// What it makes.
+    kind: JobKind,
+    /// Where it stands.
+    state: JobState,
+    /// Of which trial.
+    trial_id: TrialId,
+    /// The study of the trial.
+    study_id: StudyId,
+    /// Address of the result; null until the job is done.
+    result: Option<String>,
+    /// Why it failed; null where it did not.
+    reason: Option<String>,
+    /// Attempts and worker of a solve that has not ended; null otherwise.
+    solve: Option<OpenSolve>,
+}
 
-/// `GET`: the jobs that are not done, of studies that the caller reaches, in the order of queueing, at most 1000 of them.
+impl From<JobStatus> for Job {
+    fn from(job: JobStatus) -> Self {
+        let JobStatus { id, study, state, reason, solve } = job;
+        let result = match id.kind {
+            JobKind::Solve => format!("/api/v1/trials/{}", id.trial),
+            JobKind::Certificate | JobKind::Explanation => format!("/api/v1/trials/{}/{}", id.trial, id.kind.as_str()),
+        };
+        let result = (state == JobState::Done).then_some(result);
+        Self { id, kind: id.kind, state, trial_id: id.trial, study_id: study, result, reason, solve }
+    }
+}
+
+impl Job {
+    /// Where a job is.
+    pub(super) fn address(id: JobId) -> String {
+        format!("/api/v1/jobs/{id}")
+    }
+}
+
+/// Which jobs.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Filter {
+    kind: Option<JobKind>,
+    study_id: Option<StudyId>,
+}
+
+/// `GET /jobs`: the jobs that have not ended, of studies that the caller reaches, by kind and trial.
 #[utoipa::path(
     get,
     path = "/jobs",
     operation_id = "list_jobs",
     tag = "operation",
-    responses((status = 200, description = "Those that are not done", body = Vec<Job>)),
+    params(
+        ("kind" = Option<JobKind>, Query, description = "Jobs of this kind"),
+        ("study_id" = Option<StudyId>, Query, description = "Jobs of this study")
+    ),
+    responses((status = 200, description = "A page", body = Page<Job>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn list(may: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<Job>>, Refusal> {
-    Ok(Json(jobs::open(&mut *app.read().await?, may.caller.reach(), MOST).await?))
+pub(super) async fn list(
+    may: May<Read>,
+    State(app): State<AppState>,
+    paging: Paging<JobId, Filter>,
+) -> Result<Json<Page<Job>>, Refusal> {
+    let Filter { kind, study_id } = paging.filter;
+    let mut all = job_status::open(&mut *app.read().await?, &app.scheduler, may.caller.reach()).await?;
+    all.retain(|job| kind.is_none_or(|kind| kind == job.id.kind) && study_id.is_none_or(|study| study == job.study));
+    Ok(Json(paging.cut(all, |job| job.id)?.map(Job::from)))
+}
+
+/// `GET /jobs/{id}`: also one that has ended.
+#[utoipa::path(
+    get,
+    path = "/jobs/{id}",
+    operation_id = "get_job",
+    tag = "operation",
+    params(("id" = String, Path, description = "The job")),
+    responses((status = 200, description = "The job", body = Job), (status = 409, description = "The subject withdrew consent")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<JobId, Read>,
+) -> Result<Json<Job>, Refusal> {
+    Ok(Json(job_status::find(&mut *app.read().await?, &app.scheduler, id).await?.into()))
+}
+
+/// `POST /jobs/{id}/cancel`: a solve stops within one iteration, and its trial is cancelled.
+#[utoipa::path(
+    post,
+    path = "/jobs/{id}/cancel",
+    operation_id = "cancel_job",
+    tag = "operation",
+    params(("id" = String, Path, description = "The job; it has not ended")),
+    responses((status = 200, description = "Cancelled", body = Job)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn cancel(
+    State(app): State<AppState>,
+    Shown(id, _): Shown<JobId, Run>,
+    once: Once<Run>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let job = job_status::find(&mut writer, &app.scheduler, id).await?;
+    job_status::cancel(&mut writer, &once.actor, &app.scheduler, id).await?;
+    let cancelled = Job::from(JobStatus { state: JobState::Cancelled, solve: None, ..job });
+    let answer = once.done(&app, writer, &cancelled).await?;
+    app.scheduler.cancel_job(id).await;
+    Ok(answer)
 }
 
 /// Who solves.
@@ -38,22 +147,17 @@ pub(crate) struct Workers {
 
 impl Workers {
     pub(crate) async fn read(app: &AppState) -> Result<Self, Refusal> {
-        let mut at_work = BTreeMap::new();
         // Names of workers alone: they say nothing of a study.
-        for worker in
-            jobs::open(&mut *app.read().await?, Reach::Every, MOST).await?.into_iter().filter_map(|job| job.worker)
-        {
-            *at_work.entry(worker).or_default() += 1;
-        }
+        let at_work = jobs::by_worker(&mut *app.read().await?).await?;
         Ok(Self { places: app.scheduler.workers(), at_work })
     }
 }
 
-/// `GET`: who solves at the moment. A worker behind a broker is known while it has a job.
+/// `GET /workers`: who solves at the moment. A worker behind a broker is known while it has a solve.
 #[utoipa::path(
     get,
     path = "/workers",
-    operation_id = "list_workers",
+    operation_id = "get_workers",
     tag = "operation",
     responses((status = 200, description = "Who solves", body = Workers)),
     security(("token" = ["read"]), ("session" = ["read"])),

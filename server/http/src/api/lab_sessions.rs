@@ -5,18 +5,18 @@ use crate::AppState;
 use crate::extract::Params;
 use crate::may::May;
 use crate::once::{Once, OnceWith};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Device, Rate, Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, GaitOfWalk, InTheLab, NewAnswer, NewSession, RecordedWalk, SessionView};
-use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, studies};
+use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, schema, studies};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -27,17 +27,19 @@ use utoipa::ToSchema;
     operation_id = "list_lab_sessions",
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Every session, without what is blinded", body = Vec<SessionView>)),
+    responses((status = 200, description = "Every session, without what is blinded", body = Page<SessionView>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-) -> Result<Json<Vec<SessionView>>, Refusal> {
+    paging: Paging<u32>,
+) -> Result<Json<Page<SessionView>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    Ok(Json(lab_sessions::of_study(&mut reader, id).await?.iter().map(SessionView::from).collect()))
+    let all = lab_sessions::of_study(&mut reader, id).await?;
+    Ok(Json(paging.cut(all, |session| session.number)?.map(|session| SessionView::from(&session))))
 }
 
 /// `POST /studies/{id}/lab-sessions`: plans one: a walk without the device, then one with each gait, in an order that is
@@ -63,7 +65,7 @@ pub(super) async fn create(
     };
     let session = lab::plan(&mut writer, &once.actor, id, &new).await?;
     let location = format!("/api/v1/lab-sessions/{}", session.id);
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &SessionView::from(&session)).await
+    once.created(&app, writer, location, &SessionView::from(&session)).await
 }
 
 /// `GET /lab-sessions/{id}`.
@@ -73,7 +75,7 @@ pub(super) async fn create(
     operation_id = "get_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "The session, without what is blinded", body = SessionView)),
+    responses((status = 200, description = "The session, without what is blinded", body = SessionView), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -107,7 +109,7 @@ pub(super) struct OfWalk {
         ("walk" = u8, Query, description = "2 or 3: walk 1 is without the device"),
         ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")
     ),
-    responses((status = 200, description = "Controller file", body = Object)),
+    responses((status = 200, description = "Controller file", body = schema::ControllerFile), (status = 409, description = "The gait may not be walked with, or the subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
     security(("token" = ["device"]), ("session" = ["device"])),
 )]
 pub(super) async fn controller(
@@ -170,7 +172,7 @@ pub(super) async fn close(
         Err(before) => return Ok(before),
     };
     let session = lab::close(&mut writer, &once.actor, id, &closing.note).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &SessionView::from(&session)).await
+    once.done(&app, writer, &SessionView::from(&session)).await
 }
 
 /// Why the session is unblinded.
@@ -205,17 +207,17 @@ pub(super) async fn unblind(
         Err(before) => return Ok(before),
     };
     let session = lab::unblind(&mut writer, &once.actor, id, &told.reason).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &SessionView::from(&session)).await
+    once.done(&app, writer, &SessionView::from(&session)).await
 }
 
-/// `GET /lab/{id}`: the session as the person who walks and the rater see it.
+/// `GET /lab-sessions/{id}/next-walk`: the session as the person who walks and the rater see it.
 #[utoipa::path(
     get,
-    path = "/lab/{id}",
+    path = "/lab-sessions/{id}/next-walk",
     operation_id = "get_next_walk",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "Which walk is next, and nothing that could tell a gait", body = InTheLab)),
+    responses((status = 200, description = "Which walk is next, and nothing that could tell a gait", body = InTheLab), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn in_the_lab(
@@ -226,15 +228,15 @@ pub(super) async fn in_the_lab(
     Ok(Json(lab::in_the_lab(&mut *app.read().await?, id).await?))
 }
 
-/// `POST /lab/{id}/walks`: the next walk was recorded.
+/// `POST /lab-sessions/{id}/walks`: the next walk was recorded.
 #[utoipa::path(
     post,
-    path = "/lab/{id}/walks",
+    path = "/lab-sessions/{id}/walks",
     operation_id = "record_walk",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = RecordedWalk,
-    responses((status = 201, description = "Recorded; which walk is next", body = InTheLab)),
+    responses((status = 200, description = "Recorded; which walk is next", body = InTheLab)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn walk(
@@ -247,19 +249,19 @@ pub(super) async fn walk(
         Err(before) => return Ok(before),
     };
     let next = lab::record_walk(&mut writer, &once.actor, id, &walked).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &next).await
+    once.done(&app, writer, &next).await
 }
 
-/// `POST /lab/{id}/answers`: which walk the subject found better. The record keeps the number of the walk; the answer
+/// `POST /lab-sessions/{id}/answers`: which walk the subject found better. The record keeps the number of the walk; the answer
 /// reaches the learner at unblinding.
 #[utoipa::path(
     post,
-    path = "/lab/{id}/answers",
+    path = "/lab-sessions/{id}/answers",
     operation_id = "answer_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewAnswer,
-    responses((status = 201, description = "Recorded, and read back", body = InTheLab)),
+    responses((status = 200, description = "Recorded, and read back", body = InTheLab)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
@@ -272,20 +274,20 @@ pub(super) async fn answer(
         Err(before) => return Ok(before),
     };
     let seen = lab::answer(&mut writer, &once.caller, id, &new).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &seen).await
+    once.done(&app, writer, &seen).await
 }
 
-/// `POST /lab/{id}/take-back`: the answer that stands counts no more.
+/// `POST /lab-sessions/{id}/retract-answer`: takes the answer back.
 #[utoipa::path(
     post,
-    path = "/lab/{id}/take-back",
-    operation_id = "take_back_lab_answer",
+    path = "/lab-sessions/{id}/retract-answer",
+    operation_id = "retract_lab_answer",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "Taken back; the question is open again", body = InTheLab)),
+    responses((status = 200, description = "Retracted; the question is open again", body = InTheLab)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
-pub(super) async fn take_back(
+pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
     once: Once<Rate>,
@@ -295,5 +297,5 @@ pub(super) async fn take_back(
         Err(before) => return Ok(before),
     };
     let seen = lab::take_back(&mut writer, &once.caller, id).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &seen).await
+    once.done(&app, writer, &seen).await
 }

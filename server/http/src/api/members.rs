@@ -3,15 +3,15 @@
 use crate::AppState;
 use crate::may::May;
 use crate::once::{Once, OnceWith};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::{Administer, Read, Run};
-use gaitwright_service::studies::membership::{self, NewMember, StudyAccess};
-use gaitwright_store::members::Member;
+use gaitwright_service::studies::membership::{self, NewMember};
+use gaitwright_store::members::{self, Member};
 use gaitwright_store::{MemberId, StudyId};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -26,15 +26,36 @@ use utoipa::ToSchema;
     operation_id = "list_study_members",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Its members", body = StudyAccess)),
+    responses((status = 200, description = "A page, in the order in which they were added", body = Page<Member>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
+    paging: Paging<MemberId>,
+) -> Result<Json<Page<Member>>, Refusal> {
+    let all = members::of_study(&mut *app.read().await?, id).await?;
+    Ok(Json(paging.cut(all, |member| member.id)?))
+}
+
+/// `GET /studies/{id}/access`: whether the study is restricted to its members and administrators.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/access",
+    operation_id = "get_study_access",
+    tag = "access",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "Who reaches it", body = StudyAccess)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn access(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Read>,
 ) -> Result<Json<StudyAccess>, Refusal> {
-    Ok(Json(membership::access(&mut *app.read().await?, id).await?))
+    let restricted = members::is_restricted(&mut *app.read().await?, id).await?;
+    Ok(Json(StudyAccess { restricted }))
 }
 
 /// `POST /studies/{id}/members`: assigns a rater, or adds a clinician or a token.
@@ -58,7 +79,30 @@ pub(super) async fn add(
         Err(before) => return Ok(before),
     };
     let member = membership::add(&mut writer, &once.actor, id, &new).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &member).await
+    once.created(&app, writer, address(member.id), &member).await
+}
+
+/// Where a membership is.
+fn address(id: MemberId) -> String {
+    format!("/api/v1/study-members/{id}")
+}
+
+/// `GET /study-members/{id}`.
+#[utoipa::path(
+    get,
+    path = "/study-members/{id}",
+    operation_id = "get_study_member",
+    tag = "access",
+    params(("id" = MemberId, Path, description = "The membership")),
+    responses((status = 200, description = "The membership, also one that has ended", body = Member)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<MemberId, Read>,
+) -> Result<Json<Member>, Refusal> {
+    Ok(Json(members::get(&mut *app.read().await?, id).await?))
 }
 
 /// `POST /study-members/{id}/remove`: the member does not reach the study any more, unless it is open to it.
@@ -81,40 +125,40 @@ pub(super) async fn end(
         Err(before) => return Ok(before),
     };
     let member = membership::end(&mut writer, &once.actor, id).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &member).await
+    once.done(&app, writer, &member).await
 }
 
-/// Whether a study is restricted.
-#[derive(Debug, Deserialize, ToSchema)]
+/// Who reaches a study.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Restriction {
-    /// Only members and administrators reach it.
+pub(super) struct StudyAccess {
+    /// Whether only members and administrators reach it. Raters need to be members in any case.
     restricted: bool,
 }
 
-/// `POST /studies/{id}/access`: restricts the study to its members and administrators, or opens it to all staff. Whoever
+/// `PUT /studies/{id}/access`: restricts the study to its members and administrators, or opens it to all staff. Whoever
 /// restricts it stays a member.
 #[utoipa::path(
-    post,
+    put,
     path = "/studies/{id}/access",
     operation_id = "set_study_access",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
-    request_body = Restriction,
+    request_body = StudyAccess,
     responses((status = 200, description = "Who reaches it now", body = StudyAccess)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn restrict(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    OnceWith(once, wanted): OnceWith<Run, Restriction>,
+    OnceWith(once, wanted): OnceWith<Run, StudyAccess>,
 ) -> Result<Response, Refusal> {
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let access = membership::restrict(&mut writer, &once.caller, id, wanted.restricted).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &access).await
+    membership::restrict(&mut writer, &once.caller, id, wanted.restricted).await?;
+    once.done(&app, writer, &wanted).await
 }
 
 /// A rater to invite.
@@ -156,5 +200,5 @@ pub(super) async fn invite(
     let mut writer = once.begin_secret(&app).await?;
     let (_, member, secret) = membership::invite(&mut writer, &once.actor, id, &whom.name).await?;
     let invited = Invited { member, path: format!("/sign-in/{secret}") };
-    once.finish(&app, writer, StatusCode::CREATED, None, &invited).await
+    once.created(&app, writer, address(invited.member.id), &invited).await
 }

@@ -3,6 +3,7 @@
 
 mod access_log;
 mod archive;
+mod assessments;
 mod audit;
 mod backups;
 mod blind;
@@ -17,14 +18,13 @@ mod gaits;
 pub mod health;
 mod history;
 mod jobs;
-mod lab_recordings;
 mod lab_sessions;
+mod measurement_files;
 mod members;
 mod motion;
 mod preferences;
 mod recommendation;
 mod reference_gaits;
-mod remarks;
 mod safety_reports;
 mod scripts;
 mod sessions;
@@ -35,11 +35,10 @@ mod tokens;
 mod trials;
 mod users;
 
-pub(super) use backups::Copy;
-pub(super) use jobs::Workers;
-
 use super::{AppState, RECORDING_LIMIT_BYTES};
 use axum::extract::DefaultBodyLimit;
+pub(super) use backups::Copy;
+pub(super) use jobs::Workers;
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouterExt};
 use utoipa_axum::routes;
 
@@ -82,11 +81,13 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(history::of_study))
         .routes(routes!(history::of_study_csv))
         .routes(routes!(preferences::of_study, preferences::create))
+        .routes(routes!(preferences::of_study_csv))
         .routes(routes!(events::of_study))
         // who reaches a study
         .routes(routes!(members::of_study, members::add))
+        .routes(routes!(members::get))
         .routes(routes!(members::end))
-        .routes(routes!(members::restrict))
+        .routes(routes!(members::access, members::restrict))
         .routes(routes!(members::invite))
         // trials
         .routes(routes!(trials::get))
@@ -113,8 +114,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(scripts::tell))
         // blind comparisons
         .routes(routes!(blind::next))
-        .routes(routes!(blind::first))
-        .routes(routes!(blind::second))
+        .routes(routes!(blind::motion))
         .routes(routes!(blind::answer))
         .routes(routes!(blind::raters))
         .routes(routes!(blind::unblind))
@@ -124,28 +124,30 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(lab_sessions::controller))
         .routes(routes!(lab_sessions::close))
         .routes(routes!(lab_sessions::unblind))
-        .routes(routes!(lab_recordings::list))
-        .routes(routes!(lab_recordings::file))
-        .routes(routes!(lab_recordings::electromyogram).layer(recordings()))
-        .routes(routes!(lab_recordings::motion).layer(recordings()))
-        .routes(routes!(lab_recordings::result, lab_recordings::process))
-        .routes(routes!(lab_recordings::limit_cycles))
+        .routes(routes!(measurement_files::list))
+        .routes(routes!(measurement_files::get))
+        .routes(routes!(measurement_files::content))
+        .routes(routes!(measurement_files::emg).layer(recordings()))
+        .routes(routes!(measurement_files::motion).layer(recordings()))
+        .routes(routes!(measurement_files::result, measurement_files::process))
+        .routes(routes!(measurement_files::limit_cycles))
         .routes(routes!(lab_sessions::in_the_lab))
         .routes(routes!(lab_sessions::walk))
         .routes(routes!(lab_sessions::answer))
-        .routes(routes!(lab_sessions::take_back))
+        .routes(routes!(lab_sessions::retract))
         // answers
         .routes(routes!(preferences::get))
         .routes(routes!(preferences::retract))
         .routes(routes!(suggestions::of_study, suggestions::create))
-        .routes(routes!(remarks::of_study, remarks::create))
-        .routes(routes!(remarks::get))
-        .routes(routes!(remarks::retract))
+        .routes(routes!(assessments::of_study, assessments::create))
+        .routes(routes!(assessments::get))
+        .routes(routes!(assessments::retract))
         .routes(routes!(safety_reports::of_study))
         .routes(routes!(safety_reports::review))
         // access
         .routes(routes!(users::me))
         .routes(routes!(users::list, users::create))
+        .routes(routes!(users::get))
         .routes(routes!(users::link))
         .routes(routes!(users::disable))
         .routes(routes!(users::enable))
@@ -153,9 +155,12 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(sessions::list))
         .routes(routes!(sessions::end))
         .routes(routes!(tokens::list, tokens::create))
+        .routes(routes!(tokens::get))
         .routes(routes!(tokens::revoke))
         // operation
         .routes(routes!(jobs::list))
+        .routes(routes!(jobs::get))
+        .routes(routes!(jobs::cancel))
         .routes(routes!(jobs::workers))
         .routes(routes!(backups::create))
         .routes(routes!(audit::list))

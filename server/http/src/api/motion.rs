@@ -11,31 +11,36 @@ use gait_optimizer::walking::stick_figure::{StickFigure, stick_figures};
 use gaitwright_charts::gait_series::points;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_store::{TrialId, gaits};
+use gaitwright_store::{TrialId, gaits, schema};
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// A gait in motion, over one stride from right heel strike.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Motion {
     /// Stride time, s.
     stride_time_s: f64,
     /// How far one stride goes, m.
     stride_length_m: f64,
-    /// Mesh points in time; between two of them positions change evenly.
+    /// Nodes in time; between two of them positions change evenly.
     frames: Vec<Frame>,
 }
 
-#[derive(Debug, Serialize)]
+/// A gait at a node.
+#[derive(Debug, Serialize, ToSchema)]
 struct Frame {
     #[serde(flatten)]
+    #[schema(value_type = schema::StickFigure)]
     figure: StickFigure,
     /// Name of the domain.
     domain: String,
     /// Ground forces on left heel, left toe, right heel, right toe: forward and up, N.
+    #[schema(value_type = Vec<Vec<f64>>)]
     forces_n: [[f64; 2]; 4],
     /// Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R; absent without
     /// muscles.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Vec<f64>>)]
     activations: Option<[f64; 10]>,
 }
 
@@ -46,7 +51,7 @@ struct Frame {
     operation_id = "get_gait_motion",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Stick figures over one stride", body = Object)),
+    responses((status = 200, description = "Stick figures over one stride", body = Motion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(

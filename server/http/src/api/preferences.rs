@@ -1,17 +1,15 @@
 //! Preferences: answers to comparisons.
 
 use crate::AppState;
-use crate::extract::Params;
+use crate::csv_answer::csv_answer;
 use crate::may::May;
-use crate::negotiate::{csv_answer, wants_csv};
 use crate::once::OnceWith;
-use crate::pages_of::{After, linked_after};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
 use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_service::access::{self, Read};
@@ -21,34 +19,48 @@ use gaitwright_store::{FeedbackId, StudyId, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// `GET /studies/{id}/preferences`: as given, retracted ones included, by pages; the `Link` header has the address of
-/// the next one.
+/// `GET /studies/{id}/preferences`: as given, retracted ones included.
 #[utoipa::path(
     get,
     path = "/studies/{id}/preferences",
     operation_id = "list_preferences",
     tag = "preferences",
-    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "After this `seq`"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
-    responses((status = 200, description = "A page, by time; all of them as CSV where `Accept` asks for it. In a preference `trial_a` of the table is the winner", content((Vec<FeedbackRow> = "application/json"), (String = "text/csv")))),
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "A page, by time", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-    Params(page): Params<After<i64>>,
-    headers: HeaderMap,
+    paging: Paging<i64>,
+) -> Result<Json<Page<FeedbackRow>>, Refusal> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    let rows = feedback::comparisons(&mut reader, id, paging.after.unwrap_or(0), paging.to_read()).await?;
+    Ok(Json(paging.page(rows, |row| row.seq)?))
+}
+
+/// `GET /studies/{id}/preferences.csv`: in a preference, `trial_a` is the winner.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/preferences.csv",
+    operation_id = "list_preferences_csv",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "All of them, by time", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study_csv(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    if wants_csv(&headers) {
-        let rows = feedback::comparisons(&mut reader, id, 0, u32::MAX).await?;
-        drop(reader);
-        return csv_answer(&mut app, &format!("preferences-{}.csv", id.short()), move || table(&rows)).await;
-    }
-    let limit = page.limit(1000)?;
-    let rows = feedback::comparisons(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
-    Ok(linked_after(&format!("/api/v1/studies/{id}/preferences"), rows, limit, |row| row.seq.to_string()))
+    let rows = feedback::comparisons(&mut reader, id, 0, u32::MAX).await?;
+    drop(reader);
+    csv_answer(&mut app, &format!("preferences-{}.csv", id.short()), move || table(&rows)).await
 }
 
 fn table(rows: &[FeedbackRow]) -> CsvTable {
@@ -96,7 +108,7 @@ fn table(rows: &[FeedbackRow]) -> CsvTable {
     operation_id = "get_preference",
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "The answer")),
-    responses((status = 200, description = "The answer", body = FeedbackRow)),
+    responses((status = 200, description = "The answer", body = FeedbackRow), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -140,10 +152,10 @@ pub(super) async fn create(
     let row = feedback::get(&mut writer, given).await?;
     let other_answers = answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &Recorded { row, other_answers }).await
+    once.created(&app, writer, location, &Recorded { row, other_answers }).await
 }
 
-/// Why an answer or a remark is taken back.
+/// Why an answer or an assessment is taken back.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Retract {
@@ -175,5 +187,5 @@ pub(super) async fn retract(
         Err(before) => return Ok(before),
     };
     let row = answer::retract(&mut writer, &once.caller, None, id, why.author.as_deref(), &why.reason).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &row).await
+    once.done(&app, writer, &row).await
 }

@@ -1,8 +1,8 @@
 //! What a study recommends.
 
 use crate::AppState;
+use crate::csv_answer::csv_answer;
 use crate::may::May;
-use crate::negotiate::csv_answer;
 use crate::problem::Refusal;
 use crate::shown::Shown;
 use axum::Json;

@@ -3,39 +3,47 @@
 use crate::AppState;
 use crate::may::May;
 use crate::once::OnceWith;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::recording::{self, Match, NewReferenceGait};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::{ReferenceGaitId, SubjectId, subjects};
+use std::cmp::Reverse;
 
-/// `GET`: all of them.
+/// `GET /reference-gaits`: newest first.
 #[utoipa::path(
     get,
     path = "/reference-gaits",
     operation_id = "list_reference_gaits",
     tag = "reference-gaits",
-    responses((status = 200, description = "All of them", body = Vec<ReferenceGait>)),
+    responses((status = 200, description = "A page", body = Page<ReferenceGait>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<ReferenceGait>>, Refusal> {
-    Ok(Json(reference_gaits::all(&mut *app.read().await?).await?))
+pub(super) async fn list(
+    _: May<Read>,
+    State(app): State<AppState>,
+    paging: Paging<Reverse<ReferenceGaitId>>,
+) -> Result<Json<Page<ReferenceGait>>, Refusal> {
+    let all = reference_gaits::all(&mut *app.read().await?).await?;
+    Ok(Json(paging.cut(all, |one| Reverse(one.id))?))
 }
 
-/// `POST`: makes one of a recording: cuts it at right heel strikes, averages its strides. The very same recording
-/// gives the reference gait that is there already.
+/// `POST`: makes one of a recording: cuts it at right heel strikes, averages its strides.
 #[utoipa::path(
     post,
     path = "/reference-gaits",
     operation_id = "create_reference_gait",
     tag = "reference-gaits",
     request_body = NewReferenceGait,
-    responses((status = 201, description = "Imported; its provenance says what was done", body = ReferenceGait)),
+    responses(
+        (status = 200, description = "The very same recording was imported before", body = ReferenceGait),
+        (status = 201, description = "Imported; its provenance says what was done", body = ReferenceGait)
+    ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
@@ -50,9 +58,12 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let added = recording::add(&mut writer, &once.actor, &definition).await?;
-    let location = format!("/api/v1/reference-gaits/{}", added.id);
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &added).await
+    let (gait, added) = recording::add(&mut writer, &once.actor, &definition).await?;
+    if !added {
+        return once.done(&app, writer, &gait).await;
+    }
+    let location = format!("/api/v1/reference-gaits/{}", gait.id);
+    once.created(&app, writer, location, &gait).await
 }
 
 /// `GET {id}`.
@@ -80,15 +91,16 @@ pub(super) async fn get(
     operation_id = "list_nearest_reference_gaits",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "The nearest first; those that do not say whose they are come last", body = Vec<Match>)),
+    responses((status = 200, description = "The nearest first; those that do not say whose they are come last", body = Page<Match>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_subject(
     _: May<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
-) -> Result<Json<Vec<Match>>, Refusal> {
+    paging: Paging<usize>,
+) -> Result<Json<Page<Match>>, Refusal> {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
-    Ok(Json(recording::matches(&mut reader, &subject.body()).await?))
+    Ok(Json(paging.cut_by_place(recording::matches(&mut reader, &subject.body()).await?)?))
 }

@@ -3,12 +3,12 @@
 use crate::AppState;
 use crate::may::May;
 use crate::once::OnceWith;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
@@ -43,7 +43,7 @@ impl From<Closed> for SafetyReport {
 
 /// `GET /studies/{id}/safety-reports`: every time that a gait was called unsafe, also what was lifted since.
 ///
-/// By raters, in remarks and in lab sessions; what its author took back is left out. Before a lab session is unblinded,
+/// By raters, in assessments and in lab sessions; what its author took back is left out. Before a lab session is unblinded,
 /// both of its gaits are named.
 #[utoipa::path(
     get,
@@ -51,20 +51,22 @@ impl From<Closed> for SafetyReport {
     operation_id = "list_safety_reports",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Every time that a gait was called unsafe, by time", body = Vec<SafetyReport>)),
+    responses((status = 200, description = "Every time that a gait was called unsafe, by time", body = Page<SafetyReport>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-) -> Result<Json<Vec<SafetyReport>>, Refusal> {
+    paging: Paging<(Instant, TrialId, String)>,
+) -> Result<Json<Page<SafetyReport>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let SafetyReports { closed, lifted, .. } = SafetyReports::read(&mut reader, id).await?;
     let mut all: Vec<SafetyReport> = closed.into_iter().chain(lifted).map(Into::into).collect();
-    all.sort_by_key(|report| report.at);
-    Ok(Json(all))
+    let at = |report: &SafetyReport| (report.at, report.trial_id, report.by.clone());
+    all.sort_by_key(at);
+    Ok(Json(paging.cut(all, at)?))
 }
 
 /// `POST /trials/{id}/safety-reviews`: staff looked at a gait that was called unsafe, and decide.
@@ -79,7 +81,7 @@ pub(super) async fn of_study(
     tag = "preferences",
     params(("id" = TrialId, Path, description = "The trial whose gait it is")),
     request_body = Decision,
-    responses((status = 201, description = "Recorded", body = SafetyReview)),
+    responses((status = 200, description = "Recorded", body = SafetyReview)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn review(
@@ -92,5 +94,5 @@ pub(super) async fn review(
         Err(before) => return Ok(before),
     };
     let row = safety_review::give(&mut writer, &once.caller, id, &decision).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
+    once.done(&app, writer, &row).await
 }

@@ -5,7 +5,6 @@ use crate::once::OnceWith;
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
@@ -42,7 +41,7 @@ pub(super) async fn ask(
             Err(before) => return Ok(before),
         };
         if let Some(trial) = script::give_out(&mut writer, &once.caller, worker, &suggestion?).await? {
-            return once.finish(&app, writer, StatusCode::OK, None, &trial).await;
+            return once.done(&app, writer, &trial).await;
         }
     }
     Err(Error::conflict("the study changes too fast; try again").into())
@@ -72,7 +71,7 @@ pub(super) async fn tell(
             Err(before) => return Ok(before),
         };
         if let Some(trial) = script::record(&mut writer, &once.caller, id, &heard?).await? {
-            return once.finish(&app, writer, StatusCode::OK, None, &trial).await;
+            return once.done(&app, writer, &trial).await;
         }
     }
     Err(Error::conflict("the study changes too fast; try again").into())

@@ -3,16 +3,17 @@
 use crate::AppState;
 use crate::may::May;
 use crate::once::Once;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::{Anything, Right, sign_in};
 use gaitwright_service::error::Error;
-use gaitwright_store::SessionId;
 use gaitwright_store::sessions::{self, Session};
+use gaitwright_store::{Instant, SessionId};
+use std::cmp::Reverse;
 
 /// `GET /sessions`: the newest first.
 #[utoipa::path(
@@ -20,19 +21,24 @@ use gaitwright_store::sessions::{self, Session};
     path = "/sessions",
     operation_id = "list_sessions",
     tag = "access",
-    responses((status = 200, description = "Sessions that have not ended: the caller's own; an administrator gets everybody's", body = Vec<Session>)),
+    responses((status = 200, description = "Sessions that have not ended: the caller's own; an administrator gets everybody's", body = Page<Session>)),
     security(("token" = []), ("session" = [])),
 )]
-pub(super) async fn list(may: May<Anything>, State(app): State<AppState>) -> Result<Json<Vec<Session>>, Refusal> {
+pub(super) async fn list(
+    may: May<Anything>,
+    State(app): State<AppState>,
+    paging: Paging<(Reverse<Instant>, SessionId)>,
+) -> Result<Json<Page<Session>>, Refusal> {
+    let at = |session: &Session| (Reverse(session.created_at), session.id);
     let mut reader = app.read().await?;
     let now = app.access.clock.now(&mut reader).await?;
     let of = match may.caller.user {
         _ if may.caller.may(Right::Administer) => None,
         // A program has no session.
-        None => return Ok(Json(Vec::new())),
+        None => return Ok(Json(paging.page(Vec::new(), at)?)),
         own => own,
     };
-    Ok(Json(sign_in::live(&mut reader, of, app.access.limits, now).await?))
+    Ok(Json(paging.cut(sign_in::live(&mut reader, of, app.access.limits, now).await?, at)?))
 }
 
 /// `POST /sessions/{id}/end`: one's own; an administrator ends any.
@@ -59,5 +65,5 @@ pub(super) async fn end(
         .filter(|session| once.caller.may(Right::Administer) || once.caller.user == Some(session.user_id));
     let session = session.ok_or_else(|| Error::NotFound { what: "session".to_owned(), id: id.to_string() })?;
     sign_in::end(&mut writer, &once.actor, &session).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &session).await
+    once.done(&app, writer, &session).await
 }

@@ -1,25 +1,23 @@
 //! Studies.
 
 use crate::AppState;
-use crate::extract::Params;
 use crate::may::May;
 use crate::once::{Once, OnceWith};
-use crate::pages_of::Before;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::revision::{IfMatch, tagged};
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::change::{self, Change, Extend, Fork};
 use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
 use gaitwright_service::studies::plan::{self, NewStudy};
-use gaitwright_store::studies::{self, Study};
+use gaitwright_store::studies::{self, Chosen, Study, StudyState};
 use gaitwright_store::trials::{self, TrialCounts};
-use gaitwright_store::{Connection, LentWriter, StudyId};
+use gaitwright_store::{Connection, LentWriter, StudyId, SubjectId};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -41,44 +39,42 @@ impl StudyView {
     }
 }
 
-/// A page of studies.
-#[derive(Debug, Serialize, ToSchema)]
-pub(super) struct StudyPage {
-    studies: Vec<StudyView>,
-    /// Give it as `before` to get the next page; absent on the last one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    next: Option<StudyId>,
+/// Which studies.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Filter {
+    subject_id: Option<SubjectId>,
+    state: Option<StudyState>,
 }
 
-/// `GET`: newest first, by pages.
+/// `GET /studies`: newest first.
 #[utoipa::path(
     get,
     path = "/studies",
     operation_id = "list_studies",
     tag = "studies",
     params(
-        ("before" = Option<StudyId>, Query, description = "Older than this one"),
-        ("limit" = Option<u32>, Query, description = "At most so many: 1 to 200")
+        ("subject_id" = Option<SubjectId>, Query, description = "Studies of this subject"),
+        ("state" = Option<StudyState>, Query, description = "Studies in this state")
     ),
-    responses((status = 200, description = "A page", body = StudyPage)),
+    responses((status = 200, description = "A page", body = Page<StudyView>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
     may: May<Read>,
     State(app): State<AppState>,
-    Params(page): Params<Before<StudyId>>,
-) -> Result<Json<StudyPage>, Refusal> {
-    let limit = page.limit(200)?;
+    paging: Paging<StudyId, Filter>,
+) -> Result<Json<Page<StudyView>>, Refusal> {
     let mut reader = app.read().await?;
-    let mut found = studies::page(&mut reader, may.caller.reach(), page.before, limit + 1).await?;
-    let more = found.len() > limit as usize;
-    found.truncate(limit as usize);
-    let next = if more { found.last().map(|study| study.id) } else { None };
+    let Filter { subject_id, state } = paging.filter;
+    let chosen = Chosen { subject: subject_id, state, before: paging.after, limit: paging.to_read() };
+    let found = studies::page(&mut reader, may.caller.reach(), chosen).await?;
+    let (found, next) = paging.page(found, |study| study.id)?.into_parts();
     let mut views = Vec::with_capacity(found.len());
     for study in found {
         views.push(StudyView::of(&mut reader, study).await?);
     }
-    Ok(Json(StudyPage { studies: views, next }))
+    Ok(Json(Page::of_parts(views, next)))
 }
 
 /// `GET {id}`: its entity tag is its revision.
@@ -126,9 +122,7 @@ pub(super) async fn create(
         Err(before) => return Ok(before),
     };
     let study = plan::create_by(&mut writer, &once.caller, new).await?;
-    let view = StudyView::of(&mut writer, study).await?;
-    let location = format!("/api/v1/studies/{}", view.study.id);
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &view).await
+    made(&app, &once, writer, study).await
 }
 
 /// Why something is done.
@@ -237,7 +231,7 @@ async fn act(
     let done = command::act(&mut writer, &once.actor, id, act, &why.reason).await?;
     let revision = done.study.revision;
     let view = StudyView::of(&mut writer, done.study).await?;
-    let answer = once.finish(app, writer, StatusCode::OK, None, &view).await?;
+    let answer = once.done(app, writer, &view).await?;
     for trial in done.cancelled {
         app.scheduler.cancel_solve(trial).await;
     }
@@ -267,7 +261,9 @@ pub(super) async fn patch(
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
     let study = change::change(&mut writer, &once.actor, id, &new).await?;
-    answer(&app, &once, writer, study, StatusCode::OK).await
+    let revision = study.revision;
+    let view = StudyView::of(&mut writer, study).await?;
+    Ok(tagged(once.done(&app, writer, &view).await?, revision))
 }
 
 /// `POST {id}/extend`: more trials; an ended study goes on.
@@ -293,7 +289,9 @@ pub(super) async fn extend(
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
     let study = change::extend(&mut writer, &once.actor, id, &more).await?;
-    answer(&app, &once, writer, study, StatusCode::OK).await
+    let revision = study.revision;
+    let view = StudyView::of(&mut writer, study).await?;
+    Ok(tagged(once.done(&app, writer, &view).await?, revision))
 }
 
 /// `POST {id}/fork`: a study with the same set-up and none of the trials.
@@ -317,18 +315,11 @@ pub(super) async fn fork(
         Err(before) => return Ok(before),
     };
     let study = change::fork(&mut writer, &once.actor, id, &differs).await?;
-    answer(&app, &once, writer, study, StatusCode::CREATED).await
+    made(&app, &once, writer, study).await
 }
 
-async fn answer(
-    app: &AppState,
-    once: &Once<Run>,
-    mut writer: LentWriter<'_>,
-    study: Study,
-    status: StatusCode,
-) -> Result<Response, Refusal> {
-    let (id, revision) = (study.id, study.revision);
+async fn made(app: &AppState, once: &Once<Run>, mut writer: LentWriter<'_>, study: Study) -> Result<Response, Refusal> {
+    let (location, revision) = (format!("/api/v1/studies/{}", study.id), study.revision);
     let view = StudyView::of(&mut writer, study).await?;
-    let location = (status == StatusCode::CREATED).then(|| format!("/api/v1/studies/{id}"));
-    Ok(tagged(once.finish(app, writer, status, location, &view).await?, revision))
+    Ok(tagged(once.created(app, writer, location, &view).await?, revision))
 }

@@ -1,42 +1,38 @@
 //! Subjects.
 
 use crate::AppState;
-use crate::extract::Params;
 use crate::may::May;
 use crate::once::OnceWith;
-use crate::pages_of::{Before, linked};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gait_optimizer::muscle::MuscleParameters;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
 use gaitwright_service::studies::person::{self, NewCorrection, NewSubject};
-use gaitwright_store::SubjectId;
 use gaitwright_store::consents::{self, Consent};
 use gaitwright_store::subjects::{self, Correction, Subject};
+use gaitwright_store::{SubjectId, schema};
 
-/// `GET`: newest first, by pages; the `Link` header has the address of the next one.
+/// `GET /subjects`: newest first.
 #[utoipa::path(
     get,
     path = "/subjects",
     operation_id = "list_subjects",
     tag = "subjects",
-    params(("before" = Option<SubjectId>, Query, description = "Older than this one"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
-    responses((status = 200, description = "A page", body = Vec<Subject>)),
+    responses((status = 200, description = "A page", body = Page<Subject>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
     _: May<Read>,
     State(app): State<AppState>,
-    Params(page): Params<Before<SubjectId>>,
-) -> Result<Response, Refusal> {
-    let limit = page.limit(1000)?;
-    let found = subjects::page(&mut *app.read().await?, page.before, limit + 1).await?;
-    Ok(linked("/api/v1/subjects", found, limit, |subject| subject.id.to_string()))
+    paging: Paging<SubjectId>,
+) -> Result<Json<Page<Subject>>, Refusal> {
+    let found = subjects::page(&mut *app.read().await?, paging.after, paging.to_read()).await?;
+    Ok(Json(paging.page(found, |subject| subject.id)?))
 }
 
 /// `GET {id}`.
@@ -77,7 +73,7 @@ pub(super) async fn create(
     };
     let subject = person::add(&mut writer, &once.actor, &new).await?;
     let location = format!("/api/v1/subjects/{}", subject.id);
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &subject).await
+    once.created(&app, writer, location, &subject).await
 }
 
 /// `GET {id}/consents`: what the subject signed and withdrew, oldest first; the last one counts.
@@ -87,17 +83,18 @@ pub(super) async fn create(
     operation_id = "list_consents",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Oldest first", body = Vec<Consent>)),
+    responses((status = 200, description = "Oldest first", body = Page<Consent>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn consents(
     _: May<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
-) -> Result<Json<Vec<Consent>>, Refusal> {
+    paging: Paging<i64>,
+) -> Result<Json<Page<Consent>>, Refusal> {
     let mut reader = app.read().await?;
     subjects::get(&mut reader, id).await?;
-    Ok(Json(consents::of_subject(&mut reader, id).await?))
+    Ok(Json(paging.cut(consents::of_subject(&mut reader, id).await?, |consent| consent.seq)?))
 }
 
 /// `POST {id}/consents`: what the subject signed.
@@ -108,7 +105,7 @@ pub(super) async fn consents(
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = NewConsent,
-    responses((status = 201, description = "Written down", body = Consent)),
+    responses((status = 200, description = "Recorded", body = Consent)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn consent(
@@ -121,7 +118,7 @@ pub(super) async fn consent(
         Err(before) => return Ok(before),
     };
     let row = consent::give(&mut writer, &once.actor, id, &new).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
+    once.done(&app, writer, &row).await
 }
 
 /// `POST {id}/withdraw`: the subject does not take part any more. Every study of the subject stops; the record is
@@ -146,7 +143,7 @@ pub(super) async fn withdraw(
         Err(before) => return Ok(before),
     };
     let (row, cancelled) = consent::withdraw(&mut writer, &once.actor, id, &why).await?;
-    let answer = once.finish(&app, writer, StatusCode::OK, None, &row).await?;
+    let answer = once.done(&app, writer, &row).await?;
     for trial in cancelled {
         app.scheduler.cancel_solve(trial).await;
     }
@@ -160,17 +157,18 @@ pub(super) async fn withdraw(
     operation_id = "list_subject_corrections",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Oldest first", body = Vec<Correction>)),
+    responses((status = 200, description = "Oldest first", body = Page<Correction>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn corrections(
     _: May<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
-) -> Result<Json<Vec<Correction>>, Refusal> {
+    paging: Paging<i64>,
+) -> Result<Json<Page<Correction>>, Refusal> {
     let mut reader = app.read().await?;
     subjects::get(&mut reader, id).await?;
-    Ok(Json(subjects::corrections(&mut reader, id).await?))
+    Ok(Json(paging.cut(subjects::corrections(&mut reader, id).await?, |correction| correction.seq)?))
 }
 
 /// `POST {id}/corrections`: the right height and mass. Studies made from now on solve with them; those that are there keep
@@ -182,7 +180,7 @@ pub(super) async fn corrections(
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = NewCorrection,
-    responses((status = 201, description = "Corrected", body = Correction)),
+    responses((status = 200, description = "Corrected", body = Correction)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn correct(
@@ -195,7 +193,7 @@ pub(super) async fn correct(
         Err(before) => return Ok(before),
     };
     let row = person::correct(&mut writer, &once.actor, id, &new).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
+    once.done(&app, writer, &row).await
 }
 
 /// `GET {id}/muscles`: how the subject's muscles differ from the published table.
@@ -205,7 +203,7 @@ pub(super) async fn correct(
     operation_id = "get_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "As in `gait_settings.muscles` of a study", body = Object)),
+    responses((status = 200, description = "As in `gait_settings.muscles` of a study", body = schema::MuscleParameters)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn muscles(
@@ -218,15 +216,15 @@ pub(super) async fn muscles(
     Ok(Json(subjects::muscles(&mut reader, id).await?))
 }
 
-/// `POST {id}/muscles`: writes it down; studies made from now on take it up.
+/// `PUT /subjects/{id}/muscles`: studies made from now on use them.
 #[utoipa::path(
-    post,
+    put,
     path = "/subjects/{id}/muscles",
     operation_id = "set_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    request_body(content = Object, description = "As in `gait_settings.muscles` of a study; empty: the published table"),
-    responses((status = 201, description = "Written down", body = Object)),
+    request_body(content = schema::MuscleParameters, description = "As in `gait_settings.muscles` of a study; empty: the published table"),
+    responses((status = 200, description = "Recorded", body = schema::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn set_muscles(
@@ -239,5 +237,5 @@ pub(super) async fn set_muscles(
         Err(before) => return Ok(before),
     };
     person::set_muscles(&mut writer, &once.actor, id, &muscles).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &muscles).await
+    once.done(&app, writer, &muscles).await
 }

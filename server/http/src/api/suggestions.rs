@@ -1,43 +1,40 @@
 //! Suggestions: what would have been better than a trial.
 
 use crate::AppState;
-use crate::extract::Params;
 use crate::may::May;
 use crate::once::OnceWith;
-use crate::pages_of::{After, linked_after};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
+use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::studies::suggestion::{self, Suggestion};
 use gaitwright_store::feedback::{self, FeedbackRow};
 use gaitwright_store::{StudyId, studies};
 
-/// `GET /studies/{id}/suggestions`: as given, those that were taken back included, by pages; the `Link` header has the
-/// address of the next one.
+/// `GET /studies/{id}/suggestions`: as given, retracted ones included.
 #[utoipa::path(
     get,
     path = "/studies/{id}/suggestions",
     operation_id = "list_suggestions",
     tag = "preferences",
-    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "After this `seq`"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
-    responses((status = 200, description = "A page, by time", body = Vec<FeedbackRow>)),
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "A page, by time", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-    Params(page): Params<After<i64>>,
-) -> Result<Response, Refusal> {
-    let limit = page.limit(1000)?;
+    paging: Paging<i64>,
+) -> Result<Json<Page<FeedbackRow>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let rows = feedback::suggestions(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
-    Ok(linked_after(&format!("/api/v1/studies/{id}/suggestions"), rows, limit, |row| row.seq.to_string()))
+    let rows = feedback::suggestions(&mut reader, id, paging.after.unwrap_or(0), paging.to_read()).await?;
+    Ok(Json(paging.page(rows, |row| row.seq)?))
 }
 
 /// `POST /studies/{id}/suggestions`. The learner hears it like an answer; it is taken back like one
@@ -64,5 +61,5 @@ pub(super) async fn create(
     let given = suggestion::give(&mut writer, &once.caller, id, &new).await?;
     let row = feedback::get(&mut writer, given).await?;
     let location = format!("/api/v1/preferences/{given}");
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &row).await
+    once.created(&app, writer, location, &row).await
 }

@@ -3,11 +3,11 @@
 use crate::AppState;
 use crate::may::May;
 use crate::once::{Once, OnceWith};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::Administer;
 use gaitwright_service::access::tokens::{self as making, NewToken};
@@ -32,11 +32,34 @@ pub(super) struct MadeToken {
     path = "/tokens",
     operation_id = "list_tokens",
     tag = "access",
-    responses((status = 200, description = "All of them, without their secrets", body = Vec<Token>)),
+    responses((status = 200, description = "A page, without secrets", body = Page<Token>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
-pub(super) async fn list(_: May<Administer>, State(app): State<AppState>) -> Result<Json<Vec<Token>>, Refusal> {
-    Ok(Json(tokens::all(&mut *app.read().await?).await?))
+pub(super) async fn list(
+    _: May<Administer>,
+    State(app): State<AppState>,
+    paging: Paging<TokenId>,
+) -> Result<Json<Page<Token>>, Refusal> {
+    let all = tokens::all(&mut *app.read().await?).await?;
+    Ok(Json(paging.cut(all, |one| one.id)?))
+}
+
+/// `GET /tokens/{id}`.
+#[utoipa::path(
+    get,
+    path = "/tokens/{id}",
+    operation_id = "get_token",
+    tag = "access",
+    params(("id" = TokenId, Path, description = "The token")),
+    responses((status = 200, description = "The token, without its secret", body = Token)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn get(
+    _: May<Administer>,
+    State(app): State<AppState>,
+    Id(id, _): Id<TokenId, Administer>,
+) -> Result<Json<Token>, Refusal> {
+    Ok(Json(tokens::get(&mut *app.read().await?, id).await?))
 }
 
 /// `POST /tokens`. Never repeated: an Idempotency-Key is refused, because the secret is not stored.
@@ -56,7 +79,8 @@ pub(super) async fn create(
 ) -> Result<Response, Refusal> {
     let mut writer = once.begin_secret(&app).await?;
     let (token, secret) = making::make(&mut writer, &once.actor, &new).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &MadeToken { token, secret }).await
+    let location = format!("/api/v1/tokens/{}", token.id);
+    once.created(&app, writer, location, &MadeToken { token, secret }).await
 }
 
 /// `POST /tokens/{id}/revoke`.
@@ -79,5 +103,5 @@ pub(super) async fn revoke(
         Err(before) => return Ok(before),
     };
     let token = making::revoke(&mut writer, &once.actor, id).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &token).await
+    once.done(&app, writer, &token).await
 }

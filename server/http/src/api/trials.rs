@@ -1,66 +1,91 @@
 //! Trials.
 
 use crate::AppState;
-use crate::extract::Params;
+use crate::csv_answer::csv_answer;
 use crate::may::May;
-use crate::negotiate::{csv_answer, wants_csv};
 use crate::once::Once;
-use crate::pages_of::After;
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use gait_optimizer::{IterationRecord, TunedBounds};
 use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
 use gaitwright_service::access::{Read, Run};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::command;
+use gaitwright_store::listing::{self, Listing, SORTS};
 use gaitwright_store::results::{self, AttemptResult};
-use gaitwright_store::trials::{self, Trial};
-use gaitwright_store::{StudyId, TrialId, gaits, schema, studies};
-use serde::Serialize;
+use gaitwright_store::trials::{self, Trial, TrialState};
+use gaitwright_store::{Connection, StudyId, TrialId, gaits, schema, studies};
+use serde::Deserialize;
 use std::collections::HashMap;
-use utoipa::ToSchema;
 
-/// A page of trials.
-#[derive(Debug, Serialize, ToSchema)]
-pub(super) struct TrialPage {
-    trials: Vec<Trial>,
-    /// Give it as `after` to get the next page; absent on the last one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    next: Option<u32>,
+/// Which trials, and in which order.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Filter {
+    state: Option<TrialState>,
+    sort: Option<String>,
 }
 
-/// `GET /studies/{id}/trials`: by number, by pages; all of them as CSV.
+/// The order that `sort` names: a column, with a minus where the largest comes first.
+fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
+    let (descending, name) = sort.strip_prefix('-').map_or((false, sort), |name| (true, name));
+    let column = SORTS.into_iter().find(|column| *column == name);
+    let column = column.ok_or_else(|| {
+        Error::invalid("sort", sort, &format!("{}; after a minus the largest first", SORTS.join(", ")))
+    })?;
+    Ok((column, descending))
+}
+
+/// `GET /studies/{id}/trials`: by number, unless `sort` names another order.
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials",
     operation_id = "list_trials",
     tag = "trials",
-    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<u32>, Query, description = "After the trial with this number"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
-    responses((status = 200, description = "A page, by number; all of them as CSV where `Accept` asks for it", content((TrialPage = "application/json"), (String = "text/csv")))),
+    params(
+        ("id" = StudyId, Path, description = "The study"),
+        ("state" = Option<TrialState>, Query, description = "Trials in this state"),
+        ("sort" = Option<String>, Query, description = "Column that they are sorted by, such as `gait_rmse_rad`; after a minus the largest first. Trials without the figure come last")
+    ),
+    responses((status = 200, description = "A page", body = Page<Trial>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-    Params(page): Params<After<u32>>,
-    headers: HeaderMap,
-) -> Result<Response, Refusal> {
-    if wants_csv(&headers) {
-        return table(&mut app, id).await;
-    }
+    paging: Paging<u32, Filter>,
+) -> Result<Json<Page<Trial>>, Refusal> {
+    let (sort, descending) = order(paging.filter.sort.as_deref().unwrap_or("number"))?;
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let limit = page.limit_or(200, 1000)?;
-    let mut found = trials::page(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
-    let more = found.len() > limit as usize;
-    found.truncate(limit as usize);
-    let next = if more { found.last().map(|trial| trial.number) } else { None };
-    Ok(Json(TrialPage { trials: found, next }).into_response())
+    let offset = paging.after.unwrap_or(0);
+    let listing = Listing {
+        sort,
+        descending,
+        state: paging.filter.state,
+        contains: String::new(),
+        limit: paging.to_read(),
+        offset,
+    };
+    let places: Vec<(u32, TrialId)> = listing::of_study(&mut reader, id, &listing)
+        .await?
+        .iter()
+        .map(|row| row.id)
+        .zip(offset + 1..)
+        .map(|(id, place)| (place, id))
+        .collect();
+    let (places, next) = paging.page(places, |(place, _)| *place)?.into_parts();
+    let mut found = Vec::with_capacity(places.len());
+    for (_, trial) in places {
+        found.push(trials::get(&mut reader, trial).await?);
+    }
+    Ok(Json(Page::of_parts(found, next)))
 }
 
 /// `GET /studies/{id}/trials.csv`.
@@ -70,7 +95,7 @@ pub(super) async fn of_study(
     operation_id = "list_trials_csv",
     tag = "trials",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "All of them", body = String, content_type = "text/csv")),
+    responses((status = 200, description = "All of them", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
@@ -88,7 +113,7 @@ pub(super) async fn of_study_csv(
     operation_id = "get_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "The trial", body = Trial)),
+    responses((status = 200, description = "The trial", body = Trial), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -119,7 +144,7 @@ pub(super) async fn cancel(
         Err(before) => return Ok(before),
     };
     let trial = command::cancel(&mut writer, &once.actor, id, "cancelled on request").await?;
-    let answer = once.finish(&app, writer, StatusCode::OK, None, &trial).await?;
+    let answer = once.done(&app, writer, &trial).await?;
     app.scheduler.cancel_solve(id).await;
     Ok(answer)
 }
@@ -144,7 +169,7 @@ pub(super) async fn retry(
         Err(before) => return Ok(before),
     };
     let trial = command::retry(&mut writer, &once.actor, id).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &trial).await
+    once.done(&app, writer, &trial).await
 }
 
 /// `GET /trials/{id}/iterations`: of the running solve, or as recorded.
@@ -154,19 +179,22 @@ pub(super) async fn retry(
     operation_id = "list_iterations",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Of the running solve, or as recorded", body = Vec<schema::Iteration>)),
+    responses((status = 200, description = "Of the running solve, or as recorded", body = Page<schema::Iteration>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn iterations(
     _: May<Read>,
     State(mut app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
-) -> Result<Json<Vec<IterationRecord>>, Refusal> {
-    if let Some(track) = app.scheduler.board().track(id) {
-        return Ok(Json(track.records));
-    }
-    let iterations = gaits::iterations(&mut *app.read().await?, id).await?;
-    Ok(Json(app.compute(move |pool| iterations.unpack(pool)).await??))
+    paging: Paging<usize>,
+) -> Result<Json<Page<IterationRecord>>, Refusal> {
+    let records = if let Some(track) = app.scheduler.board().track(id) {
+        track.records
+    } else {
+        let iterations = gaits::iterations(&mut *app.read().await?, id).await?;
+        app.compute(move |pool| iterations.unpack(pool)).await??
+    };
+    Ok(Json(paging.cut_by_place(records)?))
 }
 
 /// `GET /trials/{id}/attempts`: what workers brought, also what came too late to count.
@@ -176,15 +204,17 @@ pub(super) async fn iterations(
     operation_id = "list_attempts",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "By attempt", body = Vec<AttemptResult>)),
+    responses((status = 200, description = "By attempt", body = Page<AttemptResult>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn attempts(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
-) -> Result<Json<Vec<AttemptResult>>, Refusal> {
-    Ok(Json(results::of_trial(&mut *app.read().await?, id).await?))
+    paging: Paging<u32>,
+) -> Result<Json<Page<AttemptResult>>, Refusal> {
+    let attempts = results::of_trial(&mut *app.read().await?, id).await?;
+    Ok(Json(paging.cut(attempts, |attempt| attempt.attempt)?))
 }
 
 async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {

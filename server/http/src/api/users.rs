@@ -4,11 +4,11 @@ use crate::AppState;
 use crate::may::May;
 use crate::may::SignedIn;
 use crate::once::{Once, OnceWith};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use gaitwright_service::access::people::{self, NewUser};
 use gaitwright_service::access::{Administer, Right, Role};
@@ -50,11 +50,34 @@ pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> 
     path = "/users",
     operation_id = "list_users",
     tag = "access",
-    responses((status = 200, description = "All of them", body = Vec<User>)),
+    responses((status = 200, description = "A page", body = Page<User>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
-pub(super) async fn list(_: May<Administer>, State(app): State<AppState>) -> Result<Json<Vec<User>>, Refusal> {
-    Ok(Json(users::all(&mut *app.read().await?).await?))
+pub(super) async fn list(
+    _: May<Administer>,
+    State(app): State<AppState>,
+    paging: Paging<UserId>,
+) -> Result<Json<Page<User>>, Refusal> {
+    let all = users::all(&mut *app.read().await?).await?;
+    Ok(Json(paging.cut(all, |one| one.id)?))
+}
+
+/// `GET /users/{id}`.
+#[utoipa::path(
+    get,
+    path = "/users/{id}",
+    operation_id = "get_user",
+    tag = "access",
+    params(("id" = UserId, Path, description = "The user")),
+    responses((status = 200, description = "The user", body = User)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn get(
+    _: May<Administer>,
+    State(app): State<AppState>,
+    Id(id, _): Id<UserId, Administer>,
+) -> Result<Json<User>, Refusal> {
+    Ok(Json(users::get(&mut *app.read().await?, id).await?))
 }
 
 /// `POST /users`.
@@ -76,7 +99,7 @@ pub(super) async fn create(
         Err(before) => return Ok(before),
     };
     let user = people::add(&mut writer, &once.actor, &new).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &user).await
+    once.created(&app, writer, format!("/api/v1/users/{}", user.id), &user).await
 }
 
 /// A one-time sign-in link.
@@ -93,7 +116,7 @@ pub(super) struct Link {
     operation_id = "create_sign_in_link",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
-    responses((status = 201, description = "Shown once", body = Link)),
+    responses((status = 200, description = "Shown once", body = Link)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -104,7 +127,7 @@ pub(super) async fn link(
 ) -> Result<Response, Refusal> {
     let mut writer = once.begin_secret(&app).await?;
     let secret = people::link(&mut writer, &once.actor, id).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &Link { path: format!("/sign-in/{secret}") }).await
+    once.done(&app, writer, &Link { path: format!("/sign-in/{secret}") }).await
 }
 
 /// `POST /users/{id}/disable`: ends the sessions, links and tokens of a user and lets nobody in by that name.
@@ -151,10 +174,10 @@ pub(super) struct NewRole {
     role: Role,
 }
 
-/// `POST /users/{id}/role`: gives a user another role. Tokens that an administrator made end when this one is none any
+/// `PUT /users/{id}/role`: gives a user another role. Tokens that an administrator made end when this one is none any
 /// more.
 #[utoipa::path(
-    post,
+    put,
     path = "/users/{id}/role",
     operation_id = "set_user_role",
     tag = "access",
@@ -173,7 +196,7 @@ pub(super) async fn set_role(
         Err(before) => return Ok(before),
     };
     let user = people::set_role(&mut writer, &once.actor, id, new.role).await?;
-    once.finish(&app, writer, StatusCode::OK, None, &user).await
+    once.done(&app, writer, &user).await
 }
 
 async fn set_disabled(
@@ -187,5 +210,5 @@ async fn set_disabled(
         Err(before) => return Ok(before),
     };
     let user = people::set_disabled(&mut writer, &once.actor, id, disabled).await?;
-    once.finish(app, writer, StatusCode::OK, None, &user).await
+    once.done(app, writer, &user).await
 }

@@ -3,7 +3,7 @@
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::figures;
-use super::study::{answer_in_words, remark_in_words};
+use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;
 use crate::extract::{Form, Params};
 use crate::may::May;
@@ -22,18 +22,18 @@ use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
 use gaitwright_service::studies::answer::{self, Answer, PairAnswer};
+use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::comparison::{Question, open_question};
 use gaitwright_service::studies::preference::{self, StandingAnswer};
-use gaitwright_service::studies::remark::{self, NewRemark};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable;
 use gaitwright_store::feedback::{FeedbackRow, Source};
 use gaitwright_store::idempotency::{self, Kept, fingerprint};
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
-    Connection, FeedbackId, RemarkId, StudyId, TrialId, commit, events, feedback, gaits, presentations,
-    reference_gaits, remarks, studies, trials,
+    AssessmentId, Connection, FeedbackId, StudyId, TrialId, assessments, commit, events, feedback, gaits,
+    presentations, reference_gaits, studies, trials,
 };
 use serde::Deserialize;
 use std::fmt;
@@ -52,14 +52,14 @@ pub(super) struct Choice {
 #[serde(try_from = "String")]
 enum Recorded {
     Preference(FeedbackId),
-    Remark(RemarkId),
+    Assessment(AssessmentId),
 }
 
 impl fmt::Display for Recorded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Preference(id) => id.fmt(f),
-            Self::Remark(id) => write!(f, "{REMARK}{id}"),
+            Self::Assessment(id) => write!(f, "{ASSESSMENT}{id}"),
         }
     }
 }
@@ -67,15 +67,15 @@ impl fmt::Display for Recorded {
 impl TryFrom<String> for Recorded {
     type Error = Error;
     fn try_from(text: String) -> Result<Self, Error> {
-        match text.strip_prefix(REMARK) {
-            Some(id) => Ok(Self::Remark(identifier("saved", id)?)),
+        match text.strip_prefix(ASSESSMENT) {
+            Some(id) => Ok(Self::Assessment(identifier("saved", id)?)),
             None => Ok(Self::Preference(identifier("saved", &text)?)),
         }
     }
 }
 
-/// Before the identifier of a remark.
-const REMARK: &str = "remark-";
+/// Before the identifier of an assessment.
+const ASSESSMENT: &str = "assessment-";
 
 #[derive(Template)]
 #[template(path = "compare.html")]
@@ -103,7 +103,7 @@ struct ComparePage {
 
 impl ComparePage {
     /// What can be said besides a preference: value and words.
-    const REMARKS: [(&str, &str); 4] = [
+    const ASSESSMENTS: [(&str, &str); 4] = [
         ("cannot_tell", "Cannot tell"),
         ("unsafe_a", "Gait A is unsafe"),
         ("unsafe_b", "Gait B is unsafe"),
@@ -261,16 +261,16 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 other_answers,
             })
         }
-        Recorded::Remark(id) => {
-            let remark = remarks::get(db, id).await?;
-            if remark.study_id != snapshot.study.id {
-                return Err(Error::NotFound { what: "remark".to_owned(), id: id.to_string() });
+        Recorded::Assessment(id) => {
+            let assessment = assessments::get(db, id).await?;
+            if assessment.study_id != snapshot.study.id {
+                return Err(Error::NotFound { what: "assessment".to_owned(), id: id.to_string() });
             }
-            remark_in_words(&remark, snapshot).map(|text| Saved {
+            assessment_in_words(&assessment, snapshot).map(|text| Saved {
                 id: saved,
                 text,
-                at: remark.created_at.minute(),
-                retracted: remark.retraction.is_some(),
+                at: assessment.created_at.minute(),
+                retracted: assessment.retraction.is_some(),
                 other_answers: Vec::new(),
             })
         }
@@ -295,12 +295,12 @@ pub(super) struct Submitted {
 /// What a form says.
 enum Said {
     Preference(Answer),
-    Remark(NewRemark),
+    Assessment(NewAssessment),
 }
 
 impl Said {
     fn is_about_safety(&self) -> bool {
-        matches!(self, Self::Remark(remark) if remark.answer.is_about_safety())
+        matches!(self, Self::Assessment(assessment) if assessment.answer.is_about_safety())
     }
 }
 
@@ -314,18 +314,18 @@ impl Submitted {
             let (author, note) = (author.clone(), note.clone());
             Said::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note })
         };
-        let remark = |answer| {
+        let assessment = |answer| {
             let (author, note) = (author.clone(), note.clone());
-            Said::Remark(NewRemark { first: a, second: b, answer, source, author, note })
+            Said::Assessment(NewAssessment { first: a, second: b, answer, source, author, note })
         };
         let said = match self.answer.as_str() {
             "a" => preference(PairAnswer::A),
             "b" => preference(PairAnswer::B),
             "no_difference" => preference(PairAnswer::NoDifference),
-            "cannot_tell" => remark(presentations::Judgement::CannotTell),
-            "unsafe_a" => remark(presentations::Judgement::UnsafeFirst),
-            "unsafe_b" => remark(presentations::Judgement::UnsafeSecond),
-            "unsafe_both" => remark(presentations::Judgement::UnsafeBoth),
+            "cannot_tell" => assessment(presentations::Judgement::CannotTell),
+            "unsafe_a" => assessment(presentations::Judgement::UnsafeFirst),
+            "unsafe_b" => assessment(presentations::Judgement::UnsafeSecond),
+            "unsafe_both" => assessment(presentations::Judgement::UnsafeBoth),
             other => {
                 let allowed = "a, b, no_difference, cannot_tell, unsafe_a, unsafe_b, unsafe_both: choose one";
                 return Err(Error::invalid("answer", other, allowed));
@@ -406,7 +406,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     }
     let saved = match said {
         Said::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
-        Said::Remark(new) => Recorded::Remark(remark::give(&mut writer, caller, id, &new).await?),
+        Said::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };
     let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
     idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
@@ -421,7 +421,7 @@ async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitte
     let author = printable::name("author", &form.author, 80)?;
     Ok(preference::standing_answer(db, study, pair, author).await?.map(|answer| match answer {
         StandingAnswer::Preference(id) => Recorded::Preference(id),
-        StandingAnswer::Note(id) => Recorded::Remark(id),
+        StandingAnswer::Note(id) => Recorded::Assessment(id),
     }))
 }
 
@@ -446,8 +446,8 @@ pub(super) async fn retract(
         Recorded::Preference(given) => {
             answer::retract(&mut writer, &may.caller, Some(id), given, author, &form.reason).await?;
         }
-        Recorded::Remark(made) => {
-            remark::retract(&mut writer, &may.caller, Some(id), made, (author, &form.reason)).await?;
+        Recorded::Assessment(made) => {
+            assessment::retract(&mut writer, &may.caller, Some(id), made, (author, &form.reason)).await?;
         }
     }
     commit(writer).await?;

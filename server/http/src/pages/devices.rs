@@ -100,7 +100,7 @@ pub(super) async fn post(
         Err(error) => Err(error),
     };
     match added {
-        Ok(added) => {
+        Ok((added, _)) => {
             commit(writer).await?;
             Ok(Redirect::to(&format!("/devices/{}", added.id)).into_response())
         }

@@ -20,7 +20,7 @@ use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::answer;
 use gaitwright_service::studies::lab::{self, LimitCycles, SessionView};
-use gaitwright_store::studies::Study;
+use gaitwright_store::studies::{Chosen, Study};
 use gaitwright_store::{LabSessionId, Store, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials};
 use serde::Deserialize;
 use std::sync::Arc;
@@ -289,7 +289,7 @@ pub(super) async fn get(
     let other = reached(&mut *app.read().await?, reach, other).await?;
     let StudyFigures { study, best, without_gait, sections, .. } = of_study(&mut app, id, other).await?;
     let mut reader = app.read().await?;
-    let mut offered = studies::page(&mut reader, reach, None, OFFERED).await?;
+    let mut offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;
     offered.retain(|offered| offered.id != id);
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
     drop(reader);

@@ -13,7 +13,7 @@ use gaitwright_charts::sparkline;
 use gaitwright_service::access::{Permission, Rate, Read, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_reports;
-use gaitwright_store::studies::{Study, StudyState};
+use gaitwright_store::studies::{Chosen, Study, StudyState};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
 use serde::Deserialize;
@@ -77,7 +77,7 @@ pub(super) async fn get(
 async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page {
     let reach = may.caller.reach();
     let mut reader = app.read().await?;
-    let mut found = studies::page(&mut reader, reach, before, PAGE + 1).await?;
+    let mut found = studies::page(&mut reader, reach, Chosen { before, ..Chosen::newest(PAGE + 1) }).await?;
     let more = found.len() > PAGE as usize;
     found.truncate(PAGE as usize);
     let next = found.last().filter(|_| more).map(|study| study.id);

@@ -5,7 +5,7 @@ use super::error::{Page, PageError, page};
 use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
-use super::lab_recordings::{Forms, Settings};
+use super::measurement_files::{Forms, Settings};
 use crate::AppState;
 use crate::extract::Form;
 use crate::may::May;
@@ -23,8 +23,8 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
     self, Condition, EmgView, FileForm, NewSession, SessionView, WalkActivity, WalkView,
 };
-use gaitwright_store::lab_recordings::{self, LabRecording, RecordingKind};
 use gaitwright_store::listing::{self, Listed, Listing};
+use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
@@ -142,7 +142,7 @@ struct SessionPage {
     may_unblind: bool,
     /// Walks that were recorded: what is measured can be brought for them.
     recorded: Vec<u8>,
-    recordings: Vec<LabRecording>,
+    recordings: Vec<MeasurementFile>,
     has_emg: bool,
     forms: Forms,
     filters: Settings,
@@ -260,7 +260,7 @@ async fn show(
     let study = studies::get(&mut reader, session.study_id).await?;
     let one = trials::get(&mut reader, session.gait_one).await?.number;
     let two = trials::get(&mut reader, session.gait_two).await?.number;
-    let recordings = lab_recordings::of_session(&mut reader, id).await?;
+    let recordings = measurement_files::of_session(&mut reader, id).await?;
     drop(reader);
     let draw = move |_: &OnPool| {
         let files = format!("/api/v1/lab-sessions/{id}/figures");
@@ -282,7 +282,7 @@ async fn show(
         may_run: caller.may(Run::NEEDED),
         may_unblind: caller.may(Administer::NEEDED),
         recorded: session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect(),
-        has_emg: recordings.iter().any(|recording| recording.kind == RecordingKind::Electromyogram),
+        has_emg: recordings.iter().any(|recording| recording.kind == MeasurementKind::Electromyogram),
         recordings,
         filters: forms
             .filters

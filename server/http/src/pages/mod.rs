@@ -17,8 +17,8 @@ mod help;
 mod home;
 mod lab;
 mod lab_charts;
-mod lab_recordings;
 mod lab_walk;
+mod measurement_files;
 mod members;
 mod muscles;
 mod new_study;
@@ -80,9 +80,9 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/lab-sessions/{id}", get(lab::get))
         .route("/lab-sessions/{id}/close", post(lab::close))
         .route("/lab-sessions/{id}/unblind", post(lab::unblind))
-        .route("/lab-sessions/{id}/electromyograms", post(lab_recordings::electromyogram).layer(recordings()))
-        .route("/lab-sessions/{id}/motions", post(lab_recordings::motion).layer(recordings()))
-        .route("/lab-sessions/{id}/process", post(lab_recordings::process))
+        .route("/lab-sessions/{id}/electromyograms", post(measurement_files::electromyogram).layer(recordings()))
+        .route("/lab-sessions/{id}/motions", post(measurement_files::motion).layer(recordings()))
+        .route("/lab-sessions/{id}/process", post(measurement_files::process))
         .route("/lab", get(lab_walk::list))
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/lab/{id}/answer", post(lab_walk::answer))

@@ -19,7 +19,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::Sided;
 use gaitwright_store::presentations::{self, Judgement, Presentation};
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::{Chosen, FeedbackMode};
 use gaitwright_store::{Connection, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
 
@@ -129,7 +129,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
 /// A rater's newest answer, if it can be taken back.
 async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, Error> {
     let mut newest: Option<Presentation> = None;
-    for study in studies::page(db, caller.reach(), None, SEARCHED).await? {
+    for study in studies::page(db, caller.reach(), Chosen::newest(SEARCHED)).await? {
         if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
             continue;
         }

@@ -137,7 +137,7 @@ pub(super) async fn import(
         Err(other) => return Err(other.into()),
     };
     let mut writer = app.write().await?;
-    let added = recording::add(&mut writer, &may.caller.actor, &definition).await?;
+    let (added, _) = recording::add(&mut writer, &may.caller.actor, &definition).await?;
     commit(writer).await?;
     Ok(Redirect::to(&format!("/references/{}", added.id)).into_response())
 }

@@ -18,7 +18,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::Study;
+use gaitwright_store::studies::{Chosen, Study};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
 use serde::Deserialize;
@@ -63,7 +63,7 @@ struct Compared {
 pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Params(choice): Params<Choice>) -> Page {
     let reach = may.caller.reach();
     let mut reader = app.read().await?;
-    let offered = studies::page(&mut reader, reach, None, OFFERED).await?;
+    let offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;
     let (a, b) = (reached(&mut reader, reach, choice.a).await?, reached(&mut reader, reach, choice.b).await?);
     let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {

@@ -26,9 +26,10 @@ pub enum PairAnswer {
     NoDifference,
 }
 
-/// An answer.
+/// A preference to give.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = NewPreference)]
 pub struct Answer {
     /// The first gait.
     pub trial_a: TrialId,

@@ -43,6 +43,20 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
     Ok(Certification::Ahead(gaits::get(reader, trial).await?))
 }
 
+/// Asks for the certificate of a trial's gait. `None`: it is to be made.
+///
+/// # Errors
+/// As [`begin`].
+pub async fn ask(writer: &mut Writer, actor: &Actor, trial: TrialId) -> Result<Option<Certificate>, Error> {
+    match begin(writer, trial).await? {
+        Certification::Made(certificate) => Ok(Some(*certificate)),
+        Certification::Ahead(_) => {
+            audit::append(writer, actor, "trial.ask_certificate", &format!("trial {trial}"), &json!({})).await?;
+            Ok(None)
+        }
+    }
+}
+
 /// The certificate; a new one takes some seconds of processor time, outside any transaction.
 ///
 /// # Errors

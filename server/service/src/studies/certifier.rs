@@ -5,6 +5,7 @@
 
 use super::belief::Beliefs;
 use super::choice::ranking_to_show;
+use super::job::JobState;
 use super::snapshot::StudySnapshot;
 use super::{certification, recommended};
 use crate::error::Error;
@@ -16,6 +17,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{Notify, watch};
+use tokio_util::sync::CancellationToken;
 
 /// Certifies gaits one at a time, at lower priority than solves.
 pub(super) struct Certifier {
@@ -36,6 +38,8 @@ enum Next {
 struct State {
     /// Trials whose gaits people wait for, in a lab session or a comparison. The newest comes first.
     asked: BTreeSet<TrialId>,
+    /// What of these is being certified, and what gives it up.
+    running: Option<(TrialId, CancellationToken)>,
     /// Studies with gaits to look at.
     waiting: BTreeSet<StudyId>,
     /// Gaits whose certificates could not be stored.
@@ -68,6 +72,25 @@ impl Certifier {
         }
     }
 
+    /// The gaits that somebody asked for, and where each stands.
+    pub(super) fn jobs(&self) -> Vec<(TrialId, JobState)> {
+        let state = self.state();
+        let running = state.running.as_ref().map(|(trial, _)| *trial);
+        let stands = |trial| if running == Some(trial) { JobState::Running } else { JobState::Queued };
+        state.asked.iter().map(|trial| (*trial, stands(*trial))).collect()
+    }
+
+    /// Gives up a gait that somebody asked for.
+    pub(super) fn cancel(&self, trial: TrialId) {
+        let mut state = self.state();
+        state.asked.remove(&trial);
+        if let Some((running, cancelled)) = &state.running
+            && *running == trial
+        {
+            cancelled.cancel();
+        }
+    }
+
     /// Whether a gait of a study is being certified, or waits for that.
     pub(super) fn is_at(&self, study: StudyId, gait: TrialId) -> bool {
         let state = self.state();
@@ -90,7 +113,11 @@ impl Certifier {
             let study = match next {
                 Next::Study(study) => study,
                 Next::Trial(trial) => {
-                    if let Err(error) = self.certify(trial).await {
+                    let cancelled = CancellationToken::new();
+                    self.state().running = Some((trial, cancelled.clone()));
+                    let certified = cancelled.run_until_cancelled(self.certify(trial)).await;
+                    self.state().running = None;
+                    if let Some(Err(error)) = certified {
                         tracing::error!(%trial, %error, "cannot certify a gait that people are waiting for");
                         if !error.is_of_machine() {
                             self.state().refused.insert(trial);

@@ -22,7 +22,7 @@ pub fn check(definition: &Definition) -> Result<(), Error> {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
-pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<Device, Error> {
+pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(Device, bool), Error> {
     check(definition)?;
     let name = definition.name.as_str();
     if devices::find(writer, definition).await?.is_none() && devices::has_name(writer, name).await? {
@@ -33,5 +33,5 @@ pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) ->
         let detail = json!({ "name": device.name });
         audit::append(writer, actor, "device.add", &format!("device {}", device.id), &detail).await?;
     }
-    Ok(device)
+    Ok((device, added))
 }

@@ -15,6 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{Notify, watch};
+use tokio_util::sync::CancellationToken;
 
 /// Explains trials one at a time, at lower priority than solves.
 pub(super) struct Explainer {
@@ -28,8 +29,10 @@ pub(super) struct Explainer {
 struct State {
     /// Ended studies whose best gaits are certified.
     ended: BTreeSet<StudyId>,
-    /// What is being explained.
-    running: Option<TrialId>,
+    /// What is being explained, and what gives it up.
+    running: Option<(TrialId, CancellationToken)>,
+    /// What somebody cancelled, until somebody asks for it again.
+    cancelled: BTreeSet<TrialId>,
     /// What cannot be explained, and why.
     refused: BTreeMap<TrialId, String>,
 }
@@ -60,8 +63,27 @@ impl Explainer {
         let state = self.state();
         match state.refused.get(&trial) {
             Some(reason) => Effort::Refused(reason.clone()),
-            None if state.running == Some(trial) => Effort::Running,
+            None if state.cancelled.contains(&trial) => Effort::Cancelled,
+            None if state.running.as_ref().is_some_and(|(running, _)| *running == trial) => Effort::Running,
             None => Effort::Ready,
+        }
+    }
+
+    /// Gives up a trial until somebody asks for it again.
+    pub(super) fn cancel(&self, trial: TrialId) {
+        let mut state = self.state();
+        state.cancelled.insert(trial);
+        if let Some((running, cancelled)) = &state.running
+            && *running == trial
+        {
+            cancelled.cancel();
+        }
+    }
+
+    /// Takes up a trial again that somebody had cancelled.
+    pub(super) fn again(&self, trial: TrialId) {
+        if self.state().cancelled.remove(&trial) {
+            self.told.notify_one();
         }
     }
 
@@ -87,10 +109,11 @@ impl Explainer {
     /// Explains the next trial. Returns `false` if there is none.
     async fn explain_next(&self, pulse: &mut watch::Receiver<u64>) -> Result<bool, Error> {
         let Some(trial) = self.next().await? else { return Ok(false) };
-        self.state().running = Some(trial);
-        let explained = self.explain(trial, pulse).await;
+        let cancelled = CancellationToken::new();
+        self.state().running = Some((trial, cancelled.clone()));
+        let explained = cancelled.run_until_cancelled(self.explain(trial, pulse)).await;
         self.state().running = None;
-        match explained {
+        match explained.unwrap_or(Ok(())) {
             Ok(()) => {}
             Err(error) if error.is_of_machine() => return Err(error),
             Err(error) => self.refuse(trial, &error).await?,
@@ -100,7 +123,10 @@ impl Explainer {
 
     /// Requested trials come first, in order, then the newest study, because somebody is likely to look at it soon.
     async fn next(&self) -> StoreResult<Option<TrialId>> {
-        let refused: BTreeSet<TrialId> = self.state().refused.keys().copied().collect();
+        let refused: BTreeSet<TrialId> = {
+            let state = self.state();
+            state.refused.keys().chain(&state.cancelled).copied().collect()
+        };
         let mut reader = self.store.read().await?;
         if let Some(trial) = explanations::next_requested(&mut reader, &refused).await? {
             return Ok(Some(trial));

@@ -36,6 +36,8 @@ pub enum Effort {
     Ready,
     /// The trial is being explained.
     Running,
+    /// Somebody cancelled it.
+    Cancelled,
     /// It tried, and why it could not.
     Refused(String),
 }
@@ -51,6 +53,7 @@ pub async fn state(db: &mut Connection, trial: &Trial, effort: Effort) -> Result
     let ready = match effort {
         Effort::Refused(reason) => return Ok(ExplanationState::Refused(reason)),
         Effort::Running => return Ok(ExplanationState::BeingMade),
+        Effort::Cancelled => return Ok(ExplanationState::NotAsked),
         Effort::Ready => true,
         Effort::None => false,
     };

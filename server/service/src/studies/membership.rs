@@ -7,7 +7,7 @@ use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::members::{self, MEMBER_ALREADY, Member, MemberKind};
 use gaitwright_store::users::User;
 use gaitwright_store::{Connection, MemberId, OnConstraint, StudyId, Writer, tokens, users};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
@@ -22,9 +22,9 @@ pub struct NewMember {
 }
 
 /// Who reaches a study.
-#[derive(Debug, Clone, Serialize, ToSchema)]
+#[derive(Debug, Clone)]
 pub struct StudyAccess {
-    /// Whether only members and administrators reach it. Raters need to be members in any case.
+    /// Whether only members and administrators reach it.
     pub restricted: bool,
     /// Members, in the order in which they were added.
     pub members: Vec<Member>,
@@ -91,19 +91,14 @@ pub async fn end(writer: &mut Writer, actor: &Actor, id: MemberId) -> Result<Mem
 ///
 /// # Errors
 /// What the database reports.
-pub async fn restrict(
-    writer: &mut Writer,
-    caller: &Caller,
-    study: StudyId,
-    restricted: bool,
-) -> Result<StudyAccess, Error> {
+pub async fn restrict(writer: &mut Writer, caller: &Caller, study: StudyId, restricted: bool) -> Result<(), Error> {
     if members::is_restricted(writer, study).await? != restricted {
         members::set_restricted(writer, study, restricted, caller.actor.as_str()).await?;
         let detail = json!({ "restricted": restricted });
         audit::append(writer, &caller.actor, "study.restrict", &format!("study {study}"), &detail).await?;
         keep_in(writer, caller, study).await?;
     }
-    access(writer, study).await
+    Ok(())
 }
 
 /// Makes the caller a member if the study would otherwise become inaccessible to the caller.

@@ -6,6 +6,7 @@
 
 pub mod answer;
 pub mod archive;
+pub mod assessment;
 pub mod belief;
 pub mod blind;
 pub mod catalogue;
@@ -20,6 +21,8 @@ pub mod device;
 mod explainer;
 pub mod explanation;
 pub mod history;
+pub mod job;
+pub mod job_status;
 pub mod lab;
 pub mod lifecycle;
 pub mod membership;
@@ -32,7 +35,6 @@ mod prefetch;
 pub mod recommended;
 pub mod record;
 pub mod recording;
-pub mod remark;
 pub mod retention;
 pub mod safety_reports;
 pub mod safety_review;

@@ -38,11 +38,11 @@ pub struct NewStudy {
     pub muscles: bool,
     /// Settings of the gait problem. Unless they set muscles, the measured muscle values of the subject apply.
     #[serde(default)]
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.
     #[serde(default)]
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::SolveOptions)]
     pub solve_options: SolveOptions,
     /// Values of the bounds that are not tuned.
     #[serde(default)]
@@ -54,7 +54,7 @@ pub struct NewStudy {
     pub search_space: Option<SearchSpace>,
     /// Settings of the learner. Absent settings have the recommended values of the method.
     #[serde(default)]
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::LearnerSettings)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
     #[serde(default = "automatic")]

@@ -8,7 +8,7 @@ use gait_learner::ActionIndex;
 use gaitwright_store::feedback::{self, Attribution, FeedbackContent, Source};
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, remarks};
+use gaitwright_store::{Connection, FeedbackId, StudyId, TrialId, Writer, assessments, consents};
 
 /// The author of computed answers.
 pub(super) const PROGRAM: &str = concat!("gaitwright ", env!("CARGO_PKG_VERSION"));
@@ -102,7 +102,7 @@ pub enum StandingAnswer {
     /// A preference or a tie.
     Preference(FeedbackId),
     /// That the person cannot tell.
-    Note(gaitwright_store::RemarkId),
+    Note(gaitwright_store::AssessmentId),
 }
 
 /// The newest answer of a person to a comparison, without retracted and blinded answers.
@@ -116,7 +116,7 @@ pub async fn standing_answer(
     author: &str,
 ) -> Result<Option<StandingAnswer>, Error> {
     let of_pair = |pair: (TrialId, TrialId)| pair == (a, b) || pair == (b, a);
-    let noted = remarks::of_study(db, study).await?;
+    let noted = assessments::of_study(db, study).await?;
     let noted = noted
         .iter()
         .rfind(|r| r.retraction.is_none() && printable::is_same_name(&r.author, author) && of_pair(r.pair()));

@@ -175,7 +175,7 @@ pub(super) fn check(definition: &Definition) -> Result<(), Error> {
 ///
 /// # Errors
 /// [`Error::Invalid`] for a name that does not print, or what the database reports.
-pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<ReferenceGait, Error> {
+pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(ReferenceGait, bool), Error> {
     check(definition)?;
     let (reference, added) = reference_gaits::ensure(writer, definition).await?;
     if added {
@@ -184,7 +184,7 @@ pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) ->
         let target = format!("reference gait {}", reference.id);
         audit::append(writer, actor, "reference_gait.import", &target, &detail).await?;
     }
-    Ok(reference)
+    Ok((reference, added))
 }
 
 /// A reference gait and the distance between the recorded person and a subject.

@@ -6,7 +6,8 @@ use gaitwright_store::presentations::Judgement;
 use gaitwright_store::safety_reviews::{self, SafetyReview, SafetyVerdict};
 use gaitwright_store::studies::{self, Study};
 use gaitwright_store::{
-    Connection, Instant, PresentationId, RemarkId, StoreResult, StudyId, TrialId, lab_sessions, presentations, remarks,
+    AssessmentId, Connection, Instant, PresentationId, StoreResult, StudyId, TrialId, assessments, lab_sessions,
+    presentations,
 };
 use std::collections::HashSet;
 
@@ -30,8 +31,8 @@ pub struct Closed {
 pub enum SafetyReportSource {
     /// In a blind comparison by a rater.
     Rater(PresentationId),
-    /// In a remark.
-    Staff(RemarkId),
+    /// In an assessment.
+    Staff(AssessmentId),
     /// The subject, in a lab session that is not unblinded.
     Subject,
 }
@@ -70,7 +71,7 @@ impl SafetyReports {
     /// Errors of the database.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::default();
-        for shown in presentations::remarks_of_study(db, study).await? {
+        for shown in presentations::assessments_of_study(db, study).await? {
             if let Some((said, at)) = shown.answer.zip(shown.answered_at) {
                 let by = format!("rater {}", shown.rater);
                 let closed = |trial| Closed {
@@ -83,13 +84,21 @@ impl SafetyReports {
                 found.hear(said, shown.pair(), closed);
             }
         }
-        for remark in remarks::of_study(db, study).await?.iter().filter(|remark| remark.retraction.is_none()) {
-            let (by, at, said) = (&remark.author, remark.created_at, SafetyReportSource::Staff(remark.id));
-            found.hear(remark.answer, remark.pair(), |trial| Closed { trial, by: by.clone(), at, said, review: None });
+        for assessment in
+            assessments::of_study(db, study).await?.iter().filter(|assessment| assessment.retraction.is_none())
+        {
+            let (by, at, said) = (&assessment.author, assessment.created_at, SafetyReportSource::Staff(assessment.id));
+            found.hear(assessment.answer, assessment.pair(), |trial| Closed {
+                trial,
+                by: by.clone(),
+                at,
+                said,
+                review: None,
+            });
         }
         for session in lab_sessions::of_study(db, study).await? {
             if session.done(lab_sessions::Act::Unblinded).is_some() {
-                // After unblinding its answers are remarks or preferences.
+                // After unblinding its answers are assessments or preferences.
                 continue;
             }
             if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {

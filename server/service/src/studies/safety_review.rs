@@ -6,8 +6,8 @@ use crate::error::Error;
 use crate::printable;
 use gaitwright_store::safety_reviews::{self, NewSafetyReview, SafetyReview, SafetyVerdict};
 use gaitwright_store::{
-    Connection, FeedbackId, Instant, StoreResult, TrialId, Writer, audit, consents, events, feedback, presentations,
-    remarks, trials,
+    Connection, FeedbackId, Instant, StoreResult, TrialId, Writer, assessments, audit, consents, events, feedback,
+    presentations, trials,
 };
 use serde::Deserialize;
 use serde_json::json;
@@ -95,7 +95,7 @@ async fn take_back_what_was_heard(
 async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
     match said {
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
-        SafetyReportSource::Staff(id) => Ok(remarks::get(db, id).await?.feedback_id),
+        SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
         // It reaches the learner at unblinding.
         SafetyReportSource::Subject => Ok(None),
     }

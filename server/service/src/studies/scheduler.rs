@@ -7,6 +7,7 @@ use super::belief::Beliefs;
 use super::certifier::Certifier;
 use super::explainer::Explainer;
 use super::explanation::Effort;
+use super::job::{JobId, JobKind, JobState};
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::plans_under_way::Plans;
@@ -163,6 +164,28 @@ impl Scheduler {
     /// Requests the certificate of one gait. Returns `false` if this process certifies none.
     pub fn certify(&self, trial: TrialId) -> bool {
         self.0.after_solves.as_ref().map(|(certifier, _)| certifier.ask_for(trial)).is_some()
+    }
+
+    /// The gaits whose certificates somebody asked for, and where each stands.
+    pub fn certifying(&self) -> Vec<(TrialId, JobState)> {
+        self.0.after_solves.as_ref().map(|(certifier, _)| certifier.jobs()).unwrap_or_default()
+    }
+
+    /// Stops the work of a job that was cancelled.
+    pub async fn cancel_job(&self, id: JobId) {
+        match (id.kind, &self.0.after_solves) {
+            (JobKind::Solve, _) => self.cancel_solve(id.trial).await,
+            (JobKind::Certificate, Some((certifier, _))) => certifier.cancel(id.trial),
+            (JobKind::Explanation, Some((_, explainer))) => explainer.cancel(id.trial),
+            (JobKind::Certificate | JobKind::Explanation, None) => {}
+        }
+    }
+
+    /// Takes up the explanation of a trial again that somebody had cancelled.
+    pub fn explain_again(&self, trial: TrialId) {
+        if let Some((_, explainer)) = &self.0.after_solves {
+            explainer.again(trial);
+        }
     }
 
     /// Whether a gait of a study is being certified, or waits for that.

@@ -105,7 +105,7 @@ pub enum NotWalkable {
     },
     /// The gait has no certificate yet.
     #[error(
-        "the gait of trial {number} has no certificate yet: it is being certified, or POST /api/v1/trials/{id}/certificate certifies it now"
+        "the gait of trial {number} has no certificate yet: it is being certified, or POST /api/v1/trials/{id}/certificate has it certified"
     )]
     NotCertified {
         /// The trial.

@@ -23,7 +23,7 @@ use gaitwright_service::studies::history;
 use gaitwright_service::studies::plan::{self, NewStudy};
 use gaitwright_service::studies::recommended::Judged;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::{self, Study, StudyState};
+use gaitwright_store::studies::{self, Chosen, Study, StudyState};
 use gaitwright_store::{Store, commit, gaits, reference_gaits};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -174,7 +174,7 @@ impl Reproduce {
         };
         let wanted = plan::checked(&mut writer, new.clone()).await?;
         // A folder holds at most two subjects, two variants and a hundred seeds of one number of trials.
-        let known = studies::page(&mut writer, Reach::Every, None, 1000).await?;
+        let known = studies::page(&mut writer, Reach::Every, Chosen::newest(1000)).await?;
         commit(writer).await?;
         let same = known
             .into_iter()

@@ -33,10 +33,10 @@ use gaitwright_service::studies::safety_reports::{Closed, SafetyReportSource};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::{command, lifecycle};
 use gaitwright_service::workers::Track;
+use gaitwright_store::assessments::{self, Assessment};
 use gaitwright_store::devices::{self, Device};
 use gaitwright_store::feedback::{self, FeedbackContent, FeedbackRow, Retraction, Source};
 use gaitwright_store::imports::{self, Import};
-use gaitwright_store::remarks::{self, Remark};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
@@ -348,7 +348,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
         StudySnapshot::read(&mut reader, study).await?
     };
     let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
-    let remarks = remarks::of_study(&mut reader, id).await?;
+    let assessments = assessments::of_study(&mut reader, id).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
     let draw = move |pool: &OnPool| {
@@ -373,7 +373,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
         .filter(|trial| trial.state == TrialState::Running)
         .map(|trial| running_row(trial, app.scheduler.board().track(trial.id).as_ref()))
         .collect();
-    let mut answers = answers(&snapshot, &remarks);
+    let mut answers = answers(&snapshot, &assessments);
     answers.truncate(SHOWN as usize);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
     let mut live = view(snapshot, counts, &figures, running, table, answers, caller.may(Run::NEEDED));
@@ -499,8 +499,8 @@ pub(super) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>) -> Op
 }
 
 /// What people said, the newest first; what Gait RMSE says is in the table of trials already.
-fn answers(snapshot: &StudySnapshot, remarks: &[Remark]) -> Vec<AnswerRow> {
-    let of_remark = |id| remarks.iter().any(|remark| remark.feedback_id == Some(id));
+fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRow> {
+    let of_assessment = |id| assessments.iter().any(|assessment| assessment.feedback_id == Some(id));
     let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
     let why = |retraction: &Option<Retraction>| Some(format!("taken back: {}", retraction.as_ref()?.reason));
     let lifted = |id| {
@@ -517,18 +517,18 @@ fn answers(snapshot: &StudySnapshot, remarks: &[Remark]) -> Vec<AnswerRow> {
             at: row.created_at,
         })
     };
-    let remark = |remark: &Remark| {
+    let assessment = |assessment: &Assessment| {
         Some(AnswerRow {
-            text: remark_in_words(remark, snapshot)?,
-            by: format!("{}, {}", format::person(remark.source), remark.author),
-            note: remark.note.clone(),
-            undone: why(&remark.retraction).or_else(|| lifted(remark.id)),
-            at: remark.created_at,
+            text: assessment_in_words(assessment, snapshot)?,
+            by: format!("{}, {}", format::person(assessment.source), assessment.author),
+            note: assessment.note.clone(),
+            undone: why(&assessment.retraction).or_else(|| lifted(assessment.id)),
+            at: assessment.created_at,
         })
     };
-    let preferences = snapshot.feedback.iter().filter(by_people).filter(|row| !of_remark(row.id));
+    let preferences = snapshot.feedback.iter().filter(by_people).filter(|row| !of_assessment(row.id));
     let mut rows: Vec<AnswerRow> =
-        preferences.filter_map(preference).chain(remarks.iter().filter_map(remark)).collect();
+        preferences.filter_map(preference).chain(assessments.iter().filter_map(assessment)).collect();
     rows.reverse();
     rows.sort_by_key(|row| Reverse(row.at));
     rows
@@ -545,10 +545,10 @@ pub(super) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Op
 }
 
 /// `trial 3 is unsafe`.
-pub(super) fn remark_in_words(remark: &Remark, snapshot: &StudySnapshot) -> Option<String> {
+pub(super) fn assessment_in_words(assessment: &Assessment, snapshot: &StudySnapshot) -> Option<String> {
     let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
-    let (first, second) = (name(remark.first)?, name(remark.second)?);
-    Some(match remark.answer {
+    let (first, second) = (name(assessment.first)?, name(assessment.second)?);
+    Some(match assessment.answer {
         presentations::Judgement::UnsafeFirst => format!("{first} is unsafe (beside {second})"),
         presentations::Judgement::UnsafeSecond => format!("{second} is unsafe (beside {first})"),
         presentations::Judgement::UnsafeBoth => format!("{first} and {second} are unsafe"),

@@ -16,11 +16,11 @@ use gaitwright_store::archive::Definition;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::quarantine::Quarantine;
 use gaitwright_store::row::{Cell, Row};
-use gaitwright_store::studies::{FeedbackMode, Study, StudyPlan};
+use gaitwright_store::studies::{Chosen, FeedbackMode, Study, StudyPlan};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
-    Connection, Instant, StoreError, StudyId, TrialId, archive, devices, feedback, gaits, lab_recordings, lab_sessions,
-    now, presentations, reference_gaits, remarks, results, safety_reviews, studies, subjects, trials,
+    Connection, Instant, StoreError, StudyId, TrialId, archive, assessments, devices, feedback, gaits, lab_sessions,
+    measurement_files, now, presentations, reference_gaits, results, safety_reviews, studies, subjects, trials,
 };
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -99,7 +99,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
         at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is not an identifier")))?;
     }
     let db = quarantine.db();
-    let found = at("studies", studies::page(db, Reach::Every, None, 2).await)?;
+    let found = at("studies", studies::page(db, Reach::Every, Chosen::newest(2)).await)?;
     let [study] = &found[..] else { return Err(refuse(format!("it holds {} studies, expected one", found.len()))) };
     let study = study.clone();
     at(format!("study {}", study.id), plan::check_plan(&study.plan))?;
@@ -288,10 +288,13 @@ async fn answers(db: &mut Connection, study: &Study, trials: &[Trial]) -> Result
         return Err(refuse(format!("{results} trials have a result, but {labelled} have a label")));
     }
     let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.said)?))).collect();
-    for remark in at("remarks", remarks::of_study(db, id).await)? {
-        let wanted = sorted(remark.first, remark.second);
-        if remark.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
-            return Err(refuse(format!("remark {}: what the learner heard of it is of other trials", remark.id)));
+    for assessment in at("assessments", assessments::of_study(db, id).await)? {
+        let wanted = sorted(assessment.first, assessment.second);
+        if assessment.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
+            return Err(refuse(format!(
+                "assessment {}: what the learner heard of it is of other trials",
+                assessment.id
+            )));
         }
     }
     at("presentations", presentations::of_study(db, id).await)?;
@@ -364,10 +367,10 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
 /// Checks what was measured in the lab.
 async fn lab(db: &mut Connection, pool: &Pool, study: StudyId) -> Result<(), Error> {
     for session in at("lab_sessions", lab_sessions::of_study(db, study).await)? {
-        for found in at("lab_recordings", lab_recordings::of_session(db, session.id).await)? {
+        for found in at("lab_recordings", measurement_files::of_session(db, session.id).await)? {
             at(format!("recording {}", found.id), lab::check_kept(db, pool, &found).await)?;
         }
-        let results = lab_recordings::results::<EmgResult>(db, session.id).await;
+        let results = measurement_files::results::<EmgResult>(db, session.id).await;
         at(format!("EMG results of lab session {}", session.id), results)?;
     }
     Ok(())

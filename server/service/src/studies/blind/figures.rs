@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 
 /// A proportion with its 95 % confidence interval (Wilson).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[schema(as = Proportion)]
 pub struct Share {
     /// Number of trials of the proportion.
     pub of: u32,

@@ -1,14 +1,14 @@
 //! The subject's answer in a lab session: which walk was better.
 //!
-//! It becomes a preference, or a remark, at unblinding: what the learner hears is shown to everybody who may
+//! It becomes a preference, or an assessment, at unblinding: what the learner hears is shown to everybody who may
 //! read, and whoever was in the lab would know the order from it.
 
 use super::session::{InTheLab, has_file, in_the_lab, next_walk, still_open};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
+use crate::studies::assessment;
 use crate::studies::preference::{self, Again, GivenJudgement};
-use crate::studies::remark;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::feedback::{Attribution, Source};
 use gaitwright_store::lab_answers::{self, LabAnswer};
@@ -164,8 +164,8 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
         // Several sessions may compare the same two gaits.
         again: Again::Meant,
     };
-    let heard = if given.said.is_remark() {
-        remark::write(writer, statement).await.map(drop)
+    let heard = if given.said.is_assessment() {
+        assessment::write(writer, statement).await.map(drop)
     } else {
         heard_as_preference(writer, statement).await
     };

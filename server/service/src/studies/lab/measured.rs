@@ -9,9 +9,9 @@ use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelAc
 use gait_optimizer::phase_portrait::PhasePortrait;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::lab_recordings::{self, LabRecording, RecordingKind};
 use gaitwright_store::lab_sessions;
-use gaitwright_store::{Connection, LabRecordingId, LabSessionId, Packed, PackedText, Store, Writer, gaits};
+use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
+use gaitwright_store::{Connection, LabSessionId, MeasurementFileId, Packed, PackedText, Store, Writer, gaits, schema};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -22,15 +22,15 @@ pub struct WalkActivity {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// What it was made of.
-    pub recording_id: LabRecordingId,
+    pub recording_id: MeasurementFileId,
     /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, in shares of
     /// the peak of walk 1.
-    #[schema(value_type = Vec<Object>)]
+    #[schema(value_type = Vec<schema::CycleActivity>)]
     pub channels: Vec<CycleActivity>,
     /// Mean of each channel over the cycle.
     pub averages: Vec<f64>,
     /// Distance from walk 1: in all, and of each channel; none for walk 1.
-    #[schema(value_type = Option<Object>)]
+    #[schema(value_type = Option<schema::EmgRmse>)]
     pub emg_rmse: Option<EmgRmse>,
 }
 
@@ -38,14 +38,14 @@ pub struct WalkActivity {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EmgResult {
     /// How they were filtered.
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::EmgSettings)]
     pub settings: EmgSettings,
     /// Walks with an EMG recording.
     pub walks: Vec<WalkActivity>,
 }
 
 /// The newest recording of each walk.
-fn newest(recordings: &[LabRecording], kind: RecordingKind) -> Vec<&LabRecording> {
+fn newest(recordings: &[MeasurementFile], kind: MeasurementKind) -> Vec<&MeasurementFile> {
     let of_walk = |walk| recordings.iter().rfind(|recording| recording.kind == kind && recording.walk == walk);
     (1..=super::WALKS).filter_map(of_walk).collect()
 }
@@ -57,10 +57,10 @@ fn newest(recordings: &[LabRecording], kind: RecordingKind) -> Vec<&LabRecording
 pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings) -> Result<EmgResult, Error> {
     let mut db = store.read().await?;
     still_shown(&mut db, id).await?;
-    let recordings = lab_recordings::of_session(&mut db, id).await?;
-    let mut files: Vec<(u8, LabRecordingId, EmgReading, PackedText)> = Vec::new();
-    for recording in newest(&recordings, RecordingKind::Electromyogram) {
-        let (reading, file) = lab_recordings::file(&mut db, recording.id).await?;
+    let recordings = measurement_files::of_session(&mut db, id).await?;
+    let mut files: Vec<(u8, MeasurementFileId, EmgReading, PackedText)> = Vec::new();
+    for recording in newest(&recordings, MeasurementKind::Electromyogram) {
+        let (reading, file) = measurement_files::file(&mut db, recording.id).await?;
         files.push((recording.walk, recording.id, reading, file));
     }
     drop(db);
@@ -97,8 +97,8 @@ pub async fn keep_result(
     id: LabSessionId,
     result: &EmgResult,
 ) -> Result<(), Error> {
-    let kept = lab_recordings::insert_result(writer, actor, id, result).await?;
-    let used: Vec<LabRecordingId> = result.walks.iter().map(|walk| walk.recording_id).collect();
+    let kept = measurement_files::insert_result(writer, actor, id, result).await?;
+    let used: Vec<MeasurementFileId> = result.walks.iter().map(|walk| walk.recording_id).collect();
     let detail = json!({ "result": kept, "settings": result.settings, "recordings": used });
     audit::append(writer, actor, "lab_session.process", &format!("lab session {id}"), &detail).await?;
     Ok(())
@@ -110,7 +110,7 @@ pub struct WalkModel {
     /// Number of the walk, 2 or 3.
     pub walk: u8,
     /// Each channel whose muscle the model has.
-    #[schema(value_type = Vec<Object>)]
+    #[schema(value_type = Vec<schema::ModelActivity>)]
     pub muscles: Vec<ModelActivity>,
 }
 
@@ -129,7 +129,7 @@ pub struct EmgView {
 /// Errors of the database.
 pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>, Error> {
     let mut db = store.read().await?;
-    let Some(result) = lab_recordings::newest_result::<EmgResult>(&mut db, id).await? else { return Ok(None) };
+    let Some(result) = measurement_files::newest_result::<EmgResult>(&mut db, id).await? else { return Ok(None) };
     drop(db);
     beside_model(store, id, result).await.map(Some)
 }
@@ -178,11 +178,11 @@ pub struct LimitCycles {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// What they were made of.
-    pub recording_id: LabRecordingId,
+    pub recording_id: MeasurementFileId,
     /// Edge of the zero-phase low-pass before velocities were taken by central differences, Hz.
     pub cutoff_hz: f64,
     /// Angle (rad) and velocity (rad/s) of each joint that was recorded, sample after sample.
-    #[schema(value_type = Vec<Object>)]
+    #[schema(value_type = Vec<schema::PhasePortrait>)]
     pub joints: Vec<PhasePortrait>,
 }
 
@@ -192,15 +192,15 @@ pub struct LimitCycles {
 /// Errors of the database.
 pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
     let mut db = store.read().await?;
-    let recordings = lab_recordings::of_session(&mut db, id).await?;
-    let mut files: Vec<(u8, LabRecordingId, MotionReading, PackedText)> = Vec::new();
-    for recording in newest(&recordings, RecordingKind::Motion) {
-        let (reading, file) = lab_recordings::file(&mut db, recording.id).await?;
+    let recordings = measurement_files::of_session(&mut db, id).await?;
+    let mut files: Vec<(u8, MeasurementFileId, MotionReading, PackedText)> = Vec::new();
+    for recording in newest(&recordings, MeasurementKind::Motion) {
+        let (reading, file) = measurement_files::file(&mut db, recording.id).await?;
         files.push((recording.walk, recording.id, reading, file));
     }
     drop(db);
     let process = move |pool: &OnPool| {
-        let cycles = |(walk, recording_id, reading, file): (u8, LabRecordingId, MotionReading, PackedText)| {
+        let cycles = |(walk, recording_id, reading, file): (u8, MeasurementFileId, MotionReading, PackedText)| {
             let joints = reading.portraits(&file.text(pool)?)?;
             Ok(LimitCycles { walk, recording_id, cutoff_hz: reading.cutoff_hz, joints })
         };

@@ -8,9 +8,9 @@ use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
 use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::lab_recordings::{self, LabRecording, PackedRecording, RecordingKind};
 use gaitwright_store::lab_sessions::Act;
-use gaitwright_store::{Connection, LabRecordingId, LabSessionId, PackedText, Store, Writer};
+use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind, PackedFile};
+use gaitwright_store::{Connection, LabSessionId, MeasurementFileId, PackedText, Store, Writer};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -191,7 +191,7 @@ pub struct NewMotion {
 #[derive(Debug)]
 pub struct Checked {
     walk: u8,
-    packed: PackedRecording,
+    packed: PackedFile,
 }
 
 impl NewEmg {
@@ -203,7 +203,7 @@ impl NewEmg {
         let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
-            let packed = PackedRecording::new(pool, RecordingKind::Electromyogram, &self.reading, &self.recording)?;
+            let packed = PackedFile::new(pool, MeasurementKind::Electromyogram, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
         };
         store.compute(check).await?
@@ -219,7 +219,7 @@ impl NewMotion {
         let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
-            let packed = PackedRecording::new(pool, RecordingKind::Motion, &self.reading, &self.recording)?;
+            let packed = PackedFile::new(pool, MeasurementKind::Motion, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
         };
         store.compute(check).await?
@@ -230,15 +230,15 @@ impl NewMotion {
 ///
 /// # Errors
 /// [`Error::Invalid`] with line and column, or the field.
-pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &LabRecording) -> Result<(), Error> {
+pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &MeasurementFile) -> Result<(), Error> {
     let id = kept.id;
     match kept.kind {
-        RecordingKind::Electromyogram => {
-            let (reading, file) = lab_recordings::file::<EmgReading>(db, id).await?;
+        MeasurementKind::Electromyogram => {
+            let (reading, file) = measurement_files::file::<EmgReading>(db, id).await?;
             pool.run(move |pool| reading.check(&file.text(pool)?)).await?
         }
-        RecordingKind::Motion => {
-            let (reading, file) = lab_recordings::file::<MotionReading>(db, id).await?;
+        MeasurementKind::Motion => {
+            let (reading, file) = measurement_files::file::<MotionReading>(db, id).await?;
             pool.run(move |pool| reading.check(&file.text(pool)?)).await?
         }
     }
@@ -248,7 +248,7 @@ pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &LabRecording) -
 #[derive(Debug)]
 pub struct Brought {
     /// What is known of it.
-    pub recording: LabRecording,
+    pub recording: MeasurementFile,
     /// Its form.
     pub form: FileForm,
     /// Its content.
@@ -259,14 +259,14 @@ pub struct Brought {
 ///
 /// # Errors
 /// [`Error::NotFound`], or that the file is not what its hash says.
-pub async fn brought(db: &mut Connection, id: LabRecordingId) -> Result<Brought, Error> {
+pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Brought, Error> {
     /// What both kinds of recordings say of their reading.
     #[derive(Deserialize)]
     struct Reading {
         form: FileForm,
     }
-    let recording = lab_recordings::get(db, id).await?;
-    let (Reading { form }, file) = lab_recordings::file(db, id).await?;
+    let recording = measurement_files::get(db, id).await?;
+    let (Reading { form }, file) = measurement_files::file(db, id).await?;
     Ok(Brought { recording, form, file })
 }
 
@@ -280,19 +280,19 @@ pub async fn keep(
     actor: &Actor,
     id: LabSessionId,
     checked: &Checked,
-) -> Result<LabRecording, Error> {
+) -> Result<MeasurementFile, Error> {
     let walk = checked.walk;
     if still_open(writer, id).await?.done(Act::Walk(walk)).is_none() {
         return Err(Error::conflict(format!("Walk {walk} is not recorded yet. Record it in the lab session first.")));
     }
-    let brought = lab_recordings::of_session(writer, id).await?;
+    let brought = measurement_files::of_session(writer, id).await?;
     if let Some(other) = brought.iter().find(|other| other.walk != walk && checked.packed.is_file_of(other)) {
         let other = other.walk;
         return Err(Error::conflict(format!(
             "The same file was already uploaded for walk {other}. Choose the file of this walk."
         )));
     }
-    let added = lab_recordings::insert(writer, actor, id, walk, &checked.packed).await?;
+    let added = measurement_files::insert(writer, actor, id, walk, &checked.packed).await?;
     let detail = json!({ "walk": walk, "kind": added.kind, "recording": added.id, "sha256": added.raw_sha256 });
     audit::append(writer, actor, "lab_session.record", &format!("lab session {id}"), &detail).await?;
     Ok(added)

@@ -4,54 +4,75 @@ use super::exports;
 use crate::AppState;
 use crate::may::May;
 use crate::once::{Once, OnceWith};
+use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::reached::Id;
 use crate::shown::Shown;
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderValue, header};
 use axum::response::Response;
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, Brought, Checked, EmgView, FileForm, LimitCycles, NewEmg, NewMotion};
-use gaitwright_store::lab_recordings::{self, LabRecording};
-use gaitwright_store::{LabRecordingId, LabSessionId};
+use gaitwright_store::measurement_files::{self, MeasurementFile};
+use gaitwright_store::{LabSessionId, MeasurementFileId, schema};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-/// `GET /lab-sessions/{id}/recordings`: every file that was brought, oldest first; the newest of a walk counts.
+/// `GET /lab-sessions/{id}/measurement-files`: every file that was added, oldest first; the newest of a walk counts.
 #[utoipa::path(
     get,
-    path = "/lab-sessions/{id}/recordings",
-    operation_id = "list_lab_recordings",
+    path = "/lab-sessions/{id}/measurement-files",
+    operation_id = "list_measurement_files",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "All of them", body = Vec<LabRecording>)),
+    responses((status = 200, description = "All of them", body = Page<MeasurementFile>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<LabSessionId, Read>,
-) -> Result<Json<Vec<LabRecording>>, Refusal> {
-    Ok(Json(lab_recordings::of_session(&mut *app.read().await?, id).await?))
+    paging: Paging<MeasurementFileId>,
+) -> Result<Json<Page<MeasurementFile>>, Refusal> {
+    let all = measurement_files::of_session(&mut *app.read().await?, id).await?;
+    Ok(Json(paging.cut(all, |recording| recording.id)?))
 }
 
-/// `GET /lab-recordings/{id}/file`: a file as it was brought, byte for byte. Its ETag is its SHA-256.
+/// `GET /measurement-files/{id}`.
 #[utoipa::path(
     get,
-    path = "/lab-recordings/{id}/file",
-    operation_id = "get_lab_recording_file",
+    path = "/measurement-files/{id}",
+    operation_id = "get_measurement_file",
     tag = "lab",
-    params(("id" = LabRecordingId, Path, description = "The recording")),
-    responses((status = 200, description = "The file; CSV, or an OpenSim file", body = String, content_type = "text/plain")),
+    params(("id" = MeasurementFileId, Path, description = "The file")),
+    responses((status = 200, description = "The file, without its content", body = MeasurementFile), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn file(
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<MeasurementFileId, Read>,
+) -> Result<Json<MeasurementFile>, Refusal> {
+    Ok(Json(measurement_files::get(&mut *app.read().await?, id).await?))
+}
+
+/// `GET /measurement-files/{id}/content`: the file byte for byte. Its ETag is its SHA-256.
+#[utoipa::path(
+    get,
+    path = "/measurement-files/{id}/content",
+    operation_id = "get_measurement_file_content",
+    tag = "lab",
+    params(("id" = MeasurementFileId, Path, description = "The file")),
+    responses((status = 200, description = "The file; CSV, or an OpenSim file", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn content(
     _: May<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<LabRecordingId, Read>,
+    Shown(id, _): Shown<MeasurementFileId, Read>,
 ) -> Result<Response, Refusal> {
     let Brought { recording, form, file } = lab::brought(&mut *app.read().await?, id).await?;
     let text = app.compute(move |pool| file.text(pool)).await??;
@@ -66,19 +87,19 @@ pub(super) async fn file(
     Ok(answer)
 }
 
-/// `POST /lab-sessions/{id}/electromyograms`: the electromyograms of a walk. A file that is not whole, or holds no
+/// `POST /lab-sessions/{id}/measurement-files/emg`: the electromyograms of a walk. A file that is not whole, or holds no
 /// stride, is refused, and nothing of it is kept.
 #[utoipa::path(
     post,
-    path = "/lab-sessions/{id}/electromyograms",
-    operation_id = "add_electromyogram",
+    path = "/lab-sessions/{id}/measurement-files/emg",
+    operation_id = "add_emg_file",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewEmg,
-    responses((status = 201, description = "Kept", body = LabRecording)),
+    responses((status = 201, description = "Kept", body = MeasurementFile)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
-pub(super) async fn electromyogram(
+pub(super) async fn emg(
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, new): OnceWith<Run, NewEmg>,
@@ -90,15 +111,15 @@ pub(super) async fn electromyogram(
     keep(&app, id, &once, &checked).await
 }
 
-/// `POST /lab-sessions/{id}/motions`: the joint angles of a walk, for its limit cycles.
+/// `POST /lab-sessions/{id}/measurement-files/motion`: the joint angles of a walk, for its limit cycles.
 #[utoipa::path(
     post,
-    path = "/lab-sessions/{id}/motions",
-    operation_id = "add_lab_motion",
+    path = "/lab-sessions/{id}/measurement-files/motion",
+    operation_id = "add_motion_file",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewMotion,
-    responses((status = 201, description = "Kept", body = LabRecording)),
+    responses((status = 201, description = "Kept", body = MeasurementFile)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn motion(
@@ -119,7 +140,7 @@ async fn keep(app: &AppState, id: LabSessionId, once: &Once<Run>, checked: &Chec
         Err(before) => return Ok(before),
     };
     let kept = lab::keep(&mut writer, &once.actor, id, checked).await?;
-    once.finish(app, writer, StatusCode::CREATED, None, &kept).await
+    once.created(app, writer, format!("/api/v1/measurement-files/{}", kept.id), &kept).await
 }
 
 /// How electromyograms are filtered.
@@ -127,7 +148,7 @@ async fn keep(app: &AppState, id: LabSessionId, once: &Once<Run>, checked: &Chec
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Processing {
     /// band_low_hz, band_high_hz, envelope_hz, order: what is left out has its default.
-    #[schema(value_type = Object)]
+    #[schema(value_type = schema::EmgSettings)]
     settings: EmgSettings,
 }
 
@@ -136,11 +157,11 @@ pub(super) struct Processing {
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/emg-results",
-    operation_id = "process_electromyograms",
+    operation_id = "process_emg",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Processing,
-    responses((status = 201, description = "What was made of them", body = EmgView)),
+    responses((status = 200, description = "The result", body = EmgView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn process(
@@ -158,7 +179,7 @@ pub(super) async fn process(
         Err(before) => return Ok(before),
     };
     lab::keep_result(&mut writer, &once.actor, id, &view.result).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &view).await
+    once.done(&app, writer, &view).await
 }
 
 /// `GET /lab-sessions/{id}/emg-results`: the newest result of the electromyograms, and after unblinding the muscles of the
@@ -169,7 +190,7 @@ pub(super) async fn process(
     operation_id = "get_emg_results",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "The newest result; null: nothing was processed yet", body = Option<EmgView>)),
+    responses((status = 200, description = "The newest result; null: nothing was processed yet", body = Option<EmgView>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn result(
@@ -187,13 +208,14 @@ pub(super) async fn result(
     operation_id = "get_limit_cycles",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "The newest motion of each walk", body = Vec<LimitCycles>)),
+    responses((status = 200, description = "The newest motion of each walk", body = Page<LimitCycles>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn limit_cycles(
     _: May<Read>,
     State(mut app): State<AppState>,
     Shown(id, _): Shown<LabSessionId, Read>,
-) -> Result<Json<Vec<LimitCycles>>, Refusal> {
-    Ok(Json(lab::limit_cycles(app.store_mut(), id).await?))
+    paging: Paging<usize>,
+) -> Result<Json<Page<LimitCycles>>, Refusal> {
+    Ok(Json(paging.cut_by_place(lab::limit_cycles(app.store_mut(), id).await?)?))
 }

@@ -1,18 +1,18 @@
-//! Remarks: what staff say of two gaits that is no preference.
+//! Assessments: what staff say of two gaits that is no preference.
 
 use super::feedback::{Attribution, Retraction, Source};
 use super::presentations::Judgement;
-use super::{Connection, FeedbackId, Instant, RemarkId, StoreError, StoreResult, StudyId, TrialId, now};
+use super::{AssessmentId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// A remark of the record.
+/// An assessment of the record.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Remark {
+pub struct Assessment {
     /// Identifier.
-    pub id: RemarkId,
+    pub id: AssessmentId,
     /// The study.
     pub study_id: StudyId,
     /// Trial of one gait.
@@ -35,16 +35,16 @@ pub struct Remark {
     pub retraction: Option<Retraction>,
 }
 
-impl Remark {
+impl Assessment {
     /// The two gaits.
     pub fn pair(&self) -> (TrialId, TrialId) {
         (self.first, self.second)
     }
 }
 
-/// A remark to write.
+/// An assessment to write.
 #[derive(Debug, Clone, Copy)]
-pub struct NewRemark<'a> {
+pub struct NewAssessment<'a> {
     /// The study.
     pub study: StudyId,
     /// The two gaits.
@@ -61,8 +61,8 @@ pub struct NewRemark<'a> {
 ///
 /// # Errors
 /// A violated constraint or trigger, or what the database reports.
-pub async fn insert(db: &mut Connection, new: &NewRemark<'_>) -> StoreResult<RemarkId> {
-    let id = RemarkId::fresh();
+pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult<AssessmentId> {
+    let id = AssessmentId::fresh();
     sqlx::query(
         "insert into remarks (id, study_id, first, second, answer, source, author, note, feedback_id, created_at) \
          values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -82,11 +82,11 @@ pub async fn insert(db: &mut Connection, new: &NewRemark<'_>) -> StoreResult<Rem
     Ok(id)
 }
 
-/// Takes a remark back. `false`: it was taken back already.
+/// Takes an assessment back. `false`: it was taken back already.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn retract(db: &mut Connection, id: RemarkId, author: &str, reason: &str) -> StoreResult<bool> {
+pub async fn retract(db: &mut Connection, id: AssessmentId, author: &str, reason: &str) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into remark_retractions (remark_id, author, reason, created_at) values (?, ?, ?, ?) \
          on conflict (remark_id) do nothing",
@@ -108,25 +108,25 @@ const SELECT: &str = "select m.*, r.author as retracted_by, r.reason as retracte
 ///
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
-pub async fn get(db: &mut Connection, id: RemarkId) -> StoreResult<Remark> {
+pub async fn get(db: &mut Connection, id: AssessmentId) -> StoreResult<Assessment> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.id = ?"));
     let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
     let missing = || StoreError::Missing { what: "assessment", id: id.to_string() };
     row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
 }
 
-/// Every remark of a study, by time, those that were taken back included.
+/// Every assessment of a study, by time, those that were taken back included.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Remark>> {
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Assessment>> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.study_id = ? order by m.id"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
-fn from_row(row: &SqliteRow) -> StoreResult<Remark> {
-    Ok(Remark {
+fn from_row(row: &SqliteRow) -> StoreResult<Assessment> {
+    Ok(Assessment {
         id: row.try_get("id")?,
         study_id: row.try_get("study_id")?,
         first: row.try_get("first")?,

@@ -2,7 +2,7 @@
 
 use super::audit::Actor;
 use super::{
-    Connection, EmgResultId, Instant, LabRecordingId, LabSessionId, PackedText, StoreError, StoreResult, json, now,
+    Connection, EmgResultId, Instant, LabSessionId, MeasurementFileId, PackedText, StoreError, StoreResult, json, now,
 };
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
@@ -15,14 +15,14 @@ use utoipa::ToSchema;
 /// Kind of a measurement file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum RecordingKind {
+pub enum MeasurementKind {
     /// Muscle activity.
     Electromyogram,
     /// Joint angles.
     Motion,
 }
 
-impl RecordingKind {
+impl MeasurementKind {
     /// As stored and shown.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -32,7 +32,7 @@ impl RecordingKind {
     }
 }
 
-impl FromStr for RecordingKind {
+impl FromStr for MeasurementKind {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
         [Self::Electromyogram, Self::Motion]
@@ -44,15 +44,15 @@ impl FromStr for RecordingKind {
 
 /// Measurement file, without its content.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct LabRecording {
+pub struct MeasurementFile {
     /// Identifier.
-    pub id: LabRecordingId,
+    pub id: MeasurementFileId,
     /// The session.
     pub session_id: LabSessionId,
     /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// What it is of.
-    pub kind: RecordingKind,
+    pub kind: MeasurementKind,
     /// SHA-256 of the file.
     pub raw_sha256: String,
     /// Who uploaded it.
@@ -63,19 +63,19 @@ pub struct LabRecording {
 
 /// A compressed file, ready to be written.
 #[derive(Debug)]
-pub struct PackedRecording {
-    kind: RecordingKind,
+pub struct PackedFile {
+    kind: MeasurementKind,
     reading: String,
     raw: Vec<u8>,
     raw_sha256: String,
 }
 
-impl PackedRecording {
+impl PackedFile {
     /// Compresses a file; `reading` says how it is to be read.
     ///
     /// # Errors
     /// When serialising fails.
-    pub fn new<T: Serialize>(pool: &OnPool, kind: RecordingKind, reading: &T, file: &str) -> StoreResult<Self> {
+    pub fn new<T: Serialize>(pool: &OnPool, kind: MeasurementKind, reading: &T, file: &str) -> StoreResult<Self> {
         Ok(Self {
             kind,
             reading: json::to_text("reading of a recording", reading)?,
@@ -85,7 +85,7 @@ impl PackedRecording {
     }
 
     /// Whether it is the file of a recording of the same kind.
-    pub fn is_file_of(&self, recording: &LabRecording) -> bool {
+    pub fn is_file_of(&self, recording: &MeasurementFile) -> bool {
         (self.kind, &self.raw_sha256) == (recording.kind, &recording.raw_sha256)
     }
 }
@@ -99,10 +99,10 @@ pub async fn insert(
     actor: &Actor,
     session: LabSessionId,
     walk: u8,
-    packed: &PackedRecording,
-) -> StoreResult<LabRecording> {
-    let added = LabRecording {
-        id: LabRecordingId::fresh(),
+    packed: &PackedFile,
+) -> StoreResult<MeasurementFile> {
+    let added = MeasurementFile {
+        id: MeasurementFileId::fresh(),
         session_id: session,
         walk,
         kind: packed.kind,
@@ -135,7 +135,7 @@ const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, crea
 ///
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
-pub async fn get(db: &mut Connection, id: LabRecordingId) -> StoreResult<LabRecording> {
+pub async fn get(db: &mut Connection, id: MeasurementFileId) -> StoreResult<MeasurementFile> {
     let sql = AssertSqlSafe(format!("{SELECT} where id = ?"));
     let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| missing(id))
@@ -145,12 +145,12 @@ pub async fn get(db: &mut Connection, id: LabRecordingId) -> StoreResult<LabReco
 ///
 /// # Errors
 /// What the database reports.
-pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<LabRecording>> {
+pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<MeasurementFile>> {
     let sql = AssertSqlSafe(format!("{SELECT} where session_id = ? order by id"));
     sqlx::query(sql).bind(session).fetch_all(db).await?.iter().map(from_row).collect()
 }
 
-fn missing(id: LabRecordingId) -> StoreError {
+fn missing(id: MeasurementFileId) -> StoreError {
     StoreError::Missing { what: "recording", id: id.to_string() }
 }
 
@@ -158,7 +158,7 @@ fn missing(id: LabRecordingId) -> StoreError {
 ///
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
-pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: LabRecordingId) -> StoreResult<(T, PackedText)> {
+pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: MeasurementFileId) -> StoreResult<(T, PackedText)> {
     let row = sqlx::query("select reading, raw, raw_sha256 from lab_recordings where id = ?")
         .bind(id)
         .fetch_optional(db)
@@ -211,8 +211,8 @@ pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessi
     rows.fetch_all(db).await?.iter().map(|row| json::column(row, "document")).collect()
 }
 
-fn from_row(row: &SqliteRow) -> StoreResult<LabRecording> {
-    Ok(LabRecording {
+fn from_row(row: &SqliteRow) -> StoreResult<MeasurementFile> {
+    Ok(MeasurementFile {
         id: row.try_get("id")?,
         session_id: row.try_get("session_id")?,
         walk: row.try_get("walk")?,

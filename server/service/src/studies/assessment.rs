@@ -6,19 +6,19 @@ use super::preference::{self, Again, GivenJudgement};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
+use gaitwright_store::assessments::{self, Assessment};
 use gaitwright_store::feedback::Source;
 use gaitwright_store::presentations::Judgement;
-use gaitwright_store::remarks::{self, Remark};
-use gaitwright_store::{RemarkId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
+use gaitwright_store::{AssessmentId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// A remark.
+/// An assessment.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-#[schema(as = RemarkToMake)]
-pub struct NewRemark {
+#[schema(as = NewAssessment)]
+pub struct NewAssessment {
     /// One gait.
     pub first: TrialId,
     /// Trial of the other gait.
@@ -38,13 +38,18 @@ pub struct NewRemark {
     pub note: String,
 }
 
-/// Writes a remark.
+/// Writes an assessment.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
-pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &NewRemark) -> Result<RemarkId, Error> {
+pub async fn give(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: StudyId,
+    new: &NewAssessment,
+) -> Result<AssessmentId, Error> {
     let study = studies::get(writer, study).await?;
-    if !new.answer.is_remark() {
+    if !new.answer.is_assessment() {
         return Err(Error::invalid(
             "answer",
             json!(new.answer),
@@ -63,23 +68,25 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Ne
     let id = write(writer, statement).await?;
     let (first, second, author) = (new.first, new.second, attribution.author);
     let detail = json!({ "study": study.id, "first": first, "second": second, "answer": new.answer, "author": author });
-    audit::append(writer, &caller.actor, "remark.give", &format!("remark {id}"), &detail).await?;
+    audit::append(writer, &caller.actor, "assessment.give", &format!("assessment {id}"), &detail).await?;
     Ok(id)
 }
 
-/// Adds a remark, tells the learner what follows from it, and tells open pages.
+/// Adds an assessment, tells the learner what follows from it, and tells open pages.
 ///
 /// # Errors
 /// As [`preference::hear`].
-pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<RemarkId, Error> {
+pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<AssessmentId, Error> {
     let heard = preference::hear(writer, statement).await?;
     let GivenJudgement { study, pair, said, attribution, .. } = statement;
-    let id = remarks::insert(writer, &remarks::NewRemark { study, pair, said, attribution, feedback: heard }).await?;
-    events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "remark_id": id })).await?;
+    let id =
+        assessments::insert(writer, &assessments::NewAssessment { study, pair, said, attribution, feedback: heard })
+            .await?;
+    events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "assessment_id": id })).await?;
     Ok(id)
 }
 
-/// Takes a remark back, and what the learner heard of it.
+/// Takes an assessment back, and what the learner heard of it.
 ///
 /// # Errors
 /// [`Error::NotFound`], also for an assessment of another study. [`Error::Conflict`] if it was already retracted, or if
@@ -88,25 +95,25 @@ pub async fn retract(
     writer: &mut Writer,
     caller: &Caller,
     study: Option<StudyId>,
-    id: RemarkId,
+    id: AssessmentId,
     (author, reason): (Option<&str>, &str),
-) -> Result<Remark, Error> {
-    let remark = remarks::get(writer, id).await?;
-    if study.is_some_and(|study| study != remark.study_id) {
-        return Err(Error::NotFound { what: "remark".to_owned(), id: id.to_string() });
+) -> Result<Assessment, Error> {
+    let assessment = assessments::get(writer, id).await?;
+    if study.is_some_and(|study| study != assessment.study_id) {
+        return Err(Error::NotFound { what: "assessment".to_owned(), id: id.to_string() });
     }
-    consents::may_be_shown(writer, remark.study_id).await?;
+    consents::may_be_shown(writer, assessment.study_id).await?;
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", reason, ": why it is taken back")?;
-    if !remarks::retract(writer, id, author, reason).await? {
-        return Err(Error::conflict("this remark was taken back already"));
+    if !assessments::retract(writer, id, author, reason).await? {
+        return Err(Error::conflict("this assessment was taken back already"));
     }
-    if let Some(heard) = remark.feedback_id {
+    if let Some(heard) = assessment.feedback_id {
         let heard = feedback::get(writer, heard).await?;
         feedback::retract(writer, &heard, author, reason).await?;
     }
-    events::append(writer, remark.study_id, "feedback_retracted", &json!({ "remark_id": id })).await?;
-    let detail = json!({ "study": remark.study_id, "author": author, "reason": reason });
-    audit::append(writer, &caller.actor, "remark.retract", &format!("remark {id}"), &detail).await?;
-    Ok(remarks::get(writer, id).await?)
+    events::append(writer, assessment.study_id, "feedback_retracted", &json!({ "assessment_id": id })).await?;
+    let detail = json!({ "study": assessment.study_id, "author": author, "reason": reason });
+    audit::append(writer, &caller.actor, "assessment.retract", &format!("assessment {id}"), &detail).await?;
+    Ok(assessments::get(writer, id).await?)
 }

@@ -1,0 +1,106 @@
+//! Assessments: what is said of two gaits that is no preference.
+
+use super::preferences::Retract;
+use crate::AppState;
+use crate::may::May;
+use crate::once::OnceWith;
+use crate::paging::{Page, Paging};
+use crate::problem::Refusal;
+use crate::reached::Id;
+use crate::shown::Shown;
+use axum::Json;
+use axum::extract::State;
+use axum::response::Response;
+use gaitwright_service::access::{self, Read};
+use gaitwright_service::studies::assessment::{self, NewAssessment};
+use gaitwright_store::assessments::{self, Assessment};
+use gaitwright_store::{AssessmentId, StudyId, studies};
+
+/// `GET /studies/{id}/assessments`: as made, those that were taken back included.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/assessments",
+    operation_id = "list_assessments",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "Every assessment, by time", body = Page<Assessment>), (status = 409, description = "The subject withdrew consent")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
+    paging: Paging<AssessmentId>,
+) -> Result<Json<Page<Assessment>>, Refusal> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    Ok(Json(paging.cut(assessments::of_study(&mut reader, id).await?, |assessment| assessment.id)?))
+}
+
+/// `POST /studies/{id}/assessments`: that nobody can tell which of two gaits is better, or that one must not be walked. A
+/// gait that was called unsafe is not recommended, not asked about and not planned for a lab session.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/assessments",
+    operation_id = "create_assessment",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body = NewAssessment,
+    responses((status = 201, description = "Recorded", body = Assessment)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, access::Answer>,
+    OnceWith(once, new): OnceWith<access::Answer, NewAssessment>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let made = assessment::give(&mut writer, &once.caller, id, &new).await?;
+    let row = assessments::get(&mut writer, made).await?;
+    once.created(&app, writer, format!("/api/v1/assessments/{made}"), &row).await
+}
+
+/// `GET /assessments/{id}`.
+#[utoipa::path(
+    get,
+    path = "/assessments/{id}",
+    operation_id = "get_assessment",
+    tag = "preferences",
+    params(("id" = AssessmentId, Path, description = "The assessment")),
+    responses((status = 200, description = "The assessment", body = Assessment), (status = 409, description = "The subject withdrew consent")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<AssessmentId, Read>,
+) -> Result<Json<Assessment>, Refusal> {
+    Ok(Json(assessments::get(&mut *app.read().await?, id).await?))
+}
+
+/// `POST /assessments/{id}/retract`.
+#[utoipa::path(
+    post,
+    path = "/assessments/{id}/retract",
+    operation_id = "retract_assessment",
+    tag = "preferences",
+    params(("id" = AssessmentId, Path, description = "The assessment")),
+    request_body = Retract,
+    responses((status = 200, description = "Taken back, with what the learner heard of it: the row stays", body = Assessment)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn retract(
+    State(app): State<AppState>,
+    Id(id, _): Id<AssessmentId, access::Answer>,
+    OnceWith(once, why): OnceWith<access::Answer, Retract>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = assessment::retract(&mut writer, &once.caller, None, id, (why.author.as_deref(), &why.reason)).await?;
+    once.done(&app, writer, &row).await
+}

@@ -1,0 +1,177 @@
+//! Lists by pages: one envelope, one cursor and one limit for every list of the REST interface.
+
+use super::AppState;
+use crate::problem::Refusal;
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use gaitwright_service::error::Error;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Entries on a page when the request does not say how many.
+pub(super) const DEFAULT_LIMIT: u32 = 200;
+/// Most entries on a page.
+pub(super) const LARGEST_LIMIT: u32 = 1000;
+
+/// A page of a list.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Page<T> {
+    /// The entries.
+    items: Vec<T>,
+    /// Send it as `cursor` to get the next page; null on the last page.
+    #[schema(required)]
+    next: Option<String>,
+}
+
+impl<T> Page<T> {
+    /// The same page with other entries.
+    pub(crate) fn map<U>(self, change: impl FnMut(T) -> U) -> Page<U> {
+        Page { items: self.items.into_iter().map(change).collect(), next: self.next }
+    }
+
+    /// The entries and the cursor of the next page.
+    pub(crate) fn into_parts(self) -> (Vec<T>, Option<String>) {
+        (self.items, self.next)
+    }
+
+    /// A page of entries that were made of another one's.
+    pub(crate) fn of_parts(items: Vec<T>, next: Option<String>) -> Self {
+        Self { items, next }
+    }
+}
+
+/// The filter of a list that has none.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Unfiltered {}
+
+/// The page that a request asks for: `cursor` and `limit` of its query, and the rest of it as a filter.
+#[derive(Debug)]
+pub(crate) struct Paging<K, F = Unfiltered> {
+    /// Key of the last entry of the page before; none on the first page.
+    pub(crate) after: Option<K>,
+    /// Which entries.
+    pub(crate) filter: F,
+    limit: u32,
+}
+
+impl<K: Serialize, F> Paging<K, F> {
+    /// How many entries to read: one more than the page holds tells whether there is a next page.
+    pub(crate) fn to_read(&self) -> u32 {
+        self.limit + 1
+    }
+
+    /// The page whose entries, and the first one of the next page, were read.
+    pub(crate) fn page<T>(&self, mut rows: Vec<T>, key: impl Fn(&T) -> K) -> Result<Page<T>, Error> {
+        let limit = self.limit as usize;
+        let last = if rows.len() > limit { rows.get(limit - 1).map(key) } else { None };
+        rows.truncate(limit);
+        Ok(Page { items: rows, next: last.map(|key| cursor(&key)).transpose()? })
+    }
+
+    /// The page of a short list that was read whole, in the order of its keys.
+    pub(crate) fn cut<T>(&self, rows: Vec<T>, key: impl Fn(&T) -> K) -> Result<Page<T>, Error>
+    where
+        K: Ord,
+    {
+        let ahead = rows.into_iter().skip_while(|row| self.after.as_ref().is_some_and(|after| key(row) <= *after));
+        self.page(ahead.take(self.to_read() as usize).collect(), &key)
+    }
+}
+
+impl<F> Paging<usize, F> {
+    /// The page of a computed list, whose entries have no keys but their places.
+    pub(crate) fn cut_by_place<T>(&self, rows: Vec<T>) -> Result<Page<T>, Error> {
+        Ok(self.cut(rows.into_iter().enumerate().collect(), |(place, _)| *place)?.map(|(_, row)| row))
+    }
+}
+
+/// The text of a cursor: opaque, so that nobody builds one.
+fn cursor<K: Serialize>(key: &K) -> Result<String, Error> {
+    let key = serde_json::to_vec(key).map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(hex::encode(key))
+}
+
+impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
+    fn read(query: &str) -> Result<Self, Error> {
+        let malformed = |e: serde_urlencoded::de::Error| Error::Malformed(format!("the query cannot be read: {e}"));
+        let pairs: Vec<(String, String)> = serde_urlencoded::from_str(query).map_err(malformed)?;
+        let (mut after, mut limit, mut filter) = (None, None, Vec::new());
+        for (name, value) in pairs {
+            let given = match name.as_str() {
+                "cursor" => after.replace(read_cursor(&value)?).is_some(),
+                "limit" => limit.replace(read_limit(&value)?).is_some(),
+                _ => {
+                    filter.push((name, value));
+                    continue;
+                }
+            };
+            if given {
+                return Err(Error::Malformed(format!("the query names {name} twice")));
+            }
+        }
+        let filter = serde_urlencoded::to_string(filter).map_err(|e| Error::Internal(e.to_string()))?;
+        let filter = serde_urlencoded::from_str(&filter).map_err(malformed)?;
+        Ok(Self { after, filter, limit: limit.unwrap_or(DEFAULT_LIMIT) })
+    }
+}
+
+fn read_cursor<K: DeserializeOwned>(text: &str) -> Result<K, Error> {
+    let key = hex::decode(text).ok().and_then(|key| serde_json::from_slice(&key).ok());
+    key.ok_or_else(|| Error::invalid("cursor", text, "`next` of the page before"))
+}
+
+fn read_limit(text: &str) -> Result<u32, Error> {
+    let refused = || Error::invalid("limit", text, &format!("1 to {LARGEST_LIMIT}"));
+    text.parse().ok().filter(|limit| (1..=LARGEST_LIMIT).contains(limit)).ok_or_else(refused)
+}
+
+impl<K: DeserializeOwned, F: DeserializeOwned> FromRequestParts<AppState> for Paging<K, F> {
+    type Rejection = Refusal;
+
+    async fn from_request_parts(parts: &mut Parts, _: &AppState) -> Result<Self, Refusal> {
+        Ok(Self::read(parts.uri.query().unwrap_or_default())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Paging, Unfiltered};
+    use std::cmp::Reverse;
+
+    type Newest = Paging<Reverse<u32>>;
+
+    fn pages(rows: &[u32], limit: usize) -> Vec<Vec<u32>> {
+        let (mut pages, mut query) = (Vec::new(), format!("limit={limit}"));
+        loop {
+            let page = Newest::read(&query).unwrap().cut(rows.to_vec(), |row| Reverse(*row)).unwrap();
+            pages.push(page.items);
+            let Some(next) = page.next else { return pages };
+            query = format!("limit={limit}&cursor={next}");
+        }
+    }
+
+    #[test]
+    fn pages_hold_every_entry_once_and_the_last_one_has_no_next() {
+        assert_eq!(pages(&[5, 4, 3, 2, 1], 2), [vec![5, 4], vec![3, 2], vec![1]]);
+        assert_eq!(pages(&[4, 3, 2, 1], 2), [vec![4, 3], vec![2, 1]]);
+        assert_eq!(pages(&[], 1), [Vec::<u32>::new()]);
+    }
+
+    #[test]
+    fn an_entry_that_goes_between_two_pages_takes_no_other_one_with_it() {
+        let first = Newest::read("limit=2").unwrap().cut(vec![5, 4, 3, 2], |row| Reverse(*row)).unwrap();
+        let second = Newest::read(&format!("limit=2&cursor={}", first.next.unwrap())).unwrap();
+        assert_eq!(second.cut(vec![5, 3, 2], |row| Reverse(*row)).unwrap().items, [3, 2]);
+    }
+
+    #[test]
+    fn what_is_no_page_is_refused() {
+        for query in
+            ["limit=0", "limit=1001", "limit=-1", "limit=x", "cursor=x", "cursor=22", "limit=1&limit=2", "other=1"]
+        {
+            assert!(Paging::<u32, Unfiltered>::read(query).is_err(), "{query}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Jobs: what a request that takes long is answered with, followed to its end and cancelled.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gait_optimizer::Gait;
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{StudyId, TrialId};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::certified::Verdicts;
+use gaitwright_tests::explained::{Clearance, with_few_gaits};
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// A service whose study goes on while jobs are looked at; certificates take a while, and explanations for ever.
+async fn service() -> (TempDir, Service, StudyId, Clearance) {
+    let folder = tempfile::tempdir().unwrap();
+    let explainer = Clearance::slow(Duration::from_mins(10));
+    let watched = Clearance { counts: explainer.counts.clone(), ..Clearance::default() };
+    let certifier = Verdicts { pause: Duration::from_millis(300), passes: |_: &Gait| true };
+    let solver = Analytic::slow(Duration::from_millis(10));
+    let service = Service::start_looking_back(&folder.path().join("a.db"), solver, certifier, explainer).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits()))).await;
+    (folder, service, study, watched)
+}
+
+async fn first(service: &Service, study: StudyId, state: TrialState) -> TrialId {
+    for _ in 0..2000 {
+        let trials: Vec<Trial> = service.trials(study).await;
+        if let Some(trial) = trials.iter().find(|trial| trial.state == state) {
+            return trial.id;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    panic!("no trial is {state:?}");
+}
+
+fn address(answer: &Answer) -> String {
+    assert_eq!(answer.status, StatusCode::ACCEPTED, "{}", answer.text);
+    let address = answer.headers["location"].to_str().unwrap().to_owned();
+    assert_eq!(address, format!("/api/v1/jobs/{}", answer.json()["id"].as_str().unwrap()));
+    address
+}
+
+async fn wait_for(service: &Service, job: &str, state: &str) -> Value {
+    for _ in 0..2000 {
+        let found = service.fetch(job).await.json();
+        if found["state"] == state {
+            return found;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    panic!("{job} is not {state}: {}", service.fetch(job).await.text);
+}
+
+async fn listed(service: &Service, kind: &str) -> Vec<Value> {
+    service.fetch(&format!("/api/v1/jobs?kind={kind}")).await.items().as_array().unwrap().clone()
+}
+
+#[tokio::test]
+async fn a_certificate_is_a_job_that_leads_to_its_result() {
+    let (_folder, service, study, _) = service().await;
+    let trial = first(&service, study, TrialState::Converged).await;
+    let certificate = format!("/api/v1/trials/{trial}/certificate");
+    assert_eq!(service.fetch(&format!("/api/v1/jobs/certificate-{trial}")).await.status, StatusCode::NOT_FOUND);
+    let asked = service.post(&certificate, &json!({})).await;
+    let job = address(&asked);
+    assert_eq!((&asked.json()["kind"], &asked.json()["result"]), (&json!("certificate"), &Value::Null));
+    assert_eq!(listed(&service, "certificate").await[0]["trial_id"], json!(trial));
+    let done = wait_for(&service, &job, "done").await;
+    assert_eq!(done["result"], certificate);
+    assert_eq!(service.fetch(&certificate).await.json()["passed"], true);
+    assert_eq!(service.post(&certificate, &json!({})).await.status, StatusCode::OK, "it was made before");
+    assert!(listed(&service, "certificate").await.is_empty());
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.status, StatusCode::CONFLICT, "it has ended");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_certificate_that_is_cancelled_is_not_made() {
+    let (_folder, service, study, _) = service().await;
+    let trial = first(&service, study, TrialState::Converged).await;
+    let certificate = format!("/api/v1/trials/{trial}/certificate");
+    let job = address(&service.post(&certificate, &json!({})).await);
+    let cancelled = service.post(&format!("{job}/cancel"), &json!({})).await;
+    assert_eq!((cancelled.status, &cancelled.json()["state"]), (StatusCode::OK, &json!("cancelled")));
+    tokio::time::sleep(Duration::from_millis(600)).await;
+    assert_eq!(service.get(study).await.state, StudyState::Running, "a study that ends certifies its best gaits");
+    assert_eq!(service.fetch(&certificate).await.status, StatusCode::NOT_FOUND);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn an_explanation_is_a_job_that_stops_and_begins_again() {
+    let (_folder, service, study, watched) = service().await;
+    let trial = first(&service, study, TrialState::NotConverged).await;
+    let explanation = format!("/api/v1/trials/{trial}/explanation");
+    let job = address(&service.post(&explanation, &json!({})).await);
+    wait_for(&service, &job, "running").await;
+    assert_eq!(listed(&service, "explanation").await[0]["study_id"], json!(study));
+    assert_eq!(service.fetch(&explanation).await.status, StatusCode::NOT_FOUND);
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.json()["state"], "cancelled");
+    wait_for(&service, &job, "cancelled").await;
+    while watched.counts.cancelled.load(Ordering::SeqCst) == 0 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    assert!(listed(&service, "explanation").await.is_empty());
+    address(&service.post(&explanation, &json!({})).await);
+    wait_for(&service, &job, "running").await;
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_solve_is_a_job_whose_end_is_that_of_its_trial() {
+    let (_folder, service, study, _) = service().await;
+    let trial = first(&service, study, TrialState::Running).await;
+    let job = format!("/api/v1/jobs/solve-{trial}");
+    let found = service.fetch(&job).await.json();
+    assert_eq!((&found["study_id"], &found["kind"]), (&json!(study), &json!("solve")));
+    assert!(listed(&service, "solve").await.iter().any(|job| job["study_id"] == json!(study)));
+    // It may have ended meanwhile; a younger one takes its place.
+    loop {
+        let trial = first(&service, study, TrialState::Running).await;
+        let job = format!("/api/v1/jobs/solve-{trial}");
+        if service.post(&format!("{job}/cancel"), &json!({})).await.status == StatusCode::OK {
+            assert_eq!(wait_for(&service, &job, "cancelled").await["solve"], Value::Null);
+            assert_eq!(service.fetch(&format!("/api/v1/trials/{trial}")).await.json()["state"], "cancelled");
+            break;
+        }
+    }
+    assert_eq!(service.fetch("/api/v1/jobs/solve-nothing").await.status, StatusCode::NOT_FOUND);
+    service.stop().await;
+}
