@@ -104,9 +104,9 @@ const PAGES: [(&str, Option<Right>); 71] = [
     ("post /trials/{id}/certify", Some(Right::Run)),
     ("post /trials/{id}/explain", Some(Right::Run)),
     ("post /trials/{id}/safety-review", Some(Right::Answer)),
-    ("get /references", Some(Right::Read)),
-    ("post /references", Some(Right::Run)),
-    ("get /references/{id}", Some(Right::Read)),
+    ("get /reference-gaits", Some(Right::Read)),
+    ("post /reference-gaits", Some(Right::Run)),
+    ("get /reference-gaits/{id}", Some(Right::Read)),
     ("get /rate", Some(Right::Rate)),
     ("post /rate/{id}", Some(Right::Rate)),
     ("get /rate/pair/{token}", Some(Right::Rate)),
@@ -125,8 +125,8 @@ const PAGES: [(&str, Option<Right>); 71] = [
     ("post /lab/{id}", Some(Right::Rate)),
     ("post /lab/{id}/answer", Some(Right::Rate)),
     ("post /lab/{id}/take-back", Some(Right::Rate)),
-    ("get /people", Some(Right::Administer)),
-    ("post /people", Some(Right::Administer)),
+    ("get /users", Some(Right::Administer)),
+    ("post /users", Some(Right::Administer)),
     ("get /audit", Some(Right::Administer)),
     ("get /access-log", Some(Right::Administer)),
     ("get /system", Some(Right::Read)),
@@ -224,7 +224,7 @@ async fn what_is_sent_after_the_session_has_ended_is_not_stored_and_not_lost() {
     let answer = "response_ms=900&answer=first&note=%22steady%22+%26+calm";
     let refused = send(&service, &session, &Method::POST, &pair, FORM, answer).await;
     assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
-    assert!(refused.text.contains("nothing of what you sent was stored"), "{}", refused.text);
+    assert!(refused.text.contains("Your entry was not saved"), "{}", refused.text);
     service.access = Arc::new(Access::by_sign_in(3600.0));
     let heard = service.feedback(study).await.len();
 
@@ -261,7 +261,7 @@ async fn a_refusal_offers_no_way_that_is_closed() {
     for (role, staff) in [(Role::Rater, false), (Role::Clinician, true)] {
         let (_, link) = user(&service, role.as_str(), role).await;
         let who = session_of(&send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await);
-        for (address, status) in [("/people", StatusCode::FORBIDDEN), ("/nowhere", StatusCode::NOT_FOUND)] {
+        for (address, status) in [("/users", StatusCode::FORBIDDEN), ("/nowhere", StatusCode::NOT_FOUND)] {
             let shown = send(&service, &who, &Method::GET, address, "", "").await;
             assert_eq!((shown.status, shown.text.contains("href=\"/subjects\"")), (status, staff), "{}", shown.text);
             assert!(main(&shown.text) && (staff || shown.text.contains("href=\"/rate\"")), "{}", shown.text);
@@ -326,7 +326,7 @@ async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
     {
         let refused = change(&first, body).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{body}");
-        assert!(refused.text.contains("the present password is not right"), "{}", refused.text);
+        assert!(refused.text.contains("The current password is wrong"), "{}", refused.text);
     }
     let page = send(&service, &first, &Method::GET, "/account", FORM, "").await;
     assert!(page.text.contains("name=\"present\""), "{}", page.text);

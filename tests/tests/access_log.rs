@@ -270,7 +270,11 @@ async fn corrected_height_and_mass_reach_new_studies_only() {
     let page = format!("/subjects/{subject}/correct");
     assert_eq!(send(&service, &admin, &Method::POST, &page, FORM, form).await.status, StatusCode::SEE_OTHER);
     let twice = send(&service, &admin, &Method::POST, &page, FORM, form).await;
-    assert!(twice.status == StatusCode::CONFLICT && twice.text.contains("corrected since"), "{}", twice.text);
+    assert!(
+        twice.status == StatusCode::CONFLICT && twice.text.contains("corrected after this form was loaded"),
+        "{}",
+        twice.text
+    );
     let page = fetch(format!("/subjects/{subject}")).await.text;
     assert!(page.contains("misread the scale") && page.contains("1.76 m"), "{page}");
     let trail = fetch("/api/v1/audit?limit=1".to_owned()).await;

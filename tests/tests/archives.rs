@@ -509,7 +509,7 @@ async fn rows_without_their_gait_are_counted_and_rows_that_are_not_their_hash_ar
     let from = other.fetch(&format!("/api/v1/studies/{study}/imports")).await.items();
     let converged = other.trials(study).await.iter().filter(|trial| trial.gait_rmse_rad.is_some()).count();
     assert_eq!(from[0]["unchecked_rmse"], json!(converged));
-    assert!(other.fetch(&format!("/studies/{study}")).await.text.contains("could not be computed anew"));
+    assert!(other.fetch(&format!("/studies/{study}")).await.text.contains("could not be computed again"));
     other.stop().await;
 
     let start = file.iter().position(|byte| *byte == b'\n').unwrap() + 1;

@@ -225,7 +225,7 @@ async fn a_pair_that_is_asked_again_looks_like_a_new_one_even_where_others_answe
         };
         let again = get(&service, &rater, &path).await;
         let saved = get(&service, &rater, &format!("/rate?saved={token}")).await;
-        let saved = saved.text.split_once("Recorded ").unwrap().1.split_once("UTC").unwrap().1;
+        let saved = saved.text.split_once("Saved ").unwrap().1.split_once("UTC").unwrap().1;
         let saved = saved.split_once("</div>").unwrap().0.replace(token, "TOKEN");
         looks.insert(format!(
             "{:?} {:?} {:?} {:?} {:?}",
@@ -266,6 +266,6 @@ async fn taking_back_what_somebody_else_took_back_is_no_matter_of_its_kind() {
     let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{token}/take-back"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
     let page = get(&service, &rater, back.headers["location"].to_str().unwrap()).await;
-    assert!(page.text.contains("was taken back"), "{}", page.text);
+    assert!(page.text.contains("was retracted"), "{}", page.text);
     service.stop().await;
 }

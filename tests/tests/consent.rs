@@ -193,7 +193,7 @@ async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
     let running = service.study(|new| new.trial_budget = 50).await;
     let page = format!("/subjects/{}", service.subject().await);
     let list = service.fetch("/subjects").await;
-    assert!(list.text.contains(&page) && list.text.contains("nothing written down"), "{}", list.text);
+    assert!(list.text.contains(&page) && list.text.contains("not on record"), "{}", list.text);
     assert!(service.fetch(&page).await.text.contains("No consent on record"));
     let send = async |act: &str, body: &str| {
         service.post_text(&format!("{page}/{act}"), "application/x-www-form-urlencoded", body).await
@@ -203,7 +203,7 @@ async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
     assert_eq!(send("consent", "form=version+3&after=0").await.status, StatusCode::SEE_OTHER);
     let twice = send("consent", "form=version+3&after=0").await;
     assert_eq!(twice.status, StatusCode::CONFLICT);
-    assert!(twice.text.contains("since this form was shown") && twice.text.matches("version 3</td>").count() == 1);
+    assert!(twice.text.contains("after this form was loaded") && twice.text.matches("version 3</td>").count() == 1);
 
     assert_eq!(send("withdraw", "reason=+").await.status, StatusCode::UNPROCESSABLE_ENTITY);
     assert_eq!(send("withdraw", "reason=moved+away").await.status, StatusCode::SEE_OTHER);

@@ -74,7 +74,7 @@ async fn when_a_study_has_ended_every_trial_without_a_gait_is_explained_in_order
     let coming = service.fetch(&format!("/api/v1/jobs/explanation-{}", last.id)).await;
     assert_eq!(coming.json()["state"], "queued", "{}", coming.text);
     let page = service.fetch(&format!("/trials/{}", last.id)).await.text;
-    assert!(page.contains("is found out after other trials of this study") && page.contains("/explain\""), "{page}");
+    assert!(page.contains("is queued behind those of other trials") && page.contains("/explain\""), "{page}");
 
     let found = explained(&service, last.id).await;
     let expected: Vec<String> = trials.iter().map(|trial| format!("trial {}", trial.id)).collect();
@@ -96,7 +96,7 @@ async fn when_a_study_has_ended_every_trial_without_a_gait_is_explained_in_order
     assert!(!page.contains("/explain\""), "there is nothing to ask for any more");
 
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    let reason = format!("a5 (swing-foot clearance) alone, relaxed, gives one in {0} of {0} trials", trials.len());
+    let reason = format!("Relaxing a5 (swing-foot clearance) alone gives a gait in {0} of {0} explained", trials.len());
     assert!(page.contains(&reason) && page.contains(&format!("/trials/{}#explanation", trials[0].id)), "{page}");
     service.stop().await;
 }
@@ -112,7 +112,7 @@ async fn an_explanation_is_made_once_for_whoever_asks() {
     let trial = without_gait(&service, study).await[0].id;
     assert_eq!(service.fetch(&address(trial)).await.status, StatusCode::NOT_FOUND, "nobody asked");
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
-    assert!(page.contains("Find out which bound must give way"), "{page}");
+    assert!(page.contains("Find out which bounds conflict"), "{page}");
 
     let keyed = || {
         let request = Request::post(address(trial)).header("idempotency-key", "one").body(Body::from("{}")).unwrap();
@@ -178,7 +178,7 @@ async fn what_was_asked_for_is_taken_up_by_the_next_process() {
     }
     until("one is begun", async || counts.begun.load(Ordering::SeqCst) == 1).await;
     let page = service.fetch(&format!("/trials/{}", trials[1].id)).await.text;
-    assert!(page.contains("Being explained") && page.contains("explanation.mjs"), "{page}");
+    assert!(page.contains("solves this trial again with relaxed bounds") && page.contains("explanation.mjs"), "{page}");
     service.stop().await;
     until("it is cancelled", async || counts.cancelled.load(Ordering::SeqCst) == 1).await;
 
@@ -230,7 +230,7 @@ async fn what_cannot_be_explained_is_said_and_not_tried_again() {
         refused.text
     );
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
-    assert!(page.contains("cannot be found out") && page.contains("panicked"), "{page}");
+    assert!(page.contains("This trial cannot be explained") && page.contains("panicked"), "{page}");
     assert_eq!(counts.begun.load(Ordering::SeqCst), 2, "each once");
     let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     assert_eq!(told.iter().filter(|event| event.kind == "trial_not_explained").count(), 2);

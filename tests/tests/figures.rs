@@ -65,7 +65,7 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
         (format!("/trials/{}", gaits[0].id), 1 + 6 + 2 + 6 + 6 + 2 + 7 + 1),
         (format!("/lab-sessions/{session}"), 6 + 2),
         (format!("/studies/{}/belief?right=a5&down=a6", studies[0]), 8 + 2),
-        (format!("/references/{}", service.reference().await), 5),
+        (format!("/reference-gaits/{}", service.reference().await), 5),
     ] {
         let shown = service.fetch(&page).await;
         assert_eq!(shown.status, StatusCode::OK, "{}", shown.text);
@@ -114,7 +114,7 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
         assert_eq!(service.fetch(&path).await.status, StatusCode::NOT_FOUND, "{unknown}");
     }
     let nonsense = service.fetch(&format!("/studies/{}/figures?other=x", studies[0])).await;
-    assert!(nonsense.status == StatusCode::UNPROCESSABLE_ENTITY && nonsense.text.contains("a study of the list"));
+    assert!(nonsense.status == StatusCode::UNPROCESSABLE_ENTITY && nonsense.text.contains("a study from the list"));
     service.stop().await;
 }
 
@@ -137,8 +137,11 @@ async fn a_reference_of_several_strides_has_its_band_and_one_without_says_so() {
         let trial = service.trials(study).await.into_iter().find(|t| t.state == TrialState::Converged).unwrap().id;
         for page in [format!("/studies/{study}/figures"), format!("/trials/{trial}")] {
             let page = service.fetch(&page).await.text;
-            assert_eq!(page.contains("The band is one standard deviation of the reference over its strides."), band);
-            assert_eq!(page.contains("without a standard deviation: there is no band to draw"), !band);
+            assert_eq!(
+                page.contains("The band is one standard deviation of the reference gait over its strides."),
+                band
+            );
+            assert_eq!(page.contains("has no standard deviation, so there is no band"), !band);
             assert_eq!(page.matches("</i>one standard deviation").count(), if band { 5 } else { 0 }, "{page}");
         }
         let ankle = linked(&service.fetch(&format!("/studies/{study}/figures")).await.text, "left-ankle.csv").remove(0);

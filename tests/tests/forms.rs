@@ -142,15 +142,15 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
     };
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     for (field, value, says) in [
-        ("muscles", "maybe", "allowed: on, off"),
-        ("muscles", "", "allowed: on, off"),
-        ("feedback_mode", "both", "allowed: automatic, human, mixed"),
-        ("trial_budget", "-1", "allowed: 1 to 10000"),
-        ("parallel_trials", "1.5", "allowed: 1 to 64"),
-        ("seed", "-1", "allowed: 0 to 9007199254740991"),
-        ("basin_within_percent", "101", "within, % is \"101\"; it must be 0 to 100, or nothing"),
-        ("basin_within_percent", "all", "allowed: 0 to 100, or nothing"),
-        ("subject", "paper-1", "a subject of the list"),
+        ("muscles", "maybe", "it must be on, off"),
+        ("muscles", "", "it must be on, off"),
+        ("feedback_mode", "both", "it must be automatic, human, mixed"),
+        ("trial_budget", "-1", "it must be 1 to 10000"),
+        ("parallel_trials", "1.5", "it must be 1 to 64"),
+        ("seed", "-1", "it must be 0 to 9007199254740991"),
+        ("basin_within_percent", "101", "Objective tolerance, % is \"101\"; it must be 0 to 100, or empty"),
+        ("basin_within_percent", "all", "it must be 0 to 100, or empty"),
+        ("subject", "paper-1", "a subject from the list"),
         ("pseudonym", "S09", "A new subject"),
         ("height_m", "1.8", "A new subject"),
     ] {
@@ -189,7 +189,7 @@ async fn an_answer_is_taken_back_in_its_own_study_only() {
     // What was said is struck through, why it was taken back is not.
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     let struck = page.split("class=\"retracted\">").nth(1).unwrap().split("</span>").next().unwrap();
-    assert!(struck.contains("trial") && !struck.contains("typo") && page.contains("taken back: typo"));
+    assert!(struck.contains("trial") && !struck.contains("typo") && page.contains("retracted: typo"));
     service.stop().await;
 }
 
@@ -208,8 +208,8 @@ async fn a_form_that_is_sent_again_with_another_answer_says_which_one_counts() {
     let same = send("a", "K").await;
     assert_eq!((same.status, &same.headers["location"]), (StatusCode::SEE_OTHER, &first.headers["location"]));
     let other = send("b", "K").await;
-    is_page(&other, StatusCode::CONFLICT, "this second one was not taken");
-    assert!(other.text.contains("Recorded") && other.text.contains(" over "), "the stored answer is shown");
+    is_page(&other, StatusCode::CONFLICT, "this one was not saved");
+    assert!(other.text.contains("Saved") && other.text.contains(" is better than "), "the stored answer is shown");
     assert!(other.text.contains("value=\"b\" checked") && other.text.contains("firm</textarea>"), "{}", other.text);
     assert_eq!(service.feedback(study).await.len(), before + 1);
     service.stop().await;
@@ -233,7 +233,7 @@ async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retrac
     for (pair, answer, number) in [(&ahead, "b", 2), (&turned, "a", 3), (&ahead, "cannot_tell", 4), (&ahead, "b", 2)] {
         let second = send(pair, answer, number).await;
         is_page(&second, StatusCode::CONFLICT, "in another tab or window");
-        assert!(second.text.contains("Recorded") && second.text.contains(" over "), "{}", second.text);
+        assert!(second.text.contains("Saved") && second.text.contains(" is better than "), "{}", second.text);
     }
     let rest = json!({"trial_a": b, "trial_b": a, "answer": "no_difference", "author": "K"});
     let rest = service.post(&format!("/api/v1/studies/{study}/preferences"), &rest).await;
@@ -266,7 +266,7 @@ async fn who_answers_what_another_has_answered_is_told_so() {
     let body = format!("a={a}&b={b}&answer=no_difference&source=clinician&author=L&note=&key={UNKNOWN}");
     let sent = service.post_text(&format!("/studies/{study}/compare"), FORM, &body).await;
     let page = service.fetch(sent.headers["location"].to_str().unwrap()).await.text;
-    assert!(page.contains("S01 has answered this comparison too: trial") && page.contains("K has answered"), "{page}");
+    assert!(page.contains("S01 also answered this comparison: trial") && page.contains("K also answered"), "{page}");
     service.stop().await;
 }
 
@@ -288,14 +288,10 @@ async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
         assert!(refused.text.contains(kept), "{kept}");
     }
     let none = format!("a={a}&b={b}&source=clinician&author=K&note=&key={UNKNOWN}");
-    is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "choose one");
+    is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "one of a, b");
     let itself = format!("a={a}&b={a}&answer=b&source=clinician&author=K&note=&key={UNKNOWN}");
     is_page(&service.post_text(&path, FORM, &itself).await, unprocessable, "compared with itself");
-    is_page(
-        &service.fetch(&format!("{path}?a={a}&b={a}")).await,
-        StatusCode::OK,
-        "were the same: choose two different",
-    );
+    is_page(&service.fetch(&format!("{path}?a={a}&b={a}")).await, StatusCode::OK, "are the same. Choose two different");
     is_page(&service.fetch(&format!("{path}?a={a}&b={UNKNOWN}")).await, unprocessable, UNKNOWN);
     let (_, other, _) = finished(&service).await;
     is_page(&service.fetch(&format!("{path}?a={other}&b={b}")).await, unprocessable, "a trial of this study");
@@ -482,7 +478,11 @@ async fn a_study_that_has_ended_gets_more_trials_from_its_page() {
     let path = format!("/studies/{study}/do");
     let same = service.post_text(&path, FORM, "act=extend&trial_budget=5").await;
     is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "trial_budget");
-    is_page(&service.post_text(&path, FORM, "act=extend").await, StatusCode::UNPROCESSABLE_ENTITY, "how many trials");
+    is_page(
+        &service.post_text(&path, FORM, "act=extend").await,
+        StatusCode::UNPROCESSABLE_ENTITY,
+        "total number of trials",
+    );
     assert_eq!(service.post_text(&path, FORM, "act=extend&trial_budget=7").await.status, StatusCode::SEE_OTHER);
     service.wait_for_trials(study, 7).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -492,7 +492,7 @@ async fn a_study_that_has_ended_gets_more_trials_from_its_page() {
 #[tokio::test]
 async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_field() {
     let (_folder, service) = service().await;
-    let send = async |body: &str| service.post_text("/people", FORM, body).await;
+    let send = async |body: &str| service.post_text("/users", FORM, body).await;
     assert!(send("act=add_user&name=K1&role=clinician").await.status.is_success());
     let taken = send("act=add_user&name=K1&role=admin").await;
     is_page(&taken, StatusCode::CONFLICT, "there is a user");
@@ -504,7 +504,7 @@ async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_f
         assert!(taken.text.contains(kept), "{kept}: {}", taken.text);
     }
     let refused = send("act=make_token&name=treadmill&days=soon&run=on").await;
-    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Ends after, days: \u{201c}soon\u{201d} is not accepted");
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Expires after, days is \u{201c}soon\u{201d}; it must be");
     for kept in ["value=\"treadmill\"", "value=\"soon\"", "name=\"run\" checked"] {
         assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
     }
@@ -512,6 +512,6 @@ async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_f
     assert_eq!(refused.text.matches("aria-invalid").count(), 1);
     assert!(!refused.text.contains("gait_"), "no secret");
     let nothing = send("act=make_token&name=treadmill&days=").await;
-    is_page(&nothing, StatusCode::UNPROCESSABLE_ENTITY, "What it allows: needed is some of");
+    is_page(&nothing, StatusCode::UNPROCESSABLE_ENTITY, "Scopes must be one or more of");
     service.stop().await;
 }

@@ -227,19 +227,26 @@ async fn every_guide_is_served_with_images_and_links_that_work() {
     service.stop().await;
 }
 
-/// Pages link to entries of the glossary by the anchors of its headings.
+/// Pages link to sections of the guides by the anchors of their headings.
 #[test]
-fn every_link_of_a_page_to_the_glossary_has_its_entry() {
-    let glossary = anchors(&std::fs::read_to_string(repository().join("docs/glossary.md")).unwrap());
-    let mut linked = 0;
+fn every_link_of_a_page_to_a_guide_has_its_section() {
+    let (mut linked, mut sections) = (BTreeSet::new(), 0);
     for template in std::fs::read_dir(repository().join("web/templates")).unwrap() {
         let template = template.unwrap().path();
         let text = std::fs::read_to_string(&template).unwrap();
-        for entry in text.split("/help/glossary#").skip(1) {
-            let entry = entry.split('"').next().unwrap();
-            linked += 1;
-            assert!(glossary.contains(entry), "{}: {entry}", template.display());
+        for target in text.split("href=\"/help/").skip(1).map(|rest| rest.split('"').next().unwrap()) {
+            let (guide, section) = target.split_once('#').unwrap_or((target, ""));
+            if guide.contains('{') {
+                continue;
+            }
+            let guide_text = std::fs::read_to_string(repository().join(format!("docs/{guide}.md"))).unwrap();
+            assert!(section.is_empty() || anchors(&guide_text).contains(section), "{}: {target}", template.display());
+            sections += u32::from(!section.is_empty());
+            linked.insert(guide.to_owned());
         }
     }
-    assert!(linked > 15, "{linked}");
+    assert!(sections > 15, "{sections}");
+    for guide in ["clinician", "rater", "lab-session", "lab-script", "administrator", "glossary"] {
+        assert!(linked.contains(guide), "no page links to the guide {guide}");
+    }
 }

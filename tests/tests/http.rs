@@ -260,7 +260,7 @@ async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_ef
             let saved = service.post_text(&path, "application/x-www-form-urlencoded", &form).await;
             assert_eq!(saved.status, StatusCode::SEE_OTHER, "{}", saved.text);
             let page = service.fetch(saved.headers["location"].to_str().unwrap()).await;
-            assert!(page.text.contains("Recorded"), "the answer is read back");
+            assert!(page.text.contains("Saved"), "the answer is read back");
         } else {
             let body = json!({"trial_a": newest, "trial_b": before, "answer": "a", "author": "K"});
             let path = format!("/api/v1/studies/{study}/preferences");
@@ -481,7 +481,7 @@ async fn whoever_listens_to_a_study_that_has_ended_is_told_so_and_hears_when_it_
     let mut heard = stream_of(&service, study, None).await;
     let first = heard().await;
     assert!(
-        first.contains("event: study_state") && first.contains("finished") && first.contains("all 2 trials"),
+        first.contains("event: study_state") && first.contains("finished") && first.contains("All 2 trials"),
         "{first}"
     );
     let extended = service.post(&format!("{path}/extend"), &json!({"trial_budget": 3})).await;

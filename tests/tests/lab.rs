@@ -268,7 +268,7 @@ async fn a_walk_that_was_unsafe_closes_both_gaits_until_the_order_says_which() {
         let mut closed = Vec::new();
         for gait in &gaits[..2] {
             let page = service.fetch(&format!("/trials/{}", gait.id)).await.text;
-            closed.push(page.contains("do not walk with it"));
+            closed.push(page.contains("Do not walk with it"));
         }
         closed
     };
@@ -303,7 +303,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     for (two, expected) in [
         (foreign, "a trial of this study"),
         (no_gait, "Only a converged gait can be walked"),
-        (gaits[0].id, "another gait than gait_one"),
+        (gaits[0].id, "a different gait"),
     ] {
         let refused = service.post(&path, &json!({"gait_one": gaits[0].id, "gait_two": two})).await;
         assert_eq!(refused.json()["field"], "gait_two");
@@ -313,7 +313,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     let refused = service.post_text(&form, FORM, &format!("gait_one={}&gait_two=x&notes=level", gaits[0].id)).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
     assert!(
-        refused.text.contains("a gait of the list") && refused.text.contains(">level</textarea>"),
+        refused.text.contains("a gait from the list") && refused.text.contains(">level</textarea>"),
         "{}",
         refused.text
     );
@@ -323,7 +323,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     let made = service.post_text(&form, FORM, &body).await;
     let page = made.headers["location"].to_str().unwrap().to_owned();
     let shown = service.fetch(&page).await.text;
-    assert!(shown.contains("one of the two gaits: blinded") && shown.contains("without the device"), "{shown}");
+    assert!(shown.contains("one of the two gaits (blinded)") && shown.contains("without the device"), "{shown}");
     let lab = page.replace("lab-sessions", "lab");
     assert_eq!(service.post_text(&lab, FORM, "walk=1&note=").await.status, StatusCode::SEE_OTHER);
     assert!(service.fetch(&format!("{lab}/next-walk")).await.text.contains("Walk 2"));
@@ -331,7 +331,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     let again = service.post_text(&format!("{page}/close"), FORM, "note=").await;
     assert!(again.status == StatusCode::CONFLICT && again.text.contains("the session is closed"), "{}", again.text);
     assert_eq!(service.post_text(&format!("{page}/unblind"), FORM, "note=over").await.status, StatusCode::SEE_OTHER);
-    assert!(!service.fetch(&page).await.text.contains("one of the two gaits: blinded"));
+    assert!(!service.fetch(&page).await.text.contains("one of the two gaits (blinded)"));
     service.stop().await;
 }
 
@@ -442,7 +442,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
     );
     let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
     assert!(page.contains("EMG, left tibialis anterior") && page.contains("low-pass 3 Hz, order 2"), "{page}");
-    assert!(page.contains("means of 5 strides (without the device), 5 strides (walk 2)"), "{page}");
+    assert!(page.contains("Means of 5 strides (without the device), 5 strides (walk 2)"), "{page}");
     assert!(page.contains("EMG RMSE, walk 2"), "{page}");
     service.stop().await;
 }

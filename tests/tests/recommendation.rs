@@ -91,8 +91,10 @@ async fn nothing_is_recommended_silently_whose_certificate_failed() {
     assert_eq!((&failed["objections"], &failed["passing"]), (&json!(["the simulated walker falls"]), &Value::Null));
     let shown = service.fetch(&page).await.text;
     assert!(shown.contains("This gait failed its") && shown.contains("the simulated walker falls"), "{shown}");
-    assert!(shown.contains("The next best gait without a certificate"), "{shown}");
-    assert!(service.fetch(&format!("/trials/{best}")).await.text.contains("read why before it is walked with"));
+    assert!(shown.contains("The next best gait has no certificate"), "{shown}");
+    assert!(
+        service.fetch(&format!("/trials/{best}")).await.text.contains("Read the reasons before anyone walks with it")
+    );
     let table = service.fetch(&format!("/api/v1/studies/{study}/recommendation.csv")).await.text;
     assert!(table.starts_with("bound,value,unit,limits,certificate_of_the_gait\n"), "{table}");
     assert_eq!(table.matches(",failed\n").count(), 8, "{table}");

@@ -49,11 +49,11 @@ async fn a_recording_becomes_the_reference_of_a_study() {
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0).id;
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
-    assert!(page.contains(&format!("<a href=\"/references/{id}\">near</a>")), "{page}");
+    assert!(page.contains(&format!("<a href=\"/reference-gaits/{id}\">near</a>")), "{page}");
 
-    let list = service.fetch(&format!("/references?subject={subject}")).await.text;
+    let list = service.fetch(&format!("/reference-gaits?subject={subject}")).await.text;
     assert!(list.find(">near</a>").unwrap() < list.find(">far</a>").unwrap());
-    let page = service.fetch(&format!("/references/{id}")).await.text;
+    let page = service.fetch(&format!("/reference-gaits/{id}")).await.text;
     assert!(
         page.contains("Right hip") && page.contains("</i>one standard deviation") && page.contains("<svg"),
         "{page}"
@@ -99,11 +99,11 @@ async fn the_form_imports_and_comes_back_as_it_was_typed() {
         let recording = recording.replace('\n', "%0D%0A").replace(',', "%2C");
         format!("name=S03%2C+level&form=csv&strikes=kinematics&height_m={height}&body_mass_kg=&recording={recording}")
     };
-    let refused = service.post_text("/references", kind, &form(&recording(), "tall")).await;
+    let refused = service.post_text("/reference-gaits", kind, &form(&recording(), "tall")).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
     assert!(refused.text.contains("height_m: &#34;tall&#34;") || refused.text.contains("tall"), "{}", refused.text);
     assert!(refused.text.contains("value=\"S03, level\"") && refused.text.contains("0.050000,0.6"), "as it was typed");
-    let imported = service.post_text("/references", kind, &form(&recording(), "")).await;
+    let imported = service.post_text("/reference-gaits", kind, &form(&recording(), "")).await;
     assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
     let page = service.fetch(imported.headers["location"].to_str().unwrap()).await;
     assert!(page.status == StatusCode::OK && page.text.contains("S03, level"), "{}", page.text);
@@ -115,10 +115,10 @@ async fn the_form_imports_and_comes_back_as_it_was_typed() {
     }
     let encoded = |text: &str| text.replace('\n', "%0D%0A").replace('\t', "%09");
     let with = |forces: &str| form(&recording(), "").replace("kinematics", "force") + "&forces=" + &encoded(forces);
-    let refused = service.post_text("/references", kind, &with("not a file")).await;
+    let refused = service.post_text("/reference-gaits", kind, &with("not a file")).await;
     assert!(refused.text.contains("forces, line 1: the line &#34;endheader&#34; is missing"), "{}", refused.text);
     assert!(refused.text.contains(">not a file</textarea>") && refused.text.contains("<details open>"), "as typed");
-    let imported = service.post_text("/references", kind, &with(&forces)).await;
+    let imported = service.post_text("/reference-gaits", kind, &with(&forces)).await;
     assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
     let page = service.fetch(imported.headers["location"].to_str().unwrap()).await.text;
     assert!(
@@ -191,8 +191,16 @@ async fn a_new_study_takes_the_reference_gait_nearest_to_its_subject() {
         let checked = service.post_text("/studies/new/check", kind, &body).await.json();
         let shown = text(&checked["reference"]);
         let is_nearest = body.ends_with('=');
-        assert_eq!(shown.contains(&format!("{}: the nearest", text(&reference["name"]))), is_nearest, "{checked}");
-        assert_eq!(shown.contains("Nearer to the subject in height and body mass: far"), !is_nearest, "{checked}");
+        assert_eq!(
+            shown.contains(&format!("{}: nearest to the subject", text(&reference["name"]))),
+            is_nearest,
+            "{checked}"
+        );
+        assert_eq!(
+            shown.contains("is nearer to the subject in height and body mass than this one"),
+            !is_nearest,
+            "{checked}"
+        );
     }
     let made = service.post_text("/studies/new", kind, &tall).await;
     let study = made.headers["location"].to_str().unwrap().rsplit('/').next().unwrap().parse().unwrap();

@@ -36,7 +36,7 @@ async fn decide(service: &Service, trial: impl std::fmt::Display, decision: &Val
 }
 
 async fn waits_at_home(service: &Service) -> bool {
-    service.fetch("/").await.text.contains("a gait was called unsafe: review it")
+    service.fetch("/").await.text.contains("1 gait reported as unsafe")
 }
 
 #[tokio::test]
@@ -50,7 +50,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     assert_eq!((&said[0]["stands"], &said[0]["review"]), (&json!(true), &Value::Null));
     let gait = said[0]["trial_id"].as_str().unwrap().to_owned();
     let page = service.fetch(&format!("/trials/{gait}")).await.text;
-    assert!(page.contains("do not walk with it") && page.contains("May this gait be walked with again?"), "{page}");
+    assert!(page.contains("Do not walk with it") && page.contains("Safety review"), "{page}");
     assert!(waits_at_home(&service).await);
 
     // It stays unsafe: nobody needs to look again, and it can still be lifted.
@@ -59,7 +59,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     assert_eq!((stays.status, &stays.json()["verdict"]), (StatusCode::OK, &json!("unsafe")));
     assert!(!waits_at_home(&service).await);
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
-    assert!(shown.contains("K1 looked at it and leaves it so: <q>the knee buckles</q>"), "{shown}");
+    assert!(shown.contains("K1 reviewed the report and kept the gait unsafe: <q>the knee buckles</q>"), "{shown}");
     let heard = service.feedback(study).await;
     assert!(heard.iter().all(|row| row.retraction.is_none()));
 
@@ -68,7 +68,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     let said = safety_reports(&service, study).await;
     assert_eq!((&said[0]["stands"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
-    assert!(!shown.contains("do not walk with it") && shown.contains("lets it be walked with again"), "{shown}");
+    assert!(!shown.contains("Do not walk with it") && shown.contains("cleared the gait for walking"), "{shown}");
     // The rater's answer stands as it was given; that the other gait is better was never said.
     let mut reader = service.store.read().await.unwrap();
     // On which side it was shown is drawn anew each time; the record has it as said of the pair.
@@ -129,7 +129,7 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
         "what the analytic solver gives is no gait, but that is all"
     );
     let study_page = service.fetch(&format!("/studies/{study}")).await.text;
-    assert!(study_page.contains("may be walked with again, K2: tried slowly"), "{study_page}");
+    assert!(study_page.contains("cleared for walking by K2: tried slowly"), "{study_page}");
     let twice = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r"})).await;
     assert_eq!(twice.status, StatusCode::CONFLICT);
     for (decision, field) in [

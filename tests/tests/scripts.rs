@@ -49,7 +49,7 @@ async fn a_script_asks_and_tells_until_the_study_is_finished_and_twice_gives_the
     let first = script_study(&service, 8, 1).await;
     let done = run(&service, first, "rig", 8).await;
     let finished = service.wait_for(first, &[StudyState::Finished]).await;
-    assert!(finished.state_reason.contains("all 8 trials"));
+    assert!(finished.state_reason.contains("All 8 trials"));
     let feedback = service.feedback(first).await;
     assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "convergence").count(), 8);
     assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "gait_rmse").count(), 7);
@@ -170,9 +170,9 @@ async fn time_and_a_settled_best_end_a_study() {
     let timed = service.study(|new| (new.trial_budget, new.solve_seconds_budget) = (400, Some(1.0))).await;
     let settled = service.study(|new| (new.trial_budget, new.unchanged_limit) = (400, Some(6))).await;
     let settled = service.wait_for(settled, &[StudyState::Finished]).await;
-    assert!(settled.state_reason.contains("stayed the same over 6 results"), "{}", settled.state_reason);
+    assert!(settled.state_reason.contains("did not change in 6 results"), "{}", settled.state_reason);
     let timed = service.wait_for(timed, &[StudyState::Finished]).await;
-    assert!(timed.state_reason.contains("of 1 s"), "{}", timed.state_reason);
+    assert!(timed.state_reason.contains("of the 1 s"), "{}", timed.state_reason);
     let trials = service.trials(timed.id).await.len();
     assert!((100..=101).contains(&trials), "{trials}");
     service.stop().await;

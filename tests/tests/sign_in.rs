@@ -169,7 +169,7 @@ async fn thirty_thousand_attempts_are_visible_with_their_number() {
     let (_folder, service) = service().await;
     let admin = signed_in(&service, Role::Admin).await;
     abort_attempts(&service, "192.0.2.66", (0..30_000).map(|_| "admin".to_owned())).await;
-    let page = send(&service, &admin, &Method::GET, "/people", "", "").await.text;
+    let page = send(&service, &admin, &Method::GET, "/users", "", "").await.text;
     assert!(page.contains("192.0.2.66") && page.contains("30000"), "{page}");
     let noted = trail(&service, "session.wait").await;
     assert_eq!(noted[0].detail["failed_attempts_of_network"], 20_000);
@@ -250,8 +250,8 @@ async fn role_changes_hold_from_the_next_request_and_are_audited() {
     assert_eq!((done, &changed["role"]), (StatusCode::OK, &json!("clinician")));
     assert_eq!(send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status, StatusCode::OK);
     let form = format!("act=role&id={ada}&role=rater");
-    let page = send(&service, &admin, &Method::POST, "/people", FORM, &form).await;
-    assert!(page.status == StatusCode::OK && page.text.contains("Ada is rater"), "{}", page.text);
+    let page = send(&service, &admin, &Method::POST, "/users", FORM, &form).await;
+    assert!(page.status == StatusCode::OK && page.text.contains("Ada now has the role rater"), "{}", page.text);
     assert_eq!(
         send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status,
         StatusCode::FORBIDDEN
@@ -358,8 +358,8 @@ async fn sessions_are_listed_and_ended_one_by_one() {
         [StatusCode::OK, StatusCode::UNAUTHORIZED]
     );
     let form = format!("act=end_session&id={desk_id}");
-    let page = send(&service, &admin, &Method::POST, "/people", FORM, &form).await;
-    assert!(page.text.contains("A session of Ada was ended"), "{}", page.text);
+    let page = send(&service, &admin, &Method::POST, "/users", FORM, &form).await;
+    assert!(page.text.contains("Ended a session of Ada"), "{}", page.text);
     assert_eq!(status(&service, &desk).await, StatusCode::UNAUTHORIZED);
     assert_eq!(list(admin.clone()).await.len(), 1);
     assert_eq!(trail(&service, "session.end").await.len(), 2);

@@ -108,7 +108,7 @@ impl Closed {
 /// What the whole service shares: it reveals no study.
 const SHARED: [&str; 6] = ["subjects", "devices", "reference-gaits", "users", "tokens", "sessions"];
 /// The same of pages.
-const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "references"];
+const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "reference-gaits"];
 
 /// Every operation of the description and every page that names something of a study: method, address with placeholders,
 /// and the start that says what it names.
@@ -215,7 +215,8 @@ async fn lists_show_a_restricted_study_to_its_members_alone() {
     let mut lists: Vec<String> =
         document["paths"].as_object().unwrap().keys().filter(|path| !path.contains('{')).cloned().collect();
     lists.extend(
-        ["/", "/studies/compare", "/subjects", "/rate", "/lab", "/devices", "/references", "/system"].map(Into::into),
+        ["/", "/studies/compare", "/subjects", "/rate", "/lab", "/devices", "/reference-gaits", "/system"]
+            .map(Into::into),
     );
     lists.extend([format!("/subjects/{subject}"), format!("/studies/{open}/figures")]);
     let secrets = [NAME.to_owned(), closed.study.to_string(), closed.study.short(), closed.names["lab"].clone()];

@@ -277,7 +277,7 @@ async fn a_trial_whose_workers_are_never_heard_of_again_is_lost_and_can_be_tried
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0);
     assert_eq!(trial.state, TrialState::Lost);
-    assert!(trial.message.contains("not heard of again"), "{}", trial.message);
+    assert!(trial.message.contains("lease of its worker ended"), "{}", trial.message);
     assert!(service.feedback(study).await.is_empty(), "what was lost is no result");
 
     let path = format!("/api/v1/studies/{study}/extend");

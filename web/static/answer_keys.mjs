@@ -1,6 +1,6 @@
 // @ts-check
-// Keys 1, 2 and 3 choose an answer, in the order in which the answers stand. They can be turned off (WCAG 2.1.4); that is kept
-// in this browser. Without this script no key is promised.
+// Keys 1, 2 and 3 choose the answers in their order. The user can turn them off (WCAG 2.1.4), and the browser remembers that.
+// Without this script the page does not mention the keys.
 
 const OFF = "answer keys off";
 const form = /** @type {HTMLFormElement | null} */ (document.querySelector("form[data-answer]"));
@@ -23,7 +23,7 @@ if (form && choice && box) {
   document.addEventListener("keydown", (event) => {
     const place = ["1", "2", "3"].indexOf(event.key);
     if (place < 0 || !box.checked || event.ctrlKey || event.altKey || event.metaKey) return;
-    // A key belongs to the field that has the focus; an answer may be changed with it.
+    // A focused field keeps its keys, except the choice of an answer.
     const field = /** @type {Element} */ (event.target).closest("input, select, textarea, button");
     if (field && field.getAttribute("name") !== "answer") return;
     const answer = /** @type {HTMLInputElement} */ (form.querySelectorAll(".verdict input")[place]);

@@ -1,4 +1,4 @@
-// Sends the requests of the REST reference from its forms.
+// Sends the requests of the REST reference page.
 
 for (const form of document.querySelectorAll("form[data-path]")) {
   form.addEventListener("submit", async (event) => {
@@ -25,7 +25,7 @@ for (const form of document.querySelectorAll("form[data-path]")) {
     try {
       const tail = query.toString() ? `?${query}` : "";
       if (address.endsWith("/events")) {
-        answer.textContent = `a stream: curl -N ${location.origin}${address}${tail}`;
+        answer.textContent = `Event stream. Follow it with: curl -N ${location.origin}${address}${tail}`;
         return;
       }
       const reply = await fetch(address + tail, { method, headers, body });
@@ -34,7 +34,7 @@ for (const form of document.querySelectorAll("form[data-path]")) {
       try {
         shown = JSON.stringify(JSON.parse(text), null, 2);
       } catch {
-        // Not JSON: shown as it is.
+        // Not JSON: shown unchanged.
       }
       answer.textContent = `${reply.status} ${reply.statusText}\n${shown.slice(0, 20000)}`;
     } catch (error) {

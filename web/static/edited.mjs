@@ -1,5 +1,5 @@
 // @ts-check
-// What somebody is typing is never overwritten by what a page brings anew.
+// Whether the user is editing a part of the page, so that an update must not overwrite it.
 
 const FIELDS = "input:not([type=hidden]), select, textarea";
 

@@ -1,6 +1,5 @@
 // @ts-check
-// Brings the explanation of a trial without a gait to its page as soon as it is made. Without this script it is there after a
-// reload.
+// Loads the explanation of a trial without a gait as soon as it exists. Without this script a reload shows it.
 
 const section = /** @type {HTMLElement | null} */ (document.getElementById("explanation"));
 

@@ -1,5 +1,5 @@
 // @ts-check
-// The animated stick figure of a gait, or of two on one clock. Positions come from the server; here they are only drawn.
+// The animated stick figure of a gait, or of two on one clock. The server computes the positions.
 
 import { mayMove, showStrips } from "./strips.mjs";
 import { Clocks } from "./two_clocks.mjs";
@@ -195,7 +195,7 @@ class Scene {
 }
 
 /** Where two are side by side. */
-const PACES = `<label>Side by side <select data-pace><option value="share" selected>by share of the cycle</option>
+const PACES = `<label>Synchronise <select data-pace><option value="share" selected>by gait cycle</option>
   <option value="time">by time</option></select></label>`;
 
 /** Plays scenes on one clock: gaits of different length at the same share of their cycles, or each in its own time. */
@@ -291,6 +291,6 @@ for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelector
   Promise.all(canvases.map(async (canvas) => new Scene(canvas, await load(canvas.dataset.trial))))
     .then((scenes) => new Player(box, scenes))
     .catch((error) => {
-      box.textContent = `The animation could not be loaded (${error.message}).`;
+      box.textContent = `The animation cannot be loaded (${error.message}). Reload the page to try again.`;
     });
 }

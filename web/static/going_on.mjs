@@ -1,6 +1,6 @@
 // @ts-check
-// After an answer: loads the page again when the study has got further, so that the next comparison comes by itself. Where
-// something is being typed, it offers that instead.
+// After an answer: reloads the page when the study changes, to show the next comparison. If the user is typing, it offers a link
+// instead.
 
 import { holdsEdits } from "./edited.mjs";
 
@@ -15,7 +15,7 @@ if (place) {
     }
     const link = document.createElement("a");
     link.href = location.href;
-    link.textContent = "Load this page again";
-    place.replaceChildren("The study has got further. ", link, ": what you are typing here is not kept then.");
+    link.textContent = "Reload this page";
+    place.replaceChildren("The next comparison may be ready. ", link, "; what you typed here will be lost.");
   });
 }

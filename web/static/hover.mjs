@@ -1,6 +1,6 @@
 // @ts-check
-// Says the values of the nearest point of a line chart beside the pointer or finger. They are read from the drawing, to a tenth of
-// its units: the CSV beside each figure has them as they are, and serves those who use no pointer.
+// Shows the values of the nearest point of a line chart beside the pointer or finger. They are read from the drawing, to a tenth
+// of its units. The CSV file of each figure has the exact values, also for users without a pointer.
 
 /** How far from a point the pointer may be, in units of the drawing. */
 const REACH = 60;

@@ -1,7 +1,7 @@
 // @ts-check
-// Sends the form of an answer and stays on the page when the service cannot be reached. What is chosen and written is kept in
-// this tab until the service has it: over a reload, a lost connection, signing in again. The key of the form is kept, too, so
-// what is sent twice counts once. Without this script the form is sent as any other.
+// Sends the form of an answer and stays on the page if the service cannot be reached. The tab keeps the entry until the service
+// has it: across reloads, lost connections and sign-ins. It keeps the idempotency key of the form as well, so an answer that is
+// sent twice counts once. Without this script the browser sends the form.
 
 const PREFIX = "answer ";
 const form = /** @type {HTMLFormElement | null} */ (document.querySelector("form[data-answer]"));
@@ -31,13 +31,13 @@ if (form) {
     const reply = await fetch(form.action, { method: "POST", body: new URLSearchParams(fields()) }).catch(() => null);
     sending = false;
     if (!reply || reply.status >= 500) {
-      notice.textContent = "There is no connection to the service: nothing was stored, as far as can be told from here. What you chose and wrote stays; send it again when the service is back. It counts once.";
+      notice.textContent = "The service cannot be reached. Your answer may not have been saved. This page keeps it: send it again when the service is back. It counts only once.";
       notice.hidden = false;
-      save.textContent = "Send it again";
+      save.textContent = "Send again";
       return;
     }
     if (reply.status !== 401) sessionStorage.removeItem(key);
-    // A refusal is a page of its own: sent once more as a form, the same answer leads to it.
+    // A refusal has its own page; the browser gets there by sending the form.
     if (reply.redirected && reply.ok) location.assign(reply.url);
     else form.submit();
   });

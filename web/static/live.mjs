@@ -1,24 +1,24 @@
 // @ts-check
-// Keeps a study page current: recorded events bring the parts that changed from the server, iterations those of a running
-// solve. Sorting and filtering the trials changes the address and brings the table alone.
-// Without this script the page is right after a reload, and sorting and filtering load it anew.
+// Keeps a study page current: recorded events load the changed parts of the page, and iterations load those of a running solve.
+// Sorting and filtering the trials changes the address and loads only the table.
+// Without this script the page is current after a reload, and sorting and filtering reload it.
 
 import { holdsEdits } from "./edited.mjs";
 
 const live = /** @type {HTMLElement | null} */ (document.getElementById("live"));
 
-/** Shortest time between two looks at a running solve, ms. */
+/** Shortest time between two updates of a running solve, ms. */
 const PAUSE = 500;
-/** Time before listening anew to a service that could not answer, ms. */
+/** Time before reconnecting to a service that could not answer, ms. */
 const AGAIN = 3000;
-/** What is recorded of a study and changes its page. */
+/** Recorded events that change the page of a study. */
 const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_certified", "trial_explained"];
 
-/** @type {(node: Node) => string} What a folded part is called. */
+/** @type {(node: Node) => string} The summary of a folded part. */
 const titleOf = (node) => (node instanceof HTMLDetailsElement ? (node.querySelector("summary")?.textContent ?? "") : "");
 
 /**
- * Replaces what is in a part, but for what is folded in it and being edited: that stays where it is, as it was typed.
+ * Replaces the contents of a part, except folded sections that the user is editing.
  * @param {HTMLElement} part
  * @param {Element} next
  */
@@ -35,7 +35,7 @@ function replace(part, next) {
 }
 
 /**
- * Replaces what changed and leaves the rest, its focus and its scroll position alone.
+ * Replaces the parts that changed and keeps focus and scroll position.
  * @param {HTMLElement} shown
  * @param {Document} fresh
  */
@@ -69,7 +69,7 @@ if (live) {
   let pending = false;
   let again = false;
 
-  /** Brings what changed; asked for meanwhile, once more afterwards. */
+  /** Loads the changed parts; a request that arrives meanwhile is served afterwards. */
   const refresh = async () => {
     if (pending) {
       again = true;
@@ -83,10 +83,10 @@ if (live) {
         last = state();
         announced.textContent = `The study is now: ${last}.`;
       }
-      // The subject withdrew: what is on this page is not shown any more.
+      // The subject withdrew consent: the page shows nothing of the study any more.
       if (answer.status === 409) location.reload();
     } catch {
-      // The connection is lost: the stream of events comes back by itself and brings what was missed.
+      // The connection is lost. The event stream reconnects by itself and delivers the missed events.
     } finally {
       pending = false;
       if (again) {
@@ -123,7 +123,7 @@ if (live) {
     filtered();
   });
 
-  /** @type {Map<string, number>} When each running solve was last looked at. */
+  /** @type {Map<string, number>} When each running solve was last updated. */
   const looked = new Map();
   /** @param {MessageEvent} event */
   const follow = async (event) => {
@@ -140,7 +140,7 @@ if (live) {
     }
   };
 
-  /** Listens, and says when there is nothing to be heard: what is shown was true when the service was last heard of. */
+  /** Listens to events, and shows since when there is no connection. */
   const listen = () => {
     const source = new EventSource(`/api/v1/studies/${study}/events?after=${after}`);
     for (const kind of RECORDED) {
@@ -157,12 +157,12 @@ if (live) {
       void refresh();
     });
     source.addEventListener("error", () => {
-      // A browser tries again by itself, but not when the service answered that it cannot.
+      // The browser reconnects by itself, except after an error status.
       if (source.readyState === EventSource.CLOSED) setTimeout(listen, AGAIN);
       if (!connection.hidden) return;
       // In UTC, like every other time on these pages.
       const since = new Date().toISOString().slice(11, 16);
-      connection.textContent = `No connection to the service since ${since} UTC: trying again.`;
+      connection.textContent = `No connection to the service since ${since} UTC. Retrying.`;
       connection.hidden = false;
       live.classList.add("stale");
     });

@@ -1,10 +1,10 @@
 // @ts-check
-// Asks the service about the form while it is being filled in. What is refused here would be refused when sent, too;
-// without this script it is said then.
+// Checks the form with the service while it is being filled in, by the same rules as on sending. Without this script the form is
+// checked only on sending.
 
 const form = /** @type {HTMLFormElement | null} */ (document.querySelector("form[data-check]"));
 
-/** Time without typing before the service is asked, ms. */
+/** Time without typing before the form is checked, ms. */
 const PAUSE = 350;
 
 if (form) {
@@ -19,9 +19,9 @@ if (form) {
     const body = new URLSearchParams();
     for (const [name, value] of new FormData(form)) body.append(name, String(value));
     const answer = await fetch("/studies/new/check", { method: "POST", body }).catch(() => null);
-    // A later question has its own answer.
+    // A later check has its own answer.
     if (turn !== asked) return;
-    if (answer?.status === 401) outlook.textContent = "You are not signed in any more: what you send is kept until you have signed in again.";
+    if (answer?.status === 401) outlook.textContent = "You are no longer signed in. If you send the form, it is kept until you have signed in again.";
     if (!answer?.ok) return;
     const { field, text, reference } = await answer.json();
     for (const input of form.querySelectorAll("[aria-invalid]")) {
@@ -46,7 +46,7 @@ if (form) {
     clearTimeout(timer);
     timer = window.setTimeout(() => void check(), PAUSE);
   });
-  // A new subject is described where it is chosen.
+  // The fields of a new subject unfold when it is chosen.
   const subject = /** @type {HTMLSelectElement} */ (form.elements.namedItem("subject"));
   const description = form.querySelector("details[data-new-subject]");
   subject.addEventListener("change", () => description?.toggleAttribute("open", subject.value === "new"));

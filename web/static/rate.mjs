@@ -1,6 +1,5 @@
 // @ts-check
-// Two motions on one clock, both at the same share of their strides or each in its own time. Scale and colours are the same;
-// positions come from the server.
+// Two motions, synchronised by gait cycle or by time, with the same scale and colours. The server computes the positions.
 
 import { mayMove, showStrips } from "./strips.mjs";
 import { Clocks } from "./two_clocks.mjs";
@@ -91,7 +90,7 @@ if (box) {
     };
     /** @param {number} now */
     const step = (now) => {
-      // The first frame may be of a moment before the motion was there.
+      // The first frame can be from before the motion was loaded.
       if (playing) clocks.at += (Math.max(now - last, 0) / 1000) * Number(speed.value);
       last = now;
       show();
@@ -113,11 +112,11 @@ if (box) {
     });
     pace.addEventListener("change", () => clocks.keep(/** @type {import("./two_clocks.mjs").Pace} */ (pace.value)));
     const took = /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms"));
-    // Before the form is read to be sent.
+    // Runs before the form data are collected.
     form.addEventListener("submit", () => (took.value = String(Math.round(performance.now() - begun))), { capture: true });
     save.disabled = false;
     state.textContent = "";
   } catch (error) {
-    state.textContent = "The gaits could not be loaded: reload the page before you answer.";
+    state.textContent = "The gaits cannot be loaded. Reload the page before you answer.";
   }
 }

@@ -1,5 +1,5 @@
 // @ts-check
-// Who wants no motion sees strides as pictures, like those without scripts, and starts the motion when it is wanted.
+// With reduced motion, strides are shown as pictures, as without scripts, until the user starts the animation.
 
 /** Whether things may move by themselves. */
 export const mayMove = () => !matchMedia("(prefers-reduced-motion: reduce)").matches;

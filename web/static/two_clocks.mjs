@@ -1,5 +1,5 @@
 // @ts-check
-// How far each of several strides is, by one clock: all at the same share of their cycles, or each in its own time.
+// How far each of several strides is by one clock: at the same share of the gait cycle, or by time.
 
 /** @typedef {"share" | "time"} Pace */
 
@@ -35,7 +35,7 @@ export class Clocks {
   }
 
   set place(share) {
-    // The end of a round is the beginning of the next: its last moment stands for it.
+    // The end of a cycle is the start of the next one, so its last instant is used.
     this.at = Math.min(share, 0.9999) * this.round;
   }
 

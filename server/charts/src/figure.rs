@@ -167,7 +167,7 @@ fn tiles_csv(figures: &[StickFigure]) -> CsvTable {
 
 fn map_csv(map: &HeatMap) -> CsvTable {
     let (columns, rows) = (&map.columns, &map.rows);
-    let mut table = CsvTable::new([rows.0.as_str(), &columns.0, &map.title, "beside it"]);
+    let mut table = CsvTable::new([rows.0.as_str(), &columns.0, &map.title, "note"]);
     for (row, cells) in rows.1.iter().zip(&map.cells) {
         for (column, value) in columns.1.iter().zip(cells) {
             table.row(cells![row, column, value.value, &value.below]);
@@ -232,7 +232,7 @@ mod tests {
         assert!(svg.contains(".chart.map .value") && svg.contains("fill-opacity") && !svg.contains("var(--"), "{svg}");
         resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default()).unwrap();
         let expected =
-            "\"a6: lean, rad\",\"a5: clearance, m\",Utility,beside it\n0.1,0,0.25,± 0.10\n0.1,0.013,-0.5,± 0.10\n";
+            "\"a6: lean, rad\",\"a5: clearance, m\",Utility,note\n0.1,0,0.25,± 0.10\n0.1,0.013,-0.5,± 0.10\n";
         assert_eq!(figure.csv(), expected);
     }
 

@@ -9,10 +9,10 @@ use gait_optimizer::{Gait, IterationRecord, ModelError, ReferenceGait};
 
 /// The phases of the stride, in their order, for either leg.
 pub const PHASES: [(&str, &str); 4] = [
-    ("DS2", "double support: the heel of the leading foot and the toe of the trailing foot are down"),
-    ("DS3", "double support: the leading foot is flat, the toe of the trailing foot is still down"),
-    ("SS2", "single support on the flat foot, the other leg swings"),
-    ("SS1", "single support on the toe, until the other heel strikes"),
+    ("DS2", "double support: heel of the leading foot and toe of the trailing foot on the ground"),
+    ("DS3", "double support: leading foot flat, toe of the trailing foot still on the ground"),
+    ("SS2", "single support on the flat foot while the other leg swings"),
+    ("SS1", "single support on the toe until the other heel strikes"),
 ];
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
@@ -138,14 +138,10 @@ fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, ModelError> {
         cycle.over(|_| values.next().map_or(f64::NAN, value))
     };
     let velocity = Chart::new("Hip velocity", CYCLE, "velocity, m/s")
-        .with("of the linearised hip position", 0, Stroke::Solid, over(|point| point.hip_velocity_m_s))
-        .with("of the hip", 1, Stroke::Dashed, cycle.over(|point| point.qd[0]));
-    let phase = Chart::new("Phase", CYCLE, "share of the phase, 0 to 1").with(
-        "phase",
-        0,
-        Stroke::Solid,
-        over(|point| point.phase),
-    );
+        .with("linearised", 0, Stroke::Solid, over(|point| point.hip_velocity_m_s))
+        .with("hip", 1, Stroke::Dashed, cycle.over(|point| point.qd[0]));
+    let phase =
+        Chart::new("Phase", CYCLE, "phase variable, 0 to 1").with("phase", 0, Stroke::Solid, over(|point| point.phase));
     let charts = vec![cycle.marked(velocity), cycle.marked(phase)];
     let hint = "The phase is the hip's linearised place over the stance toe, from the planned start of a domain to its planned \
                 end; it takes the place of time. In all domains but SS1 its velocity is held constant.";
@@ -164,7 +160,7 @@ fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
     let mut charts: Vec<Chart> = ANGLES.iter().map(draw).collect();
     charts.push(cycle.marked(prosthesis));
     let hint = format!(
-        "Flexion, dorsiflexion and forward lean are positive. {} The prosthetic joints have no reference.",
+        "Flexion, dorsiflexion and forward lean are positive. {} The joints of the prosthesis have no reference.",
         band_in_words(reference)
     );
     Group::new("angles", "Joint angles", hint, charts)
@@ -183,7 +179,7 @@ fn forces(cycle: &Cycle<'_>) -> Group {
         cycle.marked(chart)
     };
     let charts = [("Ground force, vertical", 1), ("Ground force, forward", 0)].map(draw).into();
-    Group::new("forces", "Ground reaction forces", "Heel and toe together.", charts)
+    Group::new("forces", "Ground reaction forces", "Sum of heel and toe.", charts)
 }
 
 fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
@@ -201,7 +197,7 @@ fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
         cycle.marked(chart)
     };
     let charts = JOINTS.iter().enumerate().map(draw).collect();
-    let hint = "The right knee and ankle are driven by the prosthesis, the other joints by the person.";
+    let hint = "The prosthesis drives the right knee and ankle; the subject drives the other joints.";
     Group::new("torques", "Joint torques", hint, charts)
 }
 
@@ -231,7 +227,7 @@ fn portraits(cycle: &Cycle<'_>) -> Group {
         Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, cycle.orbit(q))
     };
     let charts = COORDINATES.iter().enumerate().map(draw).collect();
-    let hint = "Angle and its velocity over the stride: a closed curve repeats itself; a gap is an impact.";
+    let hint = "Joint angle and velocity over the stride. A closed curve is periodic; a gap is an impact.";
     Group::new("portraits", "Phase portraits", hint, charts)
 }
 
@@ -320,7 +316,7 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
         last = Some((r.guess, r.phase));
         let phase = phase_in_words(r.phase);
         let of_guess = several && r.phase != SolvePhase::InterNode;
-        let name = if of_guess { format!("guess {}: {phase}", r.guess + 1) } else { phase.to_owned() };
+        let name = if of_guess { format!("initial guess {}: {phase}", r.guess + 1) } else { phase.to_owned() };
         starts.push((i as f64, name));
     }
     starts
@@ -339,7 +335,7 @@ fn of_iterations(iterations: &[IterationRecord]) -> Chart {
     let line = |f: fn(&IterationRecord) -> f64| -> Vec<(f64, f64)> {
         iterations.iter().enumerate().map(|(i, r)| (i as f64, f(r))).collect()
     };
-    let mut chart = Chart::new("Objective, violation and barrier by iteration", "iteration", "scaled, without unit")
+    let mut chart = Chart::new("Objective, violation and barrier by iteration", "iteration", "scaled, no unit")
         .with("constraint violation", 0, Stroke::Solid, line(|r| r.constraint_violation))
         .with("dual infeasibility", 1, Stroke::Dashed, line(|r| r.dual_infeasibility))
         .with("barrier", 2, Stroke::Solid, line(|r| r.barrier))

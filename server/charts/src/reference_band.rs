@@ -26,8 +26,8 @@ pub fn over_reference(chart: Chart, reference: &ReferenceGait, column: usize) ->
 /// What is to be known of the band, in words.
 pub fn band_in_words(reference: &ReferenceGait) -> &'static str {
     if reference.standard_deviation_rad.is_some() {
-        "The band is one standard deviation of the reference over its strides."
+        "The band is one standard deviation of the reference gait over its strides."
     } else {
-        "The reference is one mean curve without a standard deviation: there is no band to draw."
+        "The reference gait has no standard deviation, so there is no band."
     }
 }

@@ -36,7 +36,7 @@ pub const NO_SUBJECT_DATA: [&str; 30] = [
     "/system",
     "/devices",
     "/devices/{id}",
-    "/people",
+    "/users",
     "/account",
     "/sign-in",
     "/sign-in/{link}",

@@ -170,7 +170,7 @@ async fn browser_staff_call_a_gait_unsafe_and_take_it_back() {
     compare.fill("#retract-author", "K1").await;
     compare.fill("#reason", "the wrong button").await;
     compare.click(".notice.good form button").await;
-    compare.wait_until("document.querySelector('.notice.good').innerText.includes('taken back')").await;
+    compare.wait_until("document.querySelector('.notice.good').innerText.includes('retracted')").await;
     page.wait_until("document.querySelector('[data-part=state] [role=alert]') === null").await;
     page.wait_until(&format!("document.querySelector('[data-part=best] a').innerText === '{best}'")).await;
     page.is_clean(&site.origin).await;
@@ -193,7 +193,7 @@ async fn browser_staff_look_at_what_was_called_unsafe_and_decide() {
 
     // From the home page to the decision.
     let page = browser.open(&site.at("/")).await;
-    assert!(page.text("main").await.contains("a gait was called unsafe: review it"));
+    assert!(page.text("main").await.contains("1 gait reported as unsafe"));
     page.click("#waits ~ ul a").await;
     page.wait_for("[data-part=state] [role=alert] a[href$='#safety-review']").await;
     page.click("[data-part=state] [role=alert] a[href$='#safety-review']").await;
@@ -203,7 +203,7 @@ async fn browser_staff_look_at_what_was_called_unsafe_and_decide() {
     page.fill("#reason", "walked slowly, with a harness").await;
     page.click("#safety-review button").await;
     page.wait_until("document.querySelector('#safety-review') === null").await;
-    assert!(page.text("main").await.contains("lets it be walked with again"));
+    assert!(page.text("main").await.contains("cleared the gait for walking"));
     assert_eq!(page.count("main [role=alert]").await, 0);
     watched.wait_until(&format!("document.querySelector('[data-part=best] a').innerText === '{best}'")).await;
     assert_eq!(watched.count(".trials .tag.bad").await, 0);

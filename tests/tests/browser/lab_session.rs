@@ -33,7 +33,7 @@ async fn browser_clicks_through_a_lab_session_from_the_plan_to_the_order() {
     page.click("form[action$='/lab'] button[type=submit]").await;
     page.wait_until("document.querySelector('h1').innerText === 'Lab session 1'").await;
     assert!(page.text("main").await.contains("treadmill, 1.1 m/s"));
-    assert_eq!(page.text("main table").await.matches("one of the two gaits: blinded").count(), 2);
+    assert_eq!(page.text("main table").await.matches("one of the two gaits (blinded)").count(), 2);
     assert_eq!(page.text(".heading .state").await, "planned");
     is_for_everybody(axe, &page, "planned").await;
     let at = page.address().await;
@@ -64,14 +64,15 @@ async fn browser_clicks_through_a_lab_session_from_the_plan_to_the_order() {
     }
     let main = page.text("main").await;
     assert!(
-        main.contains("softer at the heel") && main.contains("The study hears it when the session is unblinded"),
+        main.contains("softer at the heel")
+            && main.contains("The study uses this answer when the session is unblinded"),
         "{main}"
     );
     page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
     page.fill("#closing", "all walked").await;
     page.click("form[action$='/close'] button").await;
     page.wait_until("document.querySelector('.heading .state').innerText === 'closed'").await;
-    assert!(page.text("main table").await.contains("one of the two gaits: blinded"));
+    assert!(page.text("main table").await.contains("one of the two gaits (blinded)"));
     is_for_everybody(axe, &page, "closed").await;
     page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
     page.fill("#reason", "every walk was recorded").await;
@@ -87,7 +88,7 @@ async fn browser_clicks_through_a_lab_session_from_the_plan_to_the_order() {
     let number = |id| trials.iter().find(|trial| trial.id == id).unwrap().number;
     page.click(".crumbs a[href^='/studies/']").await;
     page.wait_for(".answers").await;
-    let expected = format!("trial {} over trial {}", number(third), number(second));
+    let expected = format!("trial {} is better than trial {}", number(third), number(second));
     assert!(page.text(".answers").await.contains(&expected), "{}", page.text(".answers").await);
     page.is_clean(&site.origin).await;
     browser.close().await;

@@ -43,10 +43,10 @@ async fn browser_rater_answers_with_the_mouse_and_takes_it_back() {
     page.click("input[value=second]").await;
     page.click("[data-answer] [type=submit]").await;
     page.wait_for(".notice.good").await;
-    assert!(page.text(".notice.good").await.contains("answer 1: second"));
+    assert!(page.text(".notice.good").await.contains("answer 1: the second gait is better"));
     assert_eq!(answers(&site, study).await.len(), 1);
     page.click(".notice.good button").await;
-    page.wait_until("document.querySelector('.notice.good').textContent.includes('taken back')").await;
+    page.wait_until("document.querySelector('.notice.good').textContent.includes('retracted')").await;
     assert!(answers(&site, study).await[0].retraction.is_some());
     // What was asked is open again.
     site.service.wait_for(study, &[StudyState::Waiting]).await;
@@ -167,8 +167,8 @@ async fn browser_rater_with_two_tabs_answers_once() {
         .await;
     }
     let told = other.text("main").await;
-    assert!(told.contains("was already answered") && told.contains("“first” counts"), "{told}");
-    assert_eq!(other.text("h1").await, "This was not taken");
+    assert!(told.contains("was already answered") && told.contains("“first”, counts"), "{told}");
+    assert_eq!(other.text("h1").await, "Answer not saved");
     other.click("main a.button[href='/rate']").await;
     other.wait_until("location.pathname === '/rate'").await;
     assert_eq!(answers(&site, study).await.len(), 1);
@@ -211,7 +211,7 @@ async fn browser_rater_keeps_choice_and_note_while_the_service_is_gone() {
         .restart(Analytic::default(), async |_| {
             page.run(save).await;
             page.wait_for("[data-unsent]:not([hidden])").await;
-            assert!(page.text("[data-unsent]").await.contains("nothing was stored"));
+            assert!(page.text("[data-unsent]").await.contains("may not have been saved"));
             assert_eq!(page.value(GIVEN).await, "second softer at the heel");
         })
         .await;
@@ -257,7 +257,7 @@ async fn browser_rater_takes_the_newest_answer_back_also_later() {
     assert_eq!(page.count("form[action$='/take-back']").await, 1);
     page.goto(&site.at("/rate")).await;
     page.click("form[action$='/take-back'] button").await;
-    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('taken back') ?? false").await;
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('retracted') ?? false").await;
     assert!(answers(&site, study).await[0].retraction.is_some());
     page.goto(&site.at("/rate")).await;
     assert_eq!(page.count("form[action$='/take-back']").await, 0, "once");

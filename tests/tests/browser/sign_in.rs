@@ -67,7 +67,7 @@ async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
     page.click("nav a[href='/system']").await;
     page.click("form[action='/system/backup'] button").await;
     page.wait_for(".notice.good code").await;
-    page.click("main a[href='/people']").await;
+    page.click("main a[href='/users']").await;
     page.wait_for("#user-name").await;
     page.fill("#user-name", "R1").await;
     page.click("button[value=add_user]").await;
@@ -131,7 +131,7 @@ async fn browser_sends_an_answer_after_the_session_has_ended() {
     page.forget_cookies().await;
     page.click("[data-answer] [type=submit]").await;
     page.wait_for("#password").await;
-    assert!(page.text("main").await.contains("nothing of what you sent was stored"));
+    assert!(page.text("main").await.contains("Your entry was not saved"));
     sign_in().await;
     page.wait_until("document.querySelector('h1').textContent === 'Send it now'").await;
     page.click("main form button").await;

@@ -21,7 +21,7 @@ async fn browser_from_nothing_to_a_finished_study_in_three_clicks() {
     page.wait_for("[data-trial]").await;
     page.wait_for("[data-part=state] .state.finished").await;
     page.wait_until("document.querySelectorAll('.trials tbody tr').length === 3").await;
-    assert!(!page.text("#trials").await.contains("None yet") && page.count("#trials form.filter").await == 1);
+    assert!(!page.text("#trials").await.contains("No trials yet") && page.count("#trials form.filter").await == 1);
     assert_eq!(page.count("[data-part=history] svg.chart").await, 1);
     // What is recommended can be taken along.
     let bounds = "document.querySelector('[data-part=best] a[download$=\".json\"]').getAttribute('href')";
@@ -312,7 +312,7 @@ async fn browser_says_that_the_service_is_gone_and_that_it_is_back() {
         .restart(Analytic::default(), async |_| {
             page.wait_for("[data-connection]:not([hidden])").await;
             let told = page.text("[data-connection]").await;
-            assert!(told.contains("trying again") && told.contains(" UTC"), "{told}");
+            assert!(told.contains("Retrying") && told.contains(" UTC"), "{told}");
             page.wait_for("#live.stale").await;
         })
         .await;

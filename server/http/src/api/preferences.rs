@@ -31,7 +31,7 @@ use utoipa::ToSchema;
 )]
 pub(super) async fn of_study(
     _: May<Read>,
-    State(mut app): State<AppState>,
+    State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     paging: Paging<i64>,
 ) -> Result<Json<Page<FeedbackRow>>, Refusal> {
@@ -53,7 +53,7 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn of_study_csv(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;

@@ -57,7 +57,7 @@ fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
 )]
 pub(super) async fn of_study(
     _: May<Read>,
-    State(mut app): State<AppState>,
+    State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     paging: Paging<u32, Filter>,
 ) -> Result<Json<Page<Trial>>, Refusal> {

@@ -1,4 +1,4 @@
-//! The access log: who saw or exported data of subjects, and who was refused.
+//! The page of the access log: who viewed or exported data of subjects, and who was refused.
 
 use super::error::{Page, page};
 use crate::AppState;
@@ -35,7 +35,7 @@ struct AccessLogPage {
 }
 
 impl AccessLogPage {
-    /// The rows before one, chosen in the same way.
+    /// The link to older rows with the same search.
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn before(&self, row: &i64) -> String {
         let subject = self.subject.as_ref().map(|(id, _)| ("subject", id.to_string()));

@@ -1,4 +1,4 @@
-//! The audit trail: who did what, and whether the chain of its rows is whole.
+//! The page of the audit trail, with the check of its hash chain.
 
 use super::error::{Page, page};
 use super::format::words;
@@ -14,13 +14,13 @@ use serde::Deserialize;
 /// Rows of a page.
 const PAGE: u32 = 100;
 
-/// Which rows, and whether to walk the chain.
+/// Which rows to show, and whether to verify the chain.
 #[derive(Debug, Deserialize)]
 pub(super) struct Choice {
     before: Option<i64>,
     #[serde(default)]
     verify: bool,
-    /// What the rows contain.
+    /// Text that the rows contain.
     #[serde(default)]
     contains: String,
 }
@@ -30,7 +30,7 @@ pub(super) struct Choice {
 struct AuditPage {
     rows: Vec<AuditRow>,
     older: Option<i64>,
-    verdict: Option<ChainCheck>,
+    checked: Option<ChainCheck>,
     contains: String,
 }
 
@@ -40,7 +40,7 @@ impl AuditPage {
         words(action).replacen('.', ": ", 1)
     }
 
-    /// `study 0190...` with the end of the identifier alone, which tells it apart.
+    /// `study 0190...` with only the end of the identifier, which differs most.
     fn short(object: &str) -> String {
         match object.rsplit_once('-') {
             Some((start, end)) if end.len() == 12 => {
@@ -50,14 +50,14 @@ impl AuditPage {
         }
     }
 
-    /// The rows before one, with the same words.
+    /// The link to older rows with the same search.
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn before(&self, row: &i64) -> String {
         let query = serde_urlencoded::to_string([("contains", self.contains.as_str())]).unwrap_or_default();
         format!("/audit?before={row}&{query}")
     }
 
-    /// `study 0190...` as a link, where there is a page for it.
+    /// The page of an object such as `study 0190...`, if there is one.
     fn link(row: &AuditRow) -> Option<String> {
         let (kind, id) = row.object.split_once(' ')?;
         let folder = match kind {
@@ -76,6 +76,6 @@ pub(super) async fn get(_: May<Administer>, State(app): State<AppState>, Params(
     let more = rows.len() > PAGE as usize;
     rows.truncate(PAGE as usize);
     let older = rows.last().filter(|_| more).map(|row| row.seq);
-    let verdict = if choice.verify { Some(audit::verify(&mut reader).await?) } else { None };
-    page(&AuditPage { rows, older, verdict, contains: choice.contains })
+    let checked = if choice.verify { Some(audit::verify(&mut reader).await?) } else { None };
+    page(&AuditPage { rows, older, checked, contains: choice.contains })
 }

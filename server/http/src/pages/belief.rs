@@ -139,7 +139,9 @@ enum Believed {
 
 async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
     let too_many = |what: String| {
-        Ok(Believed::Absent(format!("From {what} on the belief takes longer to compute than a page may.")))
+        Ok(Believed::Absent(format!(
+            "This page is not available from {what} on, because the computation takes too long."
+        )))
     };
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
@@ -150,7 +152,7 @@ async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
     drop(reader);
     let answers = snapshot.log().feedback.len();
     if answers == 0 {
-        let why = "Nothing was heard yet: the first result gives the learner something to believe.";
+        let why = "No results yet. The page appears with the first result.";
         return Ok(Believed::Absent(why.to_owned()));
     }
     if answers > MOST_ANSWERS {
@@ -207,7 +209,7 @@ fn chosen(space: &SearchSpace, choice: &Choice) -> Result<Option<(usize, usize)>
     };
     let (right, down) = (place("right", &choice.right, 0)?, place("down", &choice.down, 1)?);
     if right == down {
-        return Err(Error::invalid("down", names[down], &format!("another bound than {}", names[right])));
+        return Err(Error::invalid("down", names[down], &format!("a bound other than {}", names[right])));
     }
     Ok(Some((right, down)))
 }
@@ -292,8 +294,8 @@ fn maps(belief: &Belief, snapshot: &StudySnapshot, chosen: Option<(usize, usize)
 
 /// What stands below each map.
 const MAP_NOTES: [&str; 2] = [
-    "Mean and standard deviation. Framed: the best action tried.",
-    "Below: trials with these two values, whatever the others: converged, not converged.",
+    "Mean ± standard deviation. The frame marks the best action.",
+    "The small print counts the trials with these two values: yes, converged; no, not converged.",
 ];
 
 /// How many trials with these levels converged and how many did not.

@@ -1,33 +1,33 @@
-//! How near a gait comes to its bounds: which of them shape it.
+//! Which bounds a gait reaches.
 
 use super::format;
 use gait_optimizer::walking::kept_clearance_m;
 use gait_optimizer::{Gait, TunedBounds};
 use gaitwright_service::error::Error;
 
-/// A bound that is met to this share is said to be active.
+/// A bound is active if the gait reaches this share of it.
 const ACTIVE: f64 = 0.99;
-/// Places of the bounds that limit from below: hip velocity (a3) and clearance (a5).
+/// Indices of the bounds that limit from below: hip velocity (a3) and foot clearance (a5).
 const FROM_BELOW: [usize; 2] = [2, 4];
 
-/// One bound and what the gait makes of it.
+/// A bound, and the extreme value that the gait reaches.
 pub(super) struct BoundUse {
     pub(super) bound: format::Bound,
-    /// The extreme value of the gait; none where it is not measured here.
+    /// The extreme value of the gait; `None` if it is not computed.
     pub(super) reached: Option<String>,
     pub(super) active: bool,
 }
 
-/// The bounds of an action, and how near a gait comes to them.
+/// The bounds of an action, with the values that a gait reaches.
 ///
 /// # Errors
-/// When the gait's subject or device is invalid.
+/// If the gait's subject or device is invalid.
 pub(super) fn of(action: &TunedBounds, gait: Option<&Gait>) -> Result<Vec<BoundUse>, Error> {
     let extremes = gait.map(extremes).transpose()?.unwrap_or_default();
     let values = action.to_array();
     let with_use = |(place, bound): (usize, format::Bound)| {
         let reached = extremes[place];
-        // Missed counts as met: the gait is of a solve that did not converge, and this bound is a reason.
+        // A violated bound counts as active: the solve did not converge, and this bound is a reason.
         let value = values[place];
         let from_below = FROM_BELOW.contains(&place);
         let is_active = |reached: f64| if from_below { ACTIVE * reached <= value } else { reached >= ACTIVE * value };
@@ -36,7 +36,7 @@ pub(super) fn of(action: &TunedBounds, gait: Option<&Gait>) -> Result<Vec<BoundU
     Ok(format::bounds(action).into_iter().enumerate().map(with_use).collect())
 }
 
-/// The largest value of what each bound limits, the smallest where it limits from below.
+/// The largest value of each limited quantity, or the smallest for a bound from below.
 fn extremes(gait: &Gait) -> Result<[Option<f64>; 8], Error> {
     let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).reduce(f64::max);
     let angle = |places: &'static [usize]| {

@@ -1,4 +1,4 @@
-//! The certificate on a gait's page, and the button that asks for it.
+//! The certificate on the page of a gait, and the button that certifies it.
 
 use super::error::PageError;
 use super::format;
@@ -12,13 +12,13 @@ use gaitwright_service::access::Run;
 use gaitwright_service::studies::certification;
 use gaitwright_store::{TrialId, commit};
 
-/// A certificate in words.
+/// A certificate as the page shows it.
 pub(super) struct InWords {
-    /// Every check is within its limit, and the gait is stable.
+    /// Whether every check is within its limit and the gait is stable.
     pub(super) passed: bool,
-    /// Why not.
-    pub(super) objections: Vec<String>,
-    /// Figures of the closed loop: meaning and value.
+    /// Why it failed.
+    pub(super) failures: Vec<String>,
+    /// Figures of the closed loop: label and value.
     pub(super) figures: Vec<(&'static str, String)>,
     /// Every check.
     pub(super) checks: Vec<CheckInWords>,
@@ -31,29 +31,32 @@ impl InWords {
             figures.push(("Largest Poincaré multiplier", format::number(map.largest)));
             let (found, resolved) =
                 (format::number(map.largest_by_differences), format::number(map.differences_resolve));
-            figures.push(("The same by differences, and what they resolve", format!("{found} (to {resolved})")));
+            figures.push(("The same from finite differences (resolution)", format!("{found} ({resolved})")));
             let (kept, leak) = (format::number(map.speed_kept), format::number(map.speed_leak));
-            figures.push(("What a stride leaves of a change of speed, and elsewhere", format!("{kept}, {leak}")));
+            figures.push((
+                "Change of speed left after a stride: in speed, in other coordinates",
+                format!("{kept}, {leak}"),
+            ));
             let distance = format::number(map.fixed_point_distance);
-            figures.push(("From the gait to the periodic motion, rad, rad/s", distance));
+            figures.push(("Distance of the gait from the periodic motion, rad and rad/s", distance));
         }
         if let Some(free) = &certificate.free_hip_return_map {
-            let words = format!("{:.3} (by differences {:.3})", free.largest, free.largest_by_differences);
+            let words = format!("{:.3} (finite differences: {:.3})", free.largest, free.largest_by_differences);
             figures.push(("Multiplier of the zero dynamics (free hip velocity)", words));
         }
         if let Some(pushes) = certificate.pushes {
             let words = format!(
-                "{:.2} m/s forwards, {:.2} m/s backwards, within {RECOVERY_STRIDES} strides",
+                "{:.2} m/s forward, {:.2} m/s backward, within {RECOVERY_STRIDES} strides",
                 pushes.forwards_m_s, pushes.backwards_m_s
             );
-            figures.push(("Pushes at the hip that are recovered", words));
+            figures.push(("Pushes at the hip from which the walker recovers", words));
         }
         let checks = certificate.checks.into_iter().map(CheckInWords::new).collect();
-        Self { passed: certificate.passed, objections: certificate.objections, figures, checks }
+        Self { passed: certificate.passed, failures: certificate.objections, figures, checks }
     }
 }
 
-/// A check with its figures as people read them.
+/// A check with formatted figures.
 pub(super) struct CheckInWords {
     pub(super) name: String,
     pub(super) value: String,

@@ -1,8 +1,9 @@
-//! The form for a preference between two gaits of a study.
+//! The page on which staff and subjects compare two gaits of a study.
 
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::figures;
+use super::refusal;
 use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;
 use crate::extract::{Form, Params};
@@ -39,7 +40,7 @@ use serde::Deserialize;
 use std::fmt;
 use std::str::FromStr;
 
-/// Which gaits to offer, and what was just saved.
+/// The gaits to compare, and the answer that was just saved.
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct Choice {
     a: Option<TrialId>,
@@ -47,7 +48,7 @@ pub(super) struct Choice {
     saved: Option<Recorded>,
 }
 
-/// What an answer is in the record.
+/// The row of an answer in the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 enum Recorded {
@@ -82,19 +83,19 @@ const ASSESSMENT: &str = "assessment-";
 struct ComparePage {
     study: Study,
     trials: Vec<Offered>,
-    /// The two that are shown: identifier and number.
+    /// The gaits shown: identifier and number.
     a: Option<(TrialId, u32)>,
     b: Option<(TrialId, u32)>,
     charts: Vec<Drawn>,
-    /// Both strides as pictures, for those without scripts and without motion; empty: they cannot be drawn.
+    /// Both strides as pictures, for readers without scripts or with reduced motion; empty if they cannot be drawn.
     strides: Vec<String>,
     key: FeedbackId,
     saved: Option<Saved>,
-    /// The learner asks for a comparison.
+    /// Whether the study waits for an answer.
     waits: bool,
-    /// So many gaits can be chosen once they are certified.
+    /// How many gaits can be compared once they are certified.
     being_certified: usize,
-    /// The study goes on by itself: another gait is being computed, or will be at once.
+    /// Whether the study computes another gait.
     is_going_on: bool,
     last_event: i64,
     typed: Submitted,
@@ -102,12 +103,12 @@ struct ComparePage {
 }
 
 impl ComparePage {
-    /// What can be said besides a preference: value and words.
+    /// Answers that state no preference: value and label.
     const ASSESSMENTS: [(&str, &str); 4] = [
         ("cannot_tell", "Cannot tell"),
         ("unsafe_a", "Gait A is unsafe"),
         ("unsafe_b", "Gait B is unsafe"),
-        ("unsafe_both", "Both are unsafe"),
+        ("unsafe_both", "Both gaits are unsafe"),
     ];
 }
 
@@ -119,20 +120,20 @@ struct Offered {
     as_b: bool,
 }
 
-/// An answer as read back from the record.
+/// An answer, read from the record.
 struct Saved {
     id: Recorded,
     text: String,
     at: String,
     retracted: bool,
-    /// What others answered to the same comparison: who, and what.
+    /// Answers of others to the same comparison: author and text.
     other_answers: Vec<(String, String)>,
 }
 
-/// So many trials of a large study are offered.
+/// How many trials of a large study are offered.
 const OFFERED: u32 = 200;
 
-/// So many of the newest gaits without a certificate are certified because somebody wants to compare gaits.
+/// How many of the newest gaits without a certificate are certified when the page is opened.
 const CERTIFIED_AT_ONCE: usize = 10;
 
 /// `GET /studies/{id}/compare`.
@@ -142,13 +143,13 @@ pub(super) async fn get(
     Shown(id, _): Shown<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
-    // Who signed in need not say so again; whoever may see this page is of the staff, unless told otherwise.
+    // The default author is the signed-in user, and the default source is a clinician.
     let mut typed = Submitted::default();
     if may.caller.user.is_some() {
         (typed.author, typed.source) = (may.caller.name, Source::Clinician.as_str().to_owned());
     }
     if choice.a.is_some() && choice.a == choice.b {
-        let refused = "Gait A and gait B were the same: choose two different ones.".to_owned();
+        let refused = "Gait A and gait B are the same. Choose two different gaits.".to_owned();
         return Box::pin(show(&mut app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused))).await;
     }
     Box::pin(show(&mut app, id, choice, typed, None)).await
@@ -243,7 +244,7 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
     })
 }
 
-/// What the record holds; none when it speaks of trials that are not at hand.
+/// Reads an answer from the record; `None` if its trials are not in the snapshot.
 async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorded) -> Result<Option<Saved>, Error> {
     Ok(match saved {
         Recorded::Preference(id) => {
@@ -277,7 +278,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
     })
 }
 
-/// The form as typed, so that a refused one comes back as it was.
+/// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Submitted {
@@ -292,7 +293,7 @@ pub(super) struct Submitted {
     key: String,
 }
 
-/// What a form says.
+/// An answer as given in the form.
 enum Said {
     Preference(Answer),
     Assessment(NewAssessment),
@@ -327,14 +328,14 @@ impl Submitted {
             "unsafe_b" => assessment(presentations::Judgement::UnsafeSecond),
             "unsafe_both" => assessment(presentations::Judgement::UnsafeBoth),
             other => {
-                let allowed = "a, b, no_difference, cannot_tell, unsafe_a, unsafe_b, unsafe_both: choose one";
+                let allowed = "one of a, b, no_difference, cannot_tell, unsafe_a, unsafe_b, unsafe_both";
                 return Err(Error::invalid("answer", other, allowed));
             }
         };
         Ok((said, identifier("key", &self.key)?))
     }
 
-    /// What tells this answer from another one with the same key.
+    /// A digest that tells this answer from another one with the same key.
     fn fingerprint(&self, study: StudyId) -> String {
         let Self { a, b, answer, source, author, note, key } = self;
         let said = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
@@ -346,15 +347,25 @@ fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
     text.parse().map_err(|_| Error::invalid(field, text, "an identifier of this form"))
 }
 
-/// What became of a submitted form.
+/// The outcome of a submitted form.
 enum Given {
-    /// It is recorded, now or before.
+    /// The answer is recorded, now or before.
     Saved(Recorded),
-    /// The same form was sent before with another answer: that one is recorded.
+    /// The same form was sent before with another answer, which is the recorded one.
     Before(Recorded),
-    /// The same person has answered this comparison before: that answer is recorded.
+    /// The same author answered this comparison before; that answer is the recorded one.
     Elsewhere(Recorded),
 }
+
+/// The labels of the form.
+const LABELS: [(&str, &str); 6] = [
+    ("a", "Gait A"),
+    ("b", "Gait B"),
+    ("answer", "Answer"),
+    ("source", "Answer by"),
+    ("author", "Your name or code"),
+    ("note", "Note"),
+];
 
 /// `POST /studies/{id}/compare`.
 pub(super) async fn post(
@@ -368,18 +379,18 @@ pub(super) async fn post(
             return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")).into_response());
         }
         Ok(Given::Before(saved)) => {
-            let why = "This form was sent before with another answer. Recorded is the one above; this second one was \
-                       not taken. To change the answer, take the first one back and save again.";
+            let why = "This form was already sent with another answer, shown above. That answer counts; this one was not \
+                       saved. To change the answer, retract the first one and save again.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Ok(Given::Elsewhere(saved)) => {
-            let why = "You have answered this comparison already, perhaps in another tab or window. Your first answer is \
-                       shown above and counts; this one was not taken. To change your mind, retract the first answer \
-                       and save again.";
+            let why = "You have already answered this comparison, perhaps in another tab or window. Your first answer, shown \
+                       above, counts; this one was not saved. To change the answer, retract the first one and save \
+                       again.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            (None, Problem::from(&error).status(), error.to_string())
+            (None, Problem::from(&error).status(), refusal::of_form(&error, &LABELS))
         }
         Err(other) => return Err(other.into()),
     };
@@ -390,7 +401,7 @@ pub(super) async fn post(
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
     let (said, key) = form.read()?;
     let mut writer = app.write().await?;
-    // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
+    // The key of the form makes a repeated form (double click, reload, two tabs) count once.
     let key = format!("form {key}");
     let request = form.fingerprint(id);
     if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
@@ -398,7 +409,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
         let recorded = Recorded::try_from(before.body)?;
         return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
     }
-    // The door refuses a second answer; here the page shows the first one. A safety report is always taken.
+    // A second answer is refused, and the page shows the first one. A safety report is always accepted.
     if !said.is_about_safety()
         && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
     {
@@ -415,7 +426,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     Ok(Given::Saved(saved))
 }
 
-/// The answer of the same person to the same comparison that stands: it was given in another tab or elsewhere.
+/// The answer in force of the same author to the same comparison, given in another tab or elsewhere.
 async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitted) -> Result<Option<Recorded>, Error> {
     let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;
@@ -425,7 +436,7 @@ async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitte
     }))
 }
 
-/// Taking an answer back.
+/// The form to retract an answer.
 #[derive(Debug, Deserialize)]
 pub(super) struct Retract {
     saved: Recorded,

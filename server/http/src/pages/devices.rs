@@ -1,4 +1,4 @@
-//! Devices: the list, and each with the form that makes another one of it.
+//! The pages of devices: the list, and each device with the form to derive a new one.
 
 use super::error::{Page, PageError, page};
 use super::format;
@@ -30,7 +30,7 @@ pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Page {
     page(&DevicesPage { devices: devices::all(&mut *app.read().await?).await? })
 }
 
-/// What was typed, by the name of the field.
+/// The entries by field name.
 type Typed = BTreeMap<String, String>;
 
 #[derive(Template)]
@@ -64,7 +64,7 @@ impl DevicePage {
         Self { device, rows, name, carried_limb, may_run, refused: None }
     }
 
-    /// The form as it was typed.
+    /// The entries of a refused form.
     fn refusing(mut self, typed: &Typed, refused: FieldError) -> Self {
         for row in &mut self.rows {
             row.value = typed.get(row.field.name).cloned().unwrap_or_default();
@@ -112,7 +112,7 @@ pub(super) async fn post(
     }
 }
 
-/// The device with what was typed. A source says where a value comes from: it does not stay with another value.
+/// The device with the entries. A changed value loses its source, which belongs to the old value.
 fn changed(before: &Definition, typed: &Typed) -> Result<Definition, Error> {
     let known = |name: &str| Definition::FIELDS.iter().any(|field| field.name == name);
     if let Some((name, value)) =

@@ -9,7 +9,7 @@ use axum::response::{Html, IntoResponse, Redirect, Response};
 use gaitwright_service::access::Role;
 use gaitwright_service::error::Error;
 
-/// An error that is shown as a page.
+/// An error of a page handler.
 #[derive(Debug)]
 pub struct PageError(Error);
 
@@ -23,7 +23,7 @@ impl<E: Into<Error>> From<E> for PageError {
 #[template(path = "error.html")]
 struct ErrorPage {
     problem: Problem,
-    /// Whom it is shown to: nobody has no navigation, a rater has one of its own.
+    /// The reader's role decides the navigation; `None` shows none.
     to: Option<AnsweredTo>,
 }
 
@@ -32,12 +32,12 @@ impl IntoResponse for PageError {
         if matches!(self.0, Error::NotSignedIn(_)) {
             return Redirect::to("/sign-in").into_response();
         }
-        // `answers::complete` makes a page of it, with the navigation of whoever asked.
+        // `answers::complete` renders it with the navigation of the caller.
         Refusal(self.0).into_response()
     }
 }
 
-/// A problem as a page, with the navigation of whoever asked.
+/// Renders a problem as a page with the navigation of the caller.
 pub(crate) fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
     let status = problem.status();
     match (ErrorPage { problem, to }).render() {
@@ -46,28 +46,28 @@ pub(crate) fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
     }
 }
 
-/// A page.
+/// A rendered page, or the error to show.
 pub type Page = Result<Html<String>, PageError>;
 
 /// Renders a template.
 ///
 /// # Errors
-/// When the template fails.
+/// If the template fails.
 pub fn page(template: &impl Template) -> Page {
     Ok(Html(template.render().map_err(|e| Error::Internal(e.to_string()))?))
 }
 
-/// Any address that is no route.
+/// Handles addresses without a route.
 pub(crate) async fn no_such_page(uri: Uri) -> Refusal {
-    Refusal(Error::NotFound { what: "the address".to_owned(), id: uri.path().to_owned() })
+    Refusal(Error::NotFound { what: "the page".to_owned(), id: uri.path().to_owned() })
 }
 
-/// Any method that an address does not know.
+/// Handles methods that a route does not have.
 pub(crate) async fn no_such_method(method: Method, uri: Uri) -> Refusal {
     Refusal(Error::MethodNotAllowed { method: method.to_string(), path: uri.path().to_owned() })
 }
 
-/// Whether programs ask for what is there: they get problem documents, people get pages.
+/// Whether the address is for programs, which get problem documents instead of pages.
 pub fn is_for_programs(path: &str) -> bool {
     ["/api/", "/static/"].iter().any(|start| path.starts_with(start))
         || ["/health", "/ready", "/metrics"].contains(&path)

@@ -1,4 +1,4 @@
-//! Why there is no gait, on the page of a trial, and the button that asks for it.
+//! The explanation of a trial without a gait, on its page, and the button that requests it.
 
 use super::error::PageError;
 use super::format;
@@ -14,20 +14,20 @@ use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{TrialId, commit};
 
-/// Why there is no gait.
+/// Why a trial has no gait.
 pub(super) struct NoGait {
-    /// What the end of the solve says.
-    pub(super) verdict: &'static str,
-    /// What was found out, or where that stands.
+    /// What the end of the solve means.
+    pub(super) outcome: &'static str,
+    /// The explanation, or its progress.
     pub(super) state: ExplanationState,
-    /// The last event before that: what comes later brings the explanation.
+    /// The last event of the study so far; the page loads the explanation when a later one announces it.
     pub(super) last_event: i64,
 }
 
 impl NoGait {
-    /// None where there is a gait, or no solve of the program.
+    /// `None` if the trial has a gait or was not solved by the service.
     pub(super) fn new(trial: &Trial, state: ExplanationState, last_event: i64) -> Option<Self> {
-        Some(Self { verdict: trial.status.and_then(verdict)?, state, last_event })
+        Some(Self { outcome: trial.status.and_then(verdict)?, state, last_event })
     }
 
     pub(super) fn is_coming(&self) -> bool {
@@ -38,7 +38,7 @@ impl NoGait {
         matches!(self.state, ExplanationState::Waiting | ExplanationState::NotAsked)
     }
 
-    pub(super) fn missed_by(violation: &Violation) -> String {
+    pub(super) fn amount(violation: &Violation) -> String {
         format::number(violation.amount)
     }
 }

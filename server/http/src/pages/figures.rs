@@ -25,10 +25,10 @@ use gaitwright_store::{LabSessionId, Store, StudyId, TrialId, gaits, lab_session
 use serde::Deserialize;
 use std::sync::Arc;
 
-/// So many of the newest studies are offered for the second place.
+/// How many of the newest studies the form offers for comparison.
 const OFFERED: u32 = 200;
 
-/// Figures that belong together.
+/// A section of figures.
 #[derive(Debug)]
 pub(crate) struct Section {
     id: &'static str,
@@ -41,12 +41,12 @@ pub(crate) struct Section {
 #[derive(Debug)]
 pub(crate) struct StudyFigures {
     study: Study,
-    /// The best trial of the study, with its number.
+    /// The best trial of the study, and its number.
     best: Option<(TrialId, u32)>,
-    /// Those of the studies that have no gait to draw.
+    /// Names of the studies without a gait to draw.
     without_gait: Vec<String>,
     sections: Vec<Section>,
-    /// Warm-start tree: on the study's own page.
+    /// The warm-start tree, which the study page shows.
     tree: Option<Figure>,
 }
 
@@ -94,7 +94,7 @@ impl Best {
     }
 }
 
-/// The paper's figures of a study, with another one beside it where that is asked for.
+/// The paper's figures for a study, and optionally for a second one.
 ///
 /// # Errors
 /// A conflict when the subject of one of them withdrew, [`Error::NotFound`]; errors of the database.
@@ -130,32 +130,32 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
         Section {
             id: study::COURSE,
             heading: "Gait RMSE of the best action by iteration",
-            hint: "Figure 3b of the paper, with a study with muscles and one without.".to_owned(),
+            hint: "Figure 3b of the paper; there, a study with muscles and one without.".to_owned(),
             figures: charts(study::COURSE, study::course(&snapshots).into_iter().collect()),
         },
         Section {
             id: "angles",
             heading: "Joint angles of the best gait",
-            hint: format!("Figure 3c: over the reference gait. {}", band_in_words(reference)),
+            hint: format!("Figure 3c of the paper, with the reference gait. {}", band_in_words(reference)),
             figures: charts("angles", gait_charts::beside_reference(&gaits, reference)),
         },
         Section {
             id: "tiles",
             heading: "Gait tiles",
-            hint: "Figure 4: the stride of the best gait.".to_owned(),
+            hint: "Figure 4 of the paper: the stride of the best gait.".to_owned(),
             figures: tiles,
         },
         Section {
             id: "orbits",
             heading: "Limit cycles of the best gait",
-            hint: "Figure 5: angle and velocity over the stride. What was measured lies over it in the lab sessions."
+            hint: "Figure 5 of the paper: angle and velocity over the stride. The pages of lab sessions show measured limit cycles."
                 .to_owned(),
             figures: charts("orbits", gait_charts::orbits(&gaits)),
         },
     ])
 }
 
-/// Every figure of the page of a gait; while its solve runs, how far that is.
+/// Every figure of the page of a gait; while its solve runs, the solver progress.
 ///
 /// # Errors
 /// [`Error::NotFound`]; errors of the database.
@@ -203,7 +203,7 @@ pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Resul
     app.compute(draw).await?
 }
 
-/// Two gaits, each with the number of its trial, over the reference gait.
+/// The joint angles of two gaits, named by their trials, over the reference gait.
 pub(super) fn pair((a, gait_a): (u32, &Gait), (b, gait_b): (u32, &Gait), reference: &ReferenceGait) -> Vec<Figure> {
     let (a, b) = (format!("gait A, trial {a}"), format!("gait B, trial {b}"));
     let charts = gait_charts::beside_reference(&[(&a, gait_a), (&b, gait_b)], reference);
@@ -233,7 +233,7 @@ pub(crate) async fn of_session(app: &mut AppState, id: LabSessionId) -> Result<V
     Ok(app.compute(draw).await?)
 }
 
-/// The limit cycles of each walk, with its gait where that may be known.
+/// The limit cycles of each walk, with the orbit of its gait after unblinding.
 pub(super) async fn measured_cycles(
     store: &mut Store,
     id: LabSessionId,
@@ -265,10 +265,10 @@ impl FiguresPage {
     }
 }
 
-/// Which study beside it.
+/// The second study.
 #[derive(Debug, Deserialize)]
 pub(super) struct Beside {
-    /// Nothing is chosen: the form sends an empty one.
+    /// The form sends an empty value if no study is chosen.
     other: Option<String>,
 }
 
@@ -282,7 +282,7 @@ pub(super) async fn get(
     let other = match beside.other.as_deref() {
         None | Some("") => None,
         Some(text) => {
-            Some(text.parse::<Named<StudyId>>().map_err(|_| Error::invalid("other", text, "a study of the list"))?)
+            Some(text.parse::<Named<StudyId>>().map_err(|_| Error::invalid("other", text, "a study from the list"))?)
         }
     };
     let reach = may.caller.reach();

@@ -1,8 +1,10 @@
-//! Numbers as people read them.
+//! Numbers and names as pages show them.
 
 use gait_optimizer::TunedBounds;
 use gaitwright_charts::power_of_ten;
+use gaitwright_service::access::Role;
 use gaitwright_store::feedback::{FeedbackRow, Source};
+use gaitwright_store::lab_recordings::RecordingKind;
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::studies::FeedbackMode;
 
@@ -16,7 +18,7 @@ pub(super) fn seconds(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}"))
 }
 
-/// A duration as people say it.
+/// A rounded duration.
 pub(super) fn duration(seconds: f64) -> String {
     let minutes = seconds / 60.0;
     if seconds < 1.0 {
@@ -43,14 +45,14 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// At most three digits, and no nought at the end.
+/// At most three digits, without trailing zeros.
 fn significant(value: f64) -> String {
     let whole = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     let last = 10_f64.powf(2.0 - whole.min(2.0));
     ((value * last).round() / last).to_string()
 }
 
-/// With the sign that is as wide as a plus.
+/// With a minus sign that is as wide as a plus sign.
 fn minus(text: &str) -> String {
     text.replace('-', "\u{2212}")
 }
@@ -65,13 +67,13 @@ pub(super) fn optional_number(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), number)
 }
 
-/// A count with its thousands apart: `11 664`.
+/// A count with separated thousands: `11 664`.
 pub(super) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {
         if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            // Too narrow to break a line at.
+            // A narrow space that lines do not break at.
             text.push('\u{202f}');
         }
         text.push(digit);
@@ -98,12 +100,12 @@ pub(super) fn answers_by(mode: FeedbackMode) -> &'static str {
     }
 }
 
-/// What a study waits for besides its solves; empty: nothing.
+/// What a study waits for besides its solves; empty if it waits for solves only.
 pub(super) fn besides_solves(mode: FeedbackMode) -> &'static str {
-    if mode == FeedbackMode::Human { ", and the time people take to answer" } else { "" }
+    if mode == FeedbackMode::Human { ", plus the time that people need to answer" } else { "" }
 }
 
-/// What the person who walked said in a lab session: first is walk 2.
+/// The answer of the subject in a lab session; first is walk 2.
 pub(super) fn walks_in_words(said: Judgement) -> &'static str {
     match said {
         Judgement::First => "walk 2 was better, the first with the device",
@@ -113,28 +115,61 @@ pub(super) fn walks_in_words(said: Judgement) -> &'static str {
         Judgement::UnsafeFirst => "walk 2 was unsafe",
         Judgement::UnsafeSecond => "walk 3 was unsafe",
         Judgement::UnsafeBoth => "walk 2 and walk 3 were unsafe",
-        Judgement::Withdrawn => "taken back",
+        Judgement::Withdrawn => "retracted",
+    }
+}
+
+/// The answer of a rater about the two sides of a pair.
+pub(super) fn sides_in_words(answer: Judgement) -> &'static str {
+    match answer {
+        Judgement::First => "the first gait is better",
+        Judgement::Second => "the second gait is better",
+        Judgement::NoDifference => "no difference",
+        Judgement::CannotTell => "cannot tell",
+        Judgement::UnsafeFirst => "the first gait is unsafe",
+        Judgement::UnsafeSecond => "the second gait is unsafe",
+        Judgement::UnsafeBoth => "both gaits are unsafe",
+        Judgement::Withdrawn => "retracted",
     }
 }
 
 /// Where an answer comes from.
 pub(super) fn source(row: &FeedbackRow) -> &'static str {
-    // Raters may be anybody: what is known is whether they could know which gait is which.
+    // A rater need not be the subject or a clinician; known is only whether the answer is blind.
     match (row.by_rater, row.unblinded) {
         (true, false) => "a rater",
         (true, true) => "a rater, not blind",
-        (false, _) => person(row.source),
+        (false, _) => source_name(row.source),
     }
 }
 
-/// The same of what no rater said.
-pub(super) fn person(source: Source) -> &'static str {
+/// The source of an answer that no rater gave.
+pub(super) fn source_name(source: Source) -> &'static str {
     match source {
         Source::Convergence => "the solver",
         Source::GaitRmse => "Gait RMSE",
         Source::Subject => "the subject",
         Source::Clinician => "a clinician",
         Source::Script => "a script",
+    }
+}
+
+/// The name of a role.
+#[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+pub(super) fn role(role: &Role) -> &'static str {
+    match role {
+        Role::Admin => "administrator",
+        Role::Clinician => "clinician",
+        Role::Rater => "rater",
+    }
+}
+
+/// The kind of a measurement file.
+#[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+pub(super) fn file_kind(kind: &RecordingKind) -> &'static str {
+    match kind {
+        RecordingKind::Electromyogram => "EMG recording",
+        RecordingKind::Motion => "joint angles",
     }
 }
 
@@ -145,11 +180,11 @@ pub(super) fn percent(probability: f64) -> String {
 
 /// A number with two decimals and its sign.
 pub(super) fn signed(value: f64) -> String {
-    // No zero is written as -0.
+    // Zero has no minus sign.
     minus(&format!("{:+.2}", if value.abs() < 0.005 { 0.0 } else { value }))
 }
 
-/// What a bound limits, with its unit; empty for what is no bound.
+/// What a bound limits, with its unit; empty for any other name.
 pub(super) fn meaning(name: &str) -> &'static str {
     TunedBounds::NAMES.iter().position(|known| *known == name).map_or("", |place| TunedBounds::MEANINGS[place])
 }
@@ -182,7 +217,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_three_digits_and_few_noughts() {
+    fn numbers_have_three_digits_without_trailing_zeros() {
         let numbers = [0.0, 1.0, 0.012_345, -79.998, 1234.5, 2.46e-7, -3e-10, 1.5e8].map(number);
         assert_eq!(
             numbers,
@@ -191,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_have_their_thousands_apart() {
+    fn counts_have_separated_thousands() {
         assert_eq!([7, 999, 11_664, 1_000_000].map(count), ["7", "999", "11\u{202f}664", "1\u{202f}000\u{202f}000"]);
     }
 }

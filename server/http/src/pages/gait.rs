@@ -1,4 +1,4 @@
-//! A trial and its gait.
+//! The page of a trial and its gait.
 
 use super::bound_use::{self, BoundUse};
 use super::certificate;
@@ -44,16 +44,16 @@ struct GaitPage {
     solve: Option<Drawn>,
     /// The stride as a row of pictures.
     tiles: Option<Drawn>,
-    /// How near the gait comes to each bound.
+    /// Each bound with the value that the gait reaches.
     bounds: Vec<BoundUse>,
-    /// Why there is no gait.
+    /// Why the trial has no gait.
     no_gait: Option<NoGait>,
     phases: [(&'static str, &'static str); 4],
-    /// Who called it unsafe.
+    /// Safety reports in force.
     unsafe_by: Vec<Closed>,
-    /// Who did, until staff let it be walked with again.
+    /// Safety reports after which staff cleared the gait.
     lifted: Vec<Closed>,
-    /// Who may decide about that: the name, as far as it is known.
+    /// The name of a user who may review the reports.
     reviewer: Option<String>,
     trial: Trial,
 }
@@ -88,7 +88,7 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(i
     let explained = explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await?;
     let may_run = may.caller.may(Run::NEEDED);
     let reviews = may.caller.may(Answer::NEEDED);
-    // Who did not sign in has no name yet.
+    // Without sign-in the name is unknown.
     let reviewer = reviews.then(|| may.caller.user.map_or_else(String::new, |_| may.caller.name));
     drop(reader);
     let has_gait = gait.is_some();
@@ -126,7 +126,7 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(i
     })
 }
 
-/// Charts that belong together.
+/// A section of charts.
 struct Group {
     id: &'static str,
     heading: &'static str,
@@ -134,7 +134,7 @@ struct Group {
     charts: Vec<Drawn>,
 }
 
-/// What is computed from a gait: CPU work.
+/// Charts that are computed from the gait on the thread pool.
 struct Everything {
     groups: Vec<Group>,
     solve: Option<Drawn>,
@@ -172,15 +172,14 @@ fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
     let parts = ["torso", "left hip", "left knee", "left ankle", "right hip"];
     let parts: Vec<String> =
         parts.iter().zip(r.gait_rmse_parts_rad).map(|(name, value)| format!("{name} {value:.4}")).collect();
-    let rmse = (trial.state == TrialState::Converged)
-        .then(|| ("Gait RMSE is the sum over coordinates, rad", parts.join(", ")));
+    let rmse = (trial.state == TrialState::Converged).then(|| ("Gait RMSE by coordinate, rad", parts.join(", ")));
     let solved = [
         ("Walking speed, m/s", format!("{:.3}", r.speed_m_s)),
         ("Stride length, m", format!("{:.3}", r.stride_length_m)),
         ("Stride time, s", format!("{:.3}", r.durations_s.iter().sum::<f64>())),
-        ("Hip velocity in the four runs between impacts, m/s", r.vhip_m_s.map(|v| format!("{v:.3}")).join(", ")),
+        ("Hip velocity in the four intervals between impacts, m/s", r.vhip_m_s.map(|v| format!("{v:.3}")).join(", ")),
         (
-            "Size of the problem",
+            "Problem size",
             format!("{} variables, {} equalities, {} inequalities", r.variables, r.equalities, r.inequalities),
         ),
     ];

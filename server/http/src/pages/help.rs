@@ -17,14 +17,14 @@ use rust_embed::Embed;
 #[folder = "../../docs"]
 struct Files;
 
-/// The guides in the order in which they are listed, each with its title in the list.
+/// The guides in the order of the table of contents, with their titles.
 const GUIDES: [(&str, &str); 9] = [
-    ("clinician", "For clinicians"),
-    ("rater", "For raters"),
-    ("lab-session", "For lab sessions"),
-    ("lab-script", "For lab scripts"),
-    ("unattended", "For unattended runs"),
-    ("administrator", "For administrators"),
+    ("clinician", "Guide for clinicians"),
+    ("rater", "Guide for raters"),
+    ("lab-session", "Guide for lab sessions"),
+    ("lab-script", "Guide for lab scripts"),
+    ("unattended", "Guide for unattended runs"),
+    ("administrator", "Guide for administrators"),
     ("method", "Method"),
     ("benchmarks", "Benchmarks"),
     ("glossary", "Glossary"),
@@ -36,7 +36,7 @@ const IMAGES: &str = "/help/images/";
 #[derive(Template)]
 #[template(path = "help.html")]
 struct Help {
-    /// Who reads it: navigation depends on the role, and nobody has none.
+    /// The reader's role decides the navigation; `None` shows none.
     to: Option<AnsweredTo>,
     title: String,
     /// HTML made from a guide; empty for the table of contents.
@@ -67,7 +67,7 @@ pub(super) async fn image(Path(name): Path<String>) -> Result<Response, Refusal>
     Ok(([(header::CONTENT_TYPE, file.metadata.mimetype().to_owned())], file.data).into_response())
 }
 
-/// A guide as HTML: headings can be linked to, links between guides work, links into the repository become plain text.
+/// Converts a guide to HTML with anchors and links between guides; links into the repository become plain text.
 fn html_of(markdown: &str) -> String {
     let mut events: Vec<Event<'_>> = Parser::new_ext(markdown, Options::ENABLE_TABLES).collect();
     let mut linked = Vec::new();
@@ -103,7 +103,7 @@ fn html_of(markdown: &str) -> String {
         .replace("<pre>", "<pre tabindex=\"0\">")
 }
 
-/// The name under which a heading can be linked to, as code hosts make it: `Gait RMSE` is `gait-rmse`.
+/// The anchor of a heading, in the form that code hosts use: `Gait RMSE` is `gait-rmse`.
 fn anchor(from_heading: &[Event<'_>]) -> String {
     let inside = from_heading.iter().take_while(|event| !matches!(event, Event::End(TagEnd::Heading(_))));
     let words = inside.filter_map(|event| match event {
@@ -114,7 +114,7 @@ fn anchor(from_heading: &[Event<'_>]) -> String {
     words.chars().filter(|c| c.is_alphanumeric() || " -".contains(*c)).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// The address under which the service has what a guide links to; `None` for a file that only the repository has.
+/// The address of a link's target in the service; `None` for a file that only the repository has.
 fn served<'a>(target: &CowStr<'a>) -> Option<CowStr<'a>> {
     if target.starts_with("https://") || target.starts_with('#') {
         return Some(target.clone());

@@ -1,4 +1,4 @@
-//! The list of studies.
+//! The home page: pending tasks and the list of studies.
 
 use super::error::{Page, page};
 use super::format::{variant, words};
@@ -24,14 +24,14 @@ const PAGE: u32 = 100;
 #[derive(Template)]
 #[template(path = "home.html")]
 struct Home {
-    /// Whoever asks came by a link that works once, and has no other way in.
+    /// Whether the user has no password and came with a one-time link.
     no_password: bool,
-    /// What goes on only when somebody does something.
+    /// Studies that wait for an action of a user.
     waiting: Vec<Waiting>,
     studies: Vec<Row>,
-    /// Whether newer studies come before these.
+    /// Whether there are newer studies than these.
     later: bool,
-    /// The last study of this page, when older ones follow.
+    /// The last study of this page, if older ones follow.
     next: Option<StudyId>,
 }
 
@@ -48,7 +48,7 @@ struct Row {
     counts: TrialCounts,
     state: String,
     best_rmse: Option<String>,
-    /// The smallest Gait RMSE so far, trial by trial.
+    /// The lowest Gait RMSE so far by trial.
     course: Option<String>,
     withdrawn: bool,
 }
@@ -56,7 +56,7 @@ struct Row {
 struct Waiting {
     study: Study,
     what: String,
-    /// Where to do it.
+    /// The page of the action.
     link: String,
 }
 
@@ -92,23 +92,21 @@ async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page 
     page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
 }
 
-/// Gaits that somebody called unsafe: staff look at them.
+/// Safety reports that staff have to review.
 fn unsafe_gaits((study, count): (Study, usize)) -> Waiting {
     let what = match count {
-        1 => "a gait was called unsafe: review it".to_owned(),
-        _ => format!("{count} gaits were called unsafe: look at them and decide"),
+        1 => "1 gait reported as unsafe needs a safety review".to_owned(),
+        _ => format!("{count} gaits reported as unsafe need a safety review"),
     };
     Waiting { link: format!("/studies/{}", study.id), what, study }
 }
 
 fn waiting(study: Study) -> Waiting {
     let (what, place) = match study.state {
-        StudyState::Waiting => ("a comparison waits for an answer".to_owned(), "/compare"),
-        // Why stands in the record where the program held it.
-        StudyState::Paused if study.state_reason.is_empty() => {
-            ("held: it goes on when somebody resumes it".to_owned(), "")
-        }
-        StudyState::Paused => (format!("held: it goes on when somebody resumes it ({})", study.state_reason), ""),
+        StudyState::Waiting => ("a comparison needs your answer".to_owned(), "/compare"),
+        // A pause by a user has no reason; a pause by the service has one.
+        StudyState::Paused if study.state_reason.is_empty() => ("paused: resume it to continue".to_owned(), ""),
+        StudyState::Paused => (format!("paused: {}", study.state_reason), ""),
         _ => ("not started yet".to_owned(), ""),
     };
     Waiting { link: format!("/studies/{}{place}", study.id), what, study }
@@ -124,7 +122,7 @@ async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
         state: words(study.state.as_str()),
         variant: variant(study.plan.muscles),
         best_rmse: improvements.last().map(|(_, rmse)| format!("{rmse:.4}")),
-        course: sparkline("Smallest Gait RMSE by trial", &course, f64::from(counts.total)),
+        course: sparkline("Lowest Gait RMSE by trial", &course, f64::from(counts.total)),
         study,
         subject,
         counts,

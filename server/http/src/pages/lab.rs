@@ -1,4 +1,4 @@
-//! Lab sessions: those of a study with the form that plans one, and each with its walks.
+//! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
@@ -6,6 +6,7 @@ use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
 use super::measurement_files::{Forms, Settings};
+use super::refusal;
 use crate::AppState;
 use crate::extract::Form;
 use crate::may::May;
@@ -30,7 +31,7 @@ use gaitwright_store::trials::TrialState;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 
-/// So many gaits are offered: those with the lowest Gait RMSE.
+/// How many gaits the form offers, by lowest Gait RMSE.
 const OFFERED: u32 = 200;
 
 #[derive(Template)]
@@ -38,7 +39,7 @@ const OFFERED: u32 = 200;
 struct SessionsPage {
     study: Study,
     sessions: Vec<(SessionView, String)>,
-    /// Converged trials of the study, the lowest Gait RMSE first, as many as are offered, with what they are called.
+    /// Converged trials of the study by Gait RMSE, lowest first, with their labels.
     gaits: Vec<(TrialId, String)>,
     may_run: bool,
     fields: Fields,
@@ -51,7 +52,7 @@ impl SessionsPage {
     }
 }
 
-/// The fields as typed, so that a refused form comes back as it was.
+/// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Fields {
@@ -62,7 +63,7 @@ pub(super) struct Fields {
 
 impl Fields {
     fn read(&self) -> Result<NewSession, Error> {
-        let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait of the list"));
+        let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait from the list"));
         Ok(NewSession {
             gait_one: gait("gait_one", &self.gait_one)?,
             gait_two: gait("gait_two", &self.gait_two)?,
@@ -107,6 +108,9 @@ async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, r
     })
 }
 
+/// The labels of the form that plans a session.
+const LABELS: [(&str, &str); 3] = [("gait_one", "Gait one"), ("gait_two", "Gait two"), ("notes", "Notes")];
+
 /// `POST /studies/{id}/lab`.
 pub(super) async fn plan(
     may: May<Run>,
@@ -124,7 +128,7 @@ pub(super) async fn plan(
     match planned.await {
         Ok(session) => Ok(Redirect::to(&format!("/lab-sessions/{session}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let form = show_list(&app, id, true, fields, Some(error.to_string())).await?;
+            let form = show_list(&app, id, true, fields, Some(refusal::of_form(&error, &LABELS))).await?;
             Ok((Problem::from(&error).status(), form).into_response())
         }
         Err(other) => Err(other.into()),
@@ -140,7 +144,7 @@ struct SessionPage {
     walks: Vec<WalkRow>,
     may_run: bool,
     may_unblind: bool,
-    /// Walks that were recorded: what is measured can be brought for them.
+    /// Recorded walks, for which files can be uploaded.
     recorded: Vec<u8>,
     recordings: Vec<MeasurementFile>,
     has_emg: bool,
@@ -149,23 +153,23 @@ struct SessionPage {
     measured: Option<Measured>,
     portraits: Vec<Drawn>,
     refused: Option<String>,
-    /// What the person who walked said, in words.
+    /// The answer of the subject, in words.
     said: &'static str,
     session: SessionView,
 }
 
-/// What was made of the electromyograms.
+/// The results of the EMG recordings.
 struct Measured {
     how: String,
     walks: Vec<String>,
-    /// Those that are held against the walk without the device.
+    /// The walks that are compared with the walk without the device.
     compared: Vec<String>,
     /// Muscle, its EMG RMSE in the walks that are compared, its average activation in each walk.
     rows: Vec<(String, Vec<String>, Vec<String>)>,
-    /// Walk, muscle as measured, muscle of the model, RMS difference, correlation.
+    /// Walk, measured muscle, muscle of the model, RMS difference, correlation.
     model: Vec<[String; 5]>,
-    /// What makes a comparison doubtful, with the walk.
-    remarks: Vec<String>,
+    /// Why a comparison is uncertain, with the walk.
+    warnings: Vec<String>,
     charts: Vec<Drawn>,
 }
 
@@ -188,7 +192,7 @@ impl Measured {
         };
         let mut rows: Vec<(String, Vec<String>, Vec<String>)> = channels.iter().enumerate().map(row).collect();
         let totals = compared.iter().map(|(_, rmse)| format::figure(Some(rmse.total))).collect();
-        rows.push(("all together".to_owned(), totals, walks().map(|_| String::new()).collect()));
+        rows.push(("all muscles".to_owned(), totals, walks().map(|_| String::new()).collect()));
         let model = emg.model.iter().flat_map(|walk| {
             walk.muscles.iter().map(|muscle| {
                 [
@@ -203,13 +207,13 @@ impl Measured {
         Self {
             how: format!(
                 "Band-pass {band_low_hz} to {band_high_hz} Hz, rectified, low-pass {envelope_hz} Hz, order {order}, all \
-                 zero-phase; means of {}. Figures are shares of the muscle's peak without the device.",
+                 zero-phase. Means of {}. Values are relative to the muscle's peak without the device.",
                 counts.join(", ")
             ),
             compared: compared.iter().map(|(walk, _)| name(walk)).collect(),
-            remarks: compared
+            warnings: compared
                 .iter()
-                .flat_map(|(walk, rmse)| rmse.remarks.iter().map(|remark| format!("{}: {remark}", name(walk))))
+                .flat_map(|(walk, rmse)| rmse.remarks.iter().map(|warning| format!("{}: {warning}", name(walk))))
                 .collect(),
             walks: walks().map(name).collect(),
             rows,
@@ -219,7 +223,7 @@ impl Measured {
     }
 }
 
-/// A trial with its number.
+/// A trial and its number.
 struct Named {
     id: TrialId,
     number: u32,
@@ -227,7 +231,7 @@ struct Named {
 
 struct WalkRow {
     walk: WalkView,
-    /// What is known of how it is walked.
+    /// The condition, as far as it is not blinded.
     condition: &'static str,
 }
 
@@ -299,14 +303,14 @@ async fn show(
 
 fn in_words(condition: Option<Condition>) -> &'static str {
     match condition {
-        None => "one of the two gaits: blinded",
+        None => "one of the two gaits (blinded)",
         Some(Condition::Normal) => "without the device",
         Some(Condition::GaitOne) => "gait one",
         Some(Condition::GaitTwo) => "gait two",
     }
 }
 
-/// A note or a reason.
+/// The form with a note or a reason.
 #[derive(Debug, Deserialize)]
 pub(super) struct Note {
     #[serde(default)]
@@ -342,12 +346,12 @@ pub(super) async fn unblind(
         Ok(commit(writer).await?)
     };
     let done = done.await;
-    // The learner may have heard something.
+    // The learner may have a new preference.
     app.scheduler.changed();
     answer(&mut app, id, &may.caller, done, Forms::default()).await
 }
 
-/// Shows the session anew; what was refused, with the reason.
+/// Shows the session again after a change, with the reason if it was refused.
 pub(super) async fn answer(
     app: &mut AppState,
     id: LabSessionId,

@@ -8,7 +8,7 @@ use gaitwright_charts::{Chart, Figure, Stroke};
 use gaitwright_service::studies::lab::{Condition, EmgView, LimitCycles, SessionView};
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
-/// What the channels are called.
+/// Names of the EMG channels.
 const MUSCLES: [(&str, &str); 6] = [
     ("RF_L", "left rectus femoris"),
     ("TA_L", "left tibialis anterior"),
@@ -17,11 +17,11 @@ const MUSCLES: [(&str, &str); 6] = [
     ("RF_R", "right rectus femoris"),
     ("BF_R", "right biceps femoris"),
 ];
-/// What the joints are called, in the order of [`JOINTS`] and of the gait's coordinates after the place of the hip.
+/// Names of the joints, in the order of [`JOINTS`] and of the gait's coordinates after the hip position.
 const JOINT_NAMES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
-/// A walk as it may be called.
+/// The condition of a walk, or its number while it is blinded.
 pub(super) fn walk_name(session: &SessionView, walk: u8) -> String {
     let condition = session.walks.iter().find(|known| known.number == walk).and_then(|known| known.condition);
     match condition {
@@ -32,13 +32,13 @@ pub(super) fn walk_name(session: &SessionView, walk: u8) -> String {
     }
 }
 
-/// What a channel is called.
+/// The name of a channel.
 pub(super) fn muscle_name(channel: &str) -> &str {
     MUSCLES.iter().find(|(known, _)| *known == channel).map_or(channel, |(_, name)| name)
 }
 
-/// Muscle activity over the cycle (figure 6 of the paper): a chart per channel, each walk with its deviation, the model
-/// beside it where the gait is known.
+/// Muscle activity over the gait cycle (figure 6 of the paper): a chart for each channel with mean and standard deviation
+/// of each walk, and the activation of the model after unblinding.
 pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Figure> {
     let Some(normal) = emg.result.walks.first() else { return Vec::new() };
     let chart = |(place, channel): (usize, &CycleActivity)| {
@@ -55,7 +55,7 @@ pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Figur
             if walk.walk == 1 {
                 let band = activity.mean.iter().zip(&activity.standard_deviation).enumerate();
                 let band = band.map(|(point, (mean, sd))| (point as f64, mean - sd, mean + sd)).collect();
-                chart = chart.with_band("its standard deviation", colour, band);
+                chart = chart.with_band("standard deviation", colour, band);
             }
             chart = chart.with(&name, colour, stroke, mean);
         }
@@ -70,7 +70,7 @@ pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Figur
     normal.channels.iter().enumerate().map(chart).collect()
 }
 
-/// Colour and stroke of a walk.
+/// The colour and stroke of a walk.
 fn look(walk: u8) -> (usize, Stroke) {
     match walk {
         1 => (7, Stroke::Dashed),

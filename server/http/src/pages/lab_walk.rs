@@ -1,4 +1,4 @@
-//! The pages in the lab: which walk is next, and which one was better. Nothing here can name a gait.
+//! The pages in the lab: the next walk, and the answer of the subject. They never name a gait.
 
 use super::error::{Page, PageError, page};
 use super::format::walks_in_words;
@@ -15,15 +15,15 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, InTheLab, NewAnswer, RecordedWalk};
 use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members};
 
-/// So many of the newest open sessions are listed.
+/// How many of the newest open sessions are listed.
 const LISTED: u32 = 100;
 
 #[derive(Template)]
 #[template(path = "lab.html")]
 struct LabPage {
-    /// The open sessions, when they were planned, and what is next: names of studies can say what is tuned.
+    /// Open sessions with time of planning and next step, without the study's name, which could reveal what is tuned.
     sessions: Vec<(LabSessionId, Instant, String)>,
-    /// Whether whoever asks reaches any study.
+    /// Whether the caller can see any study.
     assigned: bool,
 }
 
@@ -31,11 +31,11 @@ struct LabPage {
 #[template(path = "lab_walk.html")]
 struct WalkPage {
     name: String,
-    /// The answer that stands.
+    /// The answer in force.
     said: &'static str,
     seen: InTheLab,
     refused: Option<String>,
-    /// The note of a form that was refused.
+    /// The note of a refused form.
     typed: String,
 }
 
@@ -47,8 +47,8 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>) -> Page {
         let seen = lab::in_the_lab(&mut reader, session.id).await?;
         let next = match (seen.walk, seen.asks) {
             (Some(walk), _) => format!("walk {walk} is next"),
-            (None, Some(_)) => "all walks recorded: which one was better?".to_owned(),
-            (None, None) => "all walks recorded, and answered".to_owned(),
+            (None, Some(_)) => "all walks recorded, answer pending".to_owned(),
+            (None, None) => "all walks recorded and answered".to_owned(),
         };
         sessions.push((session.id, session.created_at, next));
     }
@@ -116,7 +116,7 @@ pub(super) async fn take_back(
     read_back(&app, id, taken_back.await, String::new()).await
 }
 
-/// What the record says now; what was refused, with the reason and the note that was typed.
+/// Shows the present state, with the reason and the typed note if a form was refused.
 async fn read_back(
     app: &AppState,
     id: LabSessionId,

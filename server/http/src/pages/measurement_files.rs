@@ -1,4 +1,4 @@
-//! The forms of a lab session's page that bring what was measured, and that process it.
+//! The forms of a lab session that upload measurement files and process EMG recordings.
 
 use super::error::PageError;
 use super::lab;
@@ -19,7 +19,7 @@ use gaitwright_store::{LabSessionId, commit};
 use serde::Deserialize;
 use std::str::FromStr;
 
-/// Electromyograms, as typed.
+/// The form for an EMG recording, as typed.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct EmgFields {
@@ -72,7 +72,7 @@ impl EmgFields {
 /// `TA_L=EMG 3, BF_L=EMG 5`.
 fn pairs(text: &str) -> Result<std::collections::BTreeMap<String, String>, Error> {
     let pair = |part: &str| {
-        let refused = || Error::invalid("channels", part, "CHANNEL=COLUMN, with commas between them");
+        let refused = || Error::invalid("channels", part, "CHANNEL=COLUMN pairs, separated by commas");
         let (channel, column) = part.split_once('=').ok_or_else(refused)?;
         Ok((channel.trim().to_owned(), column.trim().to_owned()))
     };
@@ -91,7 +91,7 @@ fn optional(field: &str, text: &str) -> Result<Option<f64>, Error> {
     if text.trim().is_empty() { Ok(None) } else { number(field, text).map(Some) }
 }
 
-/// Joint angles, as typed.
+/// The form for joint angles, as typed.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct MotionFields {
@@ -116,7 +116,7 @@ impl MotionFields {
             "" => None,
             "degrees" => Some(Unit::Degrees),
             "radians" => Some(Unit::Radians),
-            other => return Err(Error::invalid("unit", other, "degrees, radians or nothing")),
+            other => return Err(Error::invalid("unit", other, "degrees, radians or empty")),
         };
         let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(MotionReading::default().cutoff_hz);
         let reading = MotionReading { form: self.form, unit, cutoff_hz };
@@ -160,7 +160,7 @@ async fn keep(app: &AppState, may: &May<Run>, id: LabSessionId, checked: Checked
     Ok(commit(writer).await?)
 }
 
-/// Settings of the filters, as typed.
+/// The filter settings, as typed.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Settings {
@@ -181,14 +181,14 @@ impl From<EmgSettings> for Settings {
     }
 }
 
-/// The forms of the page as typed, so that a refused one comes back as it was.
+/// The forms as typed, to show a refused one again.
 #[derive(Debug, Default)]
 pub(super) struct Forms {
     pub(super) emg: EmgFields,
     pub(super) motion: MotionFields,
-    /// None: as the electromyograms were processed last.
+    /// `None` for the settings of the last processing.
     pub(super) filters: Option<Settings>,
-    /// The one that was refused: `emg`, `motion` or `filters`.
+    /// The refused form: `emg`, `motion` or `filters`.
     pub(super) open: &'static str,
 }
 

@@ -1,7 +1,8 @@
-//! Who reaches a study: a page with its members, and the forms that add and remove them.
+//! The access page of a study: its members, and the forms that add and remove them.
 
 use super::error::{Page, PageError, page};
-use super::people::origin;
+use super::format;
+use super::users::origin;
 use crate::AppState;
 use crate::client_address::Secure;
 use crate::extract::Form;
@@ -25,20 +26,20 @@ use serde::Deserialize;
 struct MembersPage {
     study: Study,
     access: StudyAccess,
-    /// Who can be added: what the form sends, and what people read.
+    /// Users and tokens that can be added: value and label.
     candidates: Vec<(String, String)>,
     may_run: bool,
     may_administer: bool,
-    /// A link that was just made, shown this once: whose, and itself.
+    /// A new sign-in link, shown only once: user and link.
     link: Option<(String, String)>,
     refused: Option<String>,
-    /// The name of a refused invitation.
+    /// The name in a refused invitation.
     typed: String,
 }
 
 impl MembersPage {
     fn role(member: &Member) -> &'static str {
-        member.role.map_or("token", gaitwright_service::access::Role::as_str)
+        member.role.as_ref().map_or("token", format::role)
     }
 }
 
@@ -47,7 +48,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): 
     show(&app, &may.caller, id, Shown::default()).await
 }
 
-/// What stands on the page besides the members.
+/// The parts of the page that depend on the last action.
 #[derive(Default)]
 struct Shown {
     link: Option<(String, String)>,
@@ -77,23 +78,23 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Shown) -> Pag
     })
 }
 
-/// What a form asks for.
+/// The fields of every form of the page.
 #[derive(Debug, Deserialize)]
 pub(super) struct Asked {
     act: String,
     /// `user R1` or `token rig`.
     #[serde(default)]
     who: String,
-    /// A membership.
+    /// The membership to remove.
     #[serde(default)]
     member: String,
-    /// A rater to invite.
+    /// The name of a rater to invite.
     #[serde(default)]
     name: String,
 }
 
-/// `POST /studies/{id}/members`. A link is in the answer itself: it is not stored, and a reload does not make another one
-/// without asking.
+/// `POST /studies/{id}/members`. Answers with the page instead of a redirect, because a link is not stored and can be shown
+/// only here.
 pub(super) async fn post(
     may: May<Run>,
     State(app): State<AppState>,
@@ -108,7 +109,7 @@ pub(super) async fn post(
             commit(writer).await?;
             app.scheduler.changed();
             let Some((name, secret)) = invited else {
-                // Whoever removed himself does not reach the study any more.
+                // Users who removed themselves can no longer see the study.
                 return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());
             };
             let link = Some((name, format!("{}/sign-in/{secret}", origin(secure, &headers))));
@@ -123,7 +124,7 @@ pub(super) async fn post(
     }
 }
 
-/// Does it; name and secret of a one-time link, if one was made.
+/// Performs the action; returns name and secret of a sign-in link, if it created one.
 async fn act(
     writer: &mut Writer,
     caller: &Caller,
@@ -132,7 +133,7 @@ async fn act(
 ) -> Result<Option<(String, String)>, Error> {
     match asked.act.as_str() {
         "add" => {
-            let unknown = || Error::invalid("who", asked.who.as_str(), "a user or token of the list");
+            let unknown = || Error::invalid("who", asked.who.as_str(), "a user or token from the list");
             let (kind, name) = asked.who.split_once(' ').ok_or_else(unknown)?;
             let kind = match kind {
                 "user" => MemberKind::User,
@@ -157,7 +158,7 @@ async fn act(
             let (user, _, secret) = membership::invite(writer, &caller.actor, study, &asked.name).await?;
             Ok(Some((user.name, secret)))
         }
-        "invite" => Err(Error::Forbidden("administrators make sign-in links".to_owned())),
+        "invite" => Err(Error::Forbidden("Only administrators can create sign-in links.".to_owned())),
         other => Err(Error::invalid("act", other, "add, remove, restrict, open, invite")),
     }
 }

@@ -1,4 +1,4 @@
-//! Pages for people: rendered on the server, usable without scripts.
+//! HTML pages, rendered on the server and usable without scripts.
 
 mod access_log;
 mod audit;
@@ -23,11 +23,11 @@ mod members;
 mod muscles;
 mod new_study;
 mod notice;
-mod people;
 mod problems;
 mod rate;
 mod reference;
 mod reference_gaits;
+mod refusal;
 mod safety_review;
 mod side_by_side;
 mod sign_in;
@@ -35,6 +35,7 @@ mod study;
 mod subject;
 mod system;
 mod unsent;
+mod users;
 
 use super::AppState;
 use super::api::recordings;
@@ -70,8 +71,8 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/trials/{id}/explain", post(explanation::post))
         .route("/trials/{id}/safety-review", post(safety_review::post))
-        .route("/references", get(reference_gaits::list).post(reference_gaits::import).layer(recordings()))
-        .route("/references/{id}", get(reference_gaits::get))
+        .route("/reference-gaits", get(reference_gaits::list).post(reference_gaits::import).layer(recordings()))
+        .route("/reference-gaits/{id}", get(reference_gaits::get))
         .route("/rate", get(rate::list))
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))
@@ -87,7 +88,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/lab/{id}/answer", post(lab_walk::answer))
         .route("/lab/{id}/take-back", post(lab_walk::take_back))
-        .route("/people", get(people::get).post(people::post))
+        .route("/users", get(users::get).post(users::post))
         .route("/audit", get(audit::get))
         .route("/access-log", get(access_log::get))
         .route("/system", get(system::get))

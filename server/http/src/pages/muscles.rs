@@ -1,4 +1,4 @@
-//! The muscles of a person: the form for measured values that override the published table.
+//! The form for measured muscle parameters of a subject, which override the published table.
 
 use super::error::{Page, PageError, page};
 use super::format;
@@ -19,7 +19,7 @@ use gaitwright_store::{SubjectId, commit};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// What kinds of muscles are called.
+/// Names of the muscles.
 const KINDS: [(&str, &str); 7] = [
     ("ham", "hamstrings"),
     ("glu", "gluteus"),
@@ -30,7 +30,7 @@ const KINDS: [(&str, &str); 7] = [
     ("ta", "tibialis anterior"),
 ];
 
-/// What was typed, by the name of the field.
+/// The entries by field name.
 type Typed = BTreeMap<String, String>;
 
 #[derive(Template)]
@@ -49,18 +49,18 @@ struct Row {
     cells: Vec<Cell>,
 }
 
-/// One number of a kind of muscle.
+/// One parameter of a muscle.
 struct Cell {
     /// `sol_max_force_n`.
     field: String,
     label: String,
     typed: String,
-    /// What holds where nothing is typed; none: the muscle does not span that joint.
+    /// The value of an empty field; `None` if the muscle does not span that joint.
     otherwise: Option<String>,
     refused: bool,
 }
 
-/// The page with what is in force, or with what was typed and refused.
+/// Shows the values in force, or the entries of a refused form.
 fn shown(
     subject: Subject,
     muscles: &MuscleParameters,
@@ -133,7 +133,7 @@ pub(super) async fn post(
     }
 }
 
-/// What is typed, as a document; an empty field is none.
+/// The entries as a document, without empty fields.
 fn read(typed: &Typed) -> Result<MuscleParameters, Error> {
     let mut document = Map::new();
     for (field, text) in typed.iter().filter(|(_, text)| !text.trim().is_empty()) {
@@ -145,8 +145,7 @@ fn read(typed: &Typed) -> Result<MuscleParameters, Error> {
             KINDS.iter().any(|(known, _)| known == kind) && MuscleOverride::FIELDS.iter().any(|f| f.name == *name)
         });
         let (kind, name) = part.ok_or_else(|| Error::invalid(field, text.as_str(), "a field of this form"))?;
-        let value: f64 =
-            text.trim().parse().map_err(|_| Error::invalid(field, text.as_str(), "a number, or nothing"))?;
+        let value: f64 = text.trim().parse().map_err(|_| Error::invalid(field, text.as_str(), "a number, or empty"))?;
         let of_kind = document.entry(kind).or_insert_with(|| json!({}));
         if let Value::Object(of_kind) = of_kind {
             of_kind.insert(name.to_owned(), json!(value));

@@ -1,4 +1,4 @@
-//! A notice at the head of every page, for as long as the disk of the record is short of space.
+//! A notice at the top of every page while the disk of the record is short of space.
 
 use crate::AppState;
 use crate::problem::Refusal;

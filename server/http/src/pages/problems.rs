@@ -1,4 +1,4 @@
-//! What the kinds of problems mean: the addresses that problem documents name as their type.
+//! The pages of problem types, whose addresses are the `type` of problem documents.
 
 use super::error::{Page, page};
 use crate::problem_kinds::{Entry, Kind};
@@ -10,7 +10,7 @@ use gaitwright_service::error::Error;
 #[template(path = "problems.html")]
 struct ProblemsPage {
     entries: Vec<Entry>,
-    /// One kind alone, or all of them.
+    /// Whether the page shows one type or all of them.
     one: bool,
 }
 

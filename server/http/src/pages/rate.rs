@@ -1,7 +1,7 @@
-//! The pages of a rater: what is open, and one blind pair. Nothing here can name a trial.
+//! The pages of a rater: the studies, and one blinded pair. They never name a trial.
 
 use super::error::{Page, PageError, page};
-use super::format::words;
+use super::format;
 use crate::AppState;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extract::{Form, Params};
@@ -23,17 +23,17 @@ use gaitwright_store::studies::{Chosen, FeedbackMode};
 use gaitwright_store::{Connection, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
 
-/// So many of the newest studies are searched for a rater's newest answer.
+/// In how many of the newest studies a rater's newest answer is searched.
 const SEARCHED: u32 = 200;
 
 #[derive(Template)]
 #[template(path = "rate.html")]
 struct RatePage {
     studies: Vec<(StudyId, String)>,
-    /// Whether whoever asks reaches any study.
+    /// Whether the caller can see any study.
     assigned: bool,
     nothing: bool,
-    /// What was just answered or, without that, the newest answer as long as it can be taken back.
+    /// The answer just given, or else the newest one that can be retracted.
     saved: Option<Saved>,
     /// Whether whoever asks may read, and so could know which gait is which.
     not_blind: bool,
@@ -41,19 +41,23 @@ struct RatePage {
     no_password: bool,
 }
 
-/// An answer as read back from the record.
+/// An answer, read from the record.
 struct Saved {
     token: String,
     number: u32,
-    words: String,
+    answer: Judgement,
     at: String,
     can_be_taken_back: bool,
 }
 
 impl Saved {
-    /// Whether it was taken back, or the program took it away.
+    /// Whether it was retracted.
     fn is_withdrawn(&self) -> bool {
-        self.words == Judgement::Withdrawn.as_str()
+        self.answer == Judgement::Withdrawn
+    }
+
+    fn words(&self) -> &'static str {
+        format::sides_in_words(self.answer)
     }
 }
 
@@ -64,16 +68,16 @@ struct PairPage {
     number: u32,
     /// Whether whoever asks may read, and so could know which gait is which.
     not_blind: bool,
-    /// The answer, if it was given.
+    /// The answer, if there is one.
     saved: Option<Saved>,
-    /// Why what was sent now was not taken.
+    /// Why the form was refused.
     refused: Option<String>,
-    /// Both strides, unless they cannot be drawn.
+    /// Both strides; `None` if they cannot be drawn.
     strides: Option<[Stride; 2]>,
 }
 
 impl PairPage {
-    /// How long the stride of a side takes, s; nothing where it cannot be told.
+    /// Duration of the stride of a side, s; empty if unknown.
     fn seconds(&self, side: usize) -> &str {
         self.strides.as_ref().and_then(|strides| strides.get(side)).map_or("", |stride| stride.seconds.as_str())
     }
@@ -81,9 +85,9 @@ impl PairPage {
 
 /// One of the two gaits.
 struct Stride {
-    /// How long the stride takes, s: to the hundredth, as more would be a fingerprint.
+    /// Duration of the stride, s, rounded to 0.01 s, because more digits would identify the gait.
     seconds: String,
-    /// The stride as pictures, for those without scripts.
+    /// The stride as pictures, for readers without scripts.
     picture: String,
 }
 
@@ -94,7 +98,7 @@ impl Stride {
     }
 }
 
-/// What was done before this page.
+/// The action that led to this page.
 #[derive(Debug, Deserialize)]
 pub(super) struct Before {
     #[serde(default)]
@@ -117,7 +121,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
     let studies = studies::asking_raters(&mut reader, reach)
         .await?
         .into_iter()
-        // Names can say what is tuned: a rater sees the end of the identifier.
+        // Names of studies can reveal what is tuned, so raters see the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
@@ -126,7 +130,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
     page(&RatePage { studies, assigned, nothing: before.nothing, saved, not_blind, no_password })
 }
 
-/// A rater's newest answer, if it can be taken back.
+/// A rater's newest answer, if it can be retracted.
 async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, Error> {
     let mut newest: Option<Presentation> = None;
     for study in studies::page(db, caller.reach(), Chosen::newest(SEARCHED)).await? {
@@ -138,7 +142,7 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, E
     }
     let Some(shown) = newest else { return Ok(None) };
     let shown = match blind::own(db, caller, &shown.token).await {
-        // Its sides are not in this record.
+        // The record does not have the sides of an imported pair.
         Err(Error::NotFound { .. }) => return Ok(None),
         shown => shown?,
     };
@@ -148,7 +152,7 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, E
 async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, Error> {
     let can_be_taken_back = blind::can_be_taken_back(db, &shown.presentation).await?;
     Ok(shown.answer().zip(shown.presentation.answered_at).map(|(said, at)| Saved {
-        words: words(said.as_str()),
+        answer: said,
         at: at.minute(),
         number: shown.presentation.number,
         token: shown.presentation.token,
@@ -188,7 +192,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
     let mut pair = Vec::new();
     let (first, second) = shown.shown();
     for trial in [first, second] {
-        // What is missing here is said by the animation, without a word that could tell which gait it was.
+        // Without pictures the animation reports the problem, without naming the gait.
         pair.extend(gaits::get(&mut reader, trial).await.ok());
     }
     drop(reader);
@@ -227,7 +231,7 @@ pub(super) async fn answer(
     let given = RaterAnswer { answer: form.answer, response_ms: form.response_ms.trim().parse().ok(), note: form.note };
     let answered = async {
         let mut writer = app.write().await?;
-        // The same form sent twice, by a double click or after a lost answer, is one answer.
+        // A form that is sent twice (double click, lost response) counts as one answer.
         let before = blind::own(&mut writer, &may.caller, &token).await?.answer();
         if before != Some(given.answer) {
             blind::answer(&mut writer, &may.caller, &token, &given).await?;
@@ -257,7 +261,7 @@ pub(super) async fn take_back(
     told(&mut app, &may.caller, &token, taken_back).await
 }
 
-/// What was done; what was refused because of what was done before, on the page of the pair.
+/// Redirects after an action; a conflict is shown on the page of the pair.
 async fn told(
     app: &mut AppState,
     caller: &Caller,

@@ -1,7 +1,7 @@
-//! The reference of the REST interface, made from its description, with a form to try each request.
+//! The reference page of the REST interface, generated from its description, with a form for each operation.
 //!
-//! A page of our own and no ready-made viewer: those bring megabytes of script that builds the page in the browser and
-//! styles it in line, which the content policy refuses; this one is complete without scripts and loads nothing.
+//! Ready-made viewers bring megabytes of script and inline styles, which the content policy refuses. This page is complete
+//! without scripts and loads nothing from other origins.
 
 use super::error::{Page, page};
 use crate::openapi;
@@ -15,21 +15,21 @@ struct ReferencePage {
     groups: Vec<Group>,
 }
 
-/// The operations of one subject.
+/// The operations with one tag.
 struct Group {
     name: String,
     operations: Vec<Operation>,
 }
 
-/// One method of one path.
+/// An operation: a method of a path.
 struct Operation {
     method: String,
     path: String,
     summary: String,
-    /// The right that it needs; empty: none.
+    /// The right that it requires; empty if none.
     right: String,
     parameters: Vec<Parameter>,
-    /// An example of the body; none: it takes no body.
+    /// An example of the body; `None` if it takes none.
     body: Option<String>,
     answers: Vec<(String, String)>,
 }
@@ -93,7 +93,7 @@ fn without_address(summary: &str) -> String {
     rest.trim_start_matches([':', '.', ' ']).replace('`', "")
 }
 
-/// A document of the shape that a schema asks for: required fields alone.
+/// An example document of a schema, with the required fields only.
 fn example(document: &Value, schema: &Value, depth: usize) -> Value {
     if depth > 6 {
         return Value::Null;

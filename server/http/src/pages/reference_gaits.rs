@@ -1,4 +1,4 @@
-//! Reference gaits: the list with the form that imports one, and each with its curves.
+//! The pages of reference gaits: the list with the import form, and each one with its curves.
 
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
@@ -20,7 +20,7 @@ use gaitwright_store::{Connection, ReferenceGaitId, SubjectId, commit};
 use serde::Deserialize;
 use std::str::FromStr;
 
-/// The fields as typed, so that a refused form comes back as it was.
+/// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Fields {
@@ -48,7 +48,7 @@ impl Fields {
                 "" => None,
                 "degrees" => Some(Unit::Degrees),
                 "radians" => Some(Unit::Radians),
-                other => return Err(Error::invalid("unit", other, "degrees, radians or nothing")),
+                other => return Err(Error::invalid("unit", other, "degrees, radians or empty")),
             },
             force_column: given(&self.force_column),
             forces: Some(self.forces.clone()).filter(|text| !text.trim().is_empty()),
@@ -72,7 +72,7 @@ fn number(field: &str, text: &str) -> Result<f64, Error> {
 struct ReferenceGaitsPage {
     matches: Vec<Match>,
     subjects: Vec<Subject>,
-    /// Whom the distances are measured from.
+    /// The subject from whom distances are measured.
     nearest_to: Option<Subject>,
     may_run: bool,
     fields: Fields,
@@ -104,20 +104,20 @@ impl ReferenceGaitsPage {
     }
 }
 
-/// Whom to match.
+/// The subject to match.
 #[derive(Debug, Deserialize)]
 pub(super) struct To {
     #[serde(default)]
     subject: Option<SubjectId>,
 }
 
-/// `GET /references`.
+/// `GET /reference-gaits`.
 pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Params(to): Params<To>) -> Page {
     let may_run = may.caller.may(Run::NEEDED);
     page(&ReferenceGaitsPage::read(&mut *app.read().await?, to.subject, may_run).await?)
 }
 
-/// `POST /references`.
+/// `POST /reference-gaits`.
 pub(super) async fn import(
     may: May<Run>,
     State(mut app): State<AppState>,
@@ -139,7 +139,7 @@ pub(super) async fn import(
     let mut writer = app.write().await?;
     let (added, _) = recording::add(&mut writer, &may.caller.actor, &definition).await?;
     commit(writer).await?;
-    Ok(Redirect::to(&format!("/references/{}", added.id)).into_response())
+    Ok(Redirect::to(&format!("/reference-gaits/{}", added.id)).into_response())
 }
 
 #[derive(Template)]
@@ -150,7 +150,7 @@ struct ReferenceGaitPage {
     charts: Vec<Drawn>,
 }
 
-/// `GET /references/{id}`.
+/// `GET /reference-gaits/{id}`.
 pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id, _): Id<ReferenceGaitId, Read>) -> Page {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {

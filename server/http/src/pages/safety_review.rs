@@ -1,4 +1,4 @@
-//! The form on a gait's page by which staff decide about what was called unsafe.
+//! The form for a safety review on the page of a gait.
 
 use super::error::PageError;
 use crate::AppState;

@@ -1,4 +1,4 @@
-//! Two studies on one plot: with and without muscles, two subjects, two learners.
+//! The page that compares two studies in one chart and one table.
 
 use super::drawn::Drawn;
 use super::error::{Page, page};
@@ -24,10 +24,10 @@ use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials}
 use serde::Deserialize;
 use std::sync::Arc;
 
-/// So many of the newest studies are offered, and of the newest trials of a large one drawn.
+/// How many of the newest studies are offered, and how many of the newest trials of a large study are drawn.
 const OFFERED: u32 = 200;
 
-/// Which two.
+/// The two studies.
 #[derive(Debug, Deserialize)]
 pub(super) struct Choice {
     a: Option<Named<StudyId>>,
@@ -53,9 +53,9 @@ struct Compared {
     a: Study,
     b: Study,
     chart: Option<Drawn>,
-    /// Those that have nothing to draw.
+    /// Names of studies without a best action to draw.
     without_course: Vec<String>,
-    /// What, of the one, of the other, and whether these differ.
+    /// Property, value of each study, and whether the values differ.
     rows: Vec<(String, String, String, bool)>,
 }
 
@@ -67,7 +67,7 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Params(
     let (a, b) = (reached(&mut reader, reach, choice.a).await?, reached(&mut reader, reach, choice.b).await?);
     let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {
-            return Err(Error::invalid("b", b.to_string(), "another study than a").into());
+            return Err(Error::invalid("b", b.to_string(), "a study other than a").into());
         }
         (Some(a), Some(b)) => {
             let (a, b) = (Side::read(&mut reader, a).await?, Side::read(&mut reader, b).await?);
@@ -83,7 +83,7 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Params(
     page(&SideBySide { offered, a, b, compared })
 }
 
-/// A study as read.
+/// A study with its snapshot and figures.
 pub(super) struct Side {
     pub(super) snapshot: StudySnapshot,
     subject: String,
@@ -108,7 +108,7 @@ impl Side {
         figures(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
     }
 
-    /// What the study is, and what it found.
+    /// The properties and results of the study.
     fn rows(&self, figures: &Figures) -> Vec<(String, String)> {
         let plan = &self.snapshot.study.plan;
         let best = figures.best.and_then(|id| self.snapshot.trial(id));
@@ -122,10 +122,13 @@ impl Side {
             ("Seed".to_owned(), plan.seed.to_string()),
             ("Trials with a result".to_owned(), format!("{} of {}", self.counts.results(), plan.trial_budget)),
             ("Converged".to_owned(), self.counts.converged.to_string()),
-            ("Time of the solves, s".to_owned(), format!("{seconds:.0}")),
+            ("Total solve time, s".to_owned(), format!("{seconds:.0}")),
             ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
-            ("Its Gait RMSE, rad".to_owned(), format::figure(best.and_then(|trial| trial.gait_rmse_rad))),
-            ("Its cost of transport".to_owned(), format::figure(best.and_then(|trial| trial.cost_of_transport))),
+            ("Gait RMSE of the best trial, rad".to_owned(), format::figure(best.and_then(|trial| trial.gait_rmse_rad))),
+            (
+                "Cost of transport of the best trial".to_owned(),
+                format::figure(best.and_then(|trial| trial.cost_of_transport)),
+            ),
         ];
         let bounds = best.map(|trial| trial.action.to_array());
         for (place, name) in TunedBounds::NAMES.iter().enumerate() {

@@ -1,6 +1,7 @@
-//! Signing in and out, and a person's own account.
+//! Signing in and out, and the user's own account.
 
 use super::error::{Page, PageError, page};
+use super::format;
 use super::unsent::{SignInPage, Unsent, send_now};
 use crate::extract::Form;
 use crate::identify::{browser_cookie, browser_of, cookie, session_of};
@@ -36,9 +37,9 @@ struct AccountPage {
     name: String,
     role: Role,
     shortest: usize,
-    /// Whether the present password is asked for.
+    /// Whether the form asks for the current password.
     must_say_password: bool,
-    /// Sessions of this person; whether it is the present one.
+    /// The sessions of the user, and whether each is the current one.
     sessions: Vec<(Session, bool)>,
     refused: Option<String>,
     saved: bool,
@@ -49,7 +50,7 @@ pub(super) async fn get() -> Page {
     page(&SignInPage { refused: None, name: String::new(), unsent: Unsent::default() })
 }
 
-/// Name and password, and what was sent before.
+/// Name and password, and an entry that was sent before signing in.
 #[derive(Deserialize)]
 pub(super) struct Credentials {
     name: String,
@@ -58,12 +59,12 @@ pub(super) struct Credentials {
     unsent: Unsent,
 }
 
-/// Where a request comes from, for back-off and for the list of sessions.
+/// The origin of a request, for back-off and for the list of sessions.
 struct Visit {
     address: ClientAddress,
-    /// What the browser says of itself.
+    /// The `User-Agent` header.
     browser: Option<String>,
-    /// The secret that stays in the browser.
+    /// The secret of the browser's cookie.
     kept: Option<String>,
 }
 
@@ -74,7 +75,7 @@ impl Visit {
         Self { address, browser, kept: browser_of(headers).map(str::to_owned) }
     }
 
-    /// The origin of an attempt to sign in as somebody.
+    /// The origin of an attempt to sign in with a name.
     async fn origin(&self, writer: &mut Writer, user: Option<&User>) -> Result<Origin, Error> {
         let known = match (&self.kept, user) {
             (Some(kept), Some(user)) => sessions::is_known_browser(writer, user.id, &secret::hash(kept)).await?,
@@ -83,7 +84,7 @@ impl Visit {
         Ok(Origin { network: self.address.network(), known: user.filter(|_| known).map(|user| user.id) })
     }
 
-    /// The secret that stays in the browser, and what is noted of a session that begins in it.
+    /// The secret of the browser's cookie, and the origin that a new session records.
     fn begins(&self) -> Result<(String, From), Error> {
         let kept = self.kept.clone().map_or_else(secret::fresh, Ok)?;
         let browser_hash = Some(secret::hash(&kept));
@@ -92,8 +93,8 @@ impl Visit {
     }
 }
 
-/// Compares a password with that of a user, unless there were too many failed attempts. `Err` of the inner result: how long
-/// to wait. A wrong password and one that was not compared have been noted.
+/// Compares a password with that of a user, unless there were too many failed attempts. The inner `Err` is the time to wait.
+/// Failed attempts are recorded, those without a comparison as well.
 async fn compare<'a>(
     app: &'a AppState,
     visit: &Visit,
@@ -138,7 +139,7 @@ pub(super) async fn post(
     let user = users::by_name(&mut *app.read().await?, &name).await?.filter(|user| user.disabled_at.is_none());
     let right = compare(&app, &visit, &name, user.as_ref(), form.password).await?.map_err(too_many)?;
     if let (Some((mut writer, attempt)), Some(user)) = (right, user) {
-        // Whoever was shut out meanwhile stays out.
+        // The user may have been disabled meanwhile.
         let user = users::get(&mut writer, user.id).await?;
         if user.disabled_at.is_none() {
             attempt.succeeded(&mut writer).await?;
@@ -148,12 +149,12 @@ pub(super) async fn post(
             let answer = if form.unsent.is_any() {
                 send_now(&form.unsent)?.into_response()
             } else {
-                Redirect::to(first_page(user.role)).into_response()
+                Redirect::to(home_page(user.role)).into_response()
             };
             return Ok((cookies(&app, &session, &kept)?, answer).into_response());
         }
     }
-    let refused = Some("name or password is not right".to_owned());
+    let refused = Some("Wrong name or password.".to_owned());
     Ok((StatusCode::UNAUTHORIZED, page(&SignInPage { refused, name, unsent: form.unsent })?).into_response())
 }
 
@@ -173,7 +174,7 @@ pub(super) async fn use_link(
     let (mut writer, _) = app.write_access().await?;
     let (user, session) = match sign_in::with_link_from(&mut writer, &link, &from).await {
         Err(Error::NotSignedIn(reason)) => {
-            // That it is too old stays so.
+            // An expired link stays expired, so the page need not be retried.
             commit(writer).await?;
             let refused = SignInPage { refused: Some(reason), name: String::new(), unsent: Unsent::default() };
             let refused = page(&refused)?;
@@ -182,17 +183,17 @@ pub(super) async fn use_link(
         found => found?,
     };
     commit(writer).await?;
-    Ok((cookies(&app, &session, &kept)?, Redirect::to(first_page(user.role))).into_response())
+    Ok((cookies(&app, &session, &kept)?, Redirect::to(home_page(user.role))).into_response())
 }
 
-/// The cookies of a session that begins.
+/// The cookies of a new session.
 fn cookies(app: &AppState, session: &str, kept: &str) -> Result<AppendHeaders<[(HeaderName, HeaderValue); 2]>, Error> {
     let secure = app.access.secure;
     let (session, browser) = (cookie(Some(session), secure)?, browser_cookie(kept, secure)?);
     Ok(AppendHeaders([(header::SET_COOKIE, session), (header::SET_COOKIE, browser)]))
 }
 
-fn first_page(role: Role) -> &'static str {
+fn home_page(role: Role) -> &'static str {
     if role == Role::Rater { "/rate" } else { "/" }
 }
 
@@ -223,8 +224,8 @@ async fn account_of(
     caller: Option<&Caller>,
     headers: &HeaderMap,
 ) -> Result<(AccountPage, User, Actor), Error> {
-    let caller = caller.ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
-    let id = caller.user.ok_or_else(|| Error::conflict("nobody is signed in here: there is no account"))?;
+    let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
+    let id = caller.user.ok_or_else(|| Error::conflict("No user is signed in, so there is no account."))?;
     let mut reader = app.read().await?;
     let user = users::get(&mut reader, id).await?;
     let now = app.access.clock.now(&mut reader).await?;
@@ -240,7 +241,7 @@ async fn account_of(
     Ok((shown, user, caller.actor.clone()))
 }
 
-/// A new password, and the present one where that is asked for.
+/// A new password, and the current one if the form asks for it.
 #[derive(Deserialize)]
 pub(super) struct NewPassword {
     password: String,
@@ -259,10 +260,10 @@ pub(super) async fn set_password(
     let (mut shown, user, actor) = account_of(&app, caller.as_ref(), &headers).await?;
     let visit = Visit::of(address, &headers);
     if shown.must_say_password {
-        // Guesses wait as they do at the door.
+        // Wrong passwords count as failed sign-ins.
         let right = compare(&app, &visit, &user.name, Some(&user), form.present).await?.map_err(too_many)?;
         let Some((mut writer, attempt)) = right else {
-            shown.refused = Some("the present password is not right".to_owned());
+            shown.refused = Some("The current password is wrong.".to_owned());
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
         };
         attempt.succeeded(&mut writer).await?;
@@ -286,7 +287,7 @@ pub(super) async fn set_password(
     Ok((cookies(&app, &session, &kept)?, page(&shown)?).into_response())
 }
 
-/// Which session to end.
+/// The session to end.
 #[derive(Deserialize)]
 pub(super) struct Ended {
     id: String,
@@ -298,7 +299,7 @@ pub(super) async fn end_session(
     SignedIn(caller): SignedIn,
     Form(form): Form<Ended>,
 ) -> Result<Response, PageError> {
-    let caller = caller.ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
+    let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
     let missing = || Error::NotFound { what: "session".to_owned(), id: form.id.clone() };
     let id = form.id.parse().map_err(|_| missing())?;
     let (mut writer, _) = app.write_access().await?;

@@ -1,4 +1,4 @@
-//! Subjects, and the forms for what they signed and that they withdraw.
+//! The pages of subjects, with the forms for consent, withdrawal and corrections.
 
 use super::error::{Page, PageError, page};
 use super::format::{variant, words};
@@ -22,14 +22,14 @@ use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, SubjectId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 
-/// How many subjects the list shows, and how many studies the page of one.
+/// How many subjects the list shows, and how many studies the page of a subject.
 const PAGE: u32 = 100;
 
 #[derive(Template)]
 #[template(path = "subjects.html")]
 struct SubjectsPage {
     subjects: Vec<Row>,
-    /// The last subject of this page, when others follow.
+    /// The last subject of this page, if more follow.
     next: Option<SubjectId>,
     may_run: bool,
     fields: Described,
@@ -42,7 +42,7 @@ impl SubjectsPage {
     }
 }
 
-/// A subject as typed, so that a refused form comes back as it was.
+/// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Described {
@@ -62,8 +62,8 @@ impl Described {
 /// Height and mass as typed.
 fn body_of(height: &str, mass: &str) -> Result<(f64, f64), Error> {
     let number = |field, text: &str, allowed| text.trim().parse().map_err(|_| Error::invalid(field, text, allowed));
-    let height = number("height_m", height, "a number of metres with a decimal point, as in 1.75")?;
-    Ok((height, number("body_mass_kg", mass, "a number of kilograms with a decimal point, as in 65.7")?))
+    let height = number("height_m", height, "a number in metres, as in 1.75")?;
+    Ok((height, number("body_mass_kg", mass, "a number in kilograms, as in 65.7")?))
 }
 
 struct Row {
@@ -80,12 +80,12 @@ struct SubjectPage {
     may_run: bool,
     /// The newest ones.
     studies: Vec<StudyRow>,
-    /// Of these studies; none of a subject who withdrew.
+    /// Lab sessions of these studies; none after a withdrawal.
     sessions: Vec<SessionRow>,
-    /// The newest row that the form knows of: sent twice, it is written once.
+    /// The newest consent row that the form knows, so that a repeated form is recorded once.
     after: i64,
     corrections: Vec<Correction>,
-    /// The newest correction that the form knows of: sent twice, it is made once.
+    /// The newest correction that the form knows, so that a repeated form is recorded once.
     corrected: i64,
     may_administer: bool,
     refused: Option<String>,
@@ -142,7 +142,7 @@ pub(super) async fn add(
     let status = Problem::from(&error).status();
     let refused = match error {
         Error::Invalid(refused) => *refused,
-        // The one conflict there is: somebody has this pseudonym.
+        // The only possible conflict is a pseudonym that is taken.
         other => {
             FieldError { message: other.to_string(), ..FieldError::new("pseudonym", fields.pseudonym.clone(), "") }
         }
@@ -165,7 +165,7 @@ async fn show_list(
     let mut rows = Vec::with_capacity(found.len());
     for subject in found {
         let said = consents::of_subject(&mut reader, subject.id).await?;
-        rows.push(Row { subject, consent: said.last().map_or("nothing written down", |last| last.kind.as_str()) });
+        rows.push(Row { subject, consent: said.last().map_or("not on record", |last| last.kind.as_str()) });
     }
     page(&SubjectsPage { subjects: rows, next, may_run, fields, refused })
 }
@@ -206,7 +206,7 @@ async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<St
     })
 }
 
-/// The studies of a subject that a caller reaches, the newest first.
+/// The studies of a subject that the caller can see, newest first.
 async fn studies_of(db: &mut Connection, reach: Reach, id: SubjectId) -> Result<Vec<StudyRow>, Error> {
     let mut rows = Vec::new();
     for study in studies::of_subject(db, reach, id, PAGE).await? {
@@ -216,7 +216,7 @@ async fn studies_of(db: &mut Connection, reach: Reach, id: SubjectId) -> Result<
     Ok(rows)
 }
 
-/// The lab sessions of a study, the newest first.
+/// The lab sessions of a study, newest first.
 async fn sessions_of(db: &mut Connection, study: &Study) -> Result<Vec<SessionRow>, Error> {
     let sessions = lab_sessions::of_study(db, study.id).await?;
     let row = |session| {
@@ -226,7 +226,7 @@ async fn sessions_of(db: &mut Connection, study: &Study) -> Result<Vec<SessionRo
     Ok(sessions.iter().rev().map(row).collect())
 }
 
-/// What was signed.
+/// The form that was signed.
 #[derive(Debug, Deserialize)]
 pub(super) struct Signed {
     form: String,
@@ -248,7 +248,7 @@ async fn give(app: &AppState, may: &May<Run>, id: SubjectId, form: Signed) -> Re
     let mut writer = app.write().await?;
     let newest = consents::of_subject(&mut writer, id).await?.last().map_or(0, |last| last.seq);
     if newest != form.after {
-        return Err(Error::conflict("something was written down since this form was shown; look at it first"));
+        return Err(Error::conflict("Consent was recorded or withdrawn after this form was loaded. Check it first."));
     }
     consent::give(&mut writer, &may.caller.actor, id, &NewConsent { form: form.form }).await?;
     Ok(commit(writer).await?)
@@ -302,13 +302,13 @@ async fn set_right(app: &AppState, may: &May<Run>, id: SubjectId, form: Correcte
     let mut writer = app.write().await?;
     let newest = subjects::corrections(&mut writer, id).await?.last().map_or(0, |last| last.seq);
     if newest != form.before {
-        return Err(Error::conflict("height and mass were corrected since this form was shown; look at them first"));
+        return Err(Error::conflict("Height and mass were corrected after this form was loaded. Check them first."));
     }
     person::correct(&mut writer, &may.caller.actor, id, &new).await?;
     Ok(commit(writer).await?)
 }
 
-/// Shows the subject anew; what was refused, with the reason.
+/// Shows the subject again after a change, with the reason if it was refused.
 async fn answer(
     app: &AppState,
     id: SubjectId,

@@ -1,4 +1,4 @@
-//! How the service is: versions, workers, queue, record.
+//! The system page: version, workers, queue, record and backups.
 
 use super::error::{Page, page};
 use super::format::{duration, words};
@@ -16,12 +16,12 @@ use gaitwright_store::{FORM, backup, jobs, trials};
 #[template(path = "system.html")]
 struct SystemPage {
     version: &'static str,
-    /// Version of the form of the record.
+    /// Version of the database schema.
     form: i64,
     workers: Workers,
     /// The backup that was just made.
     copied: Option<Copy>,
-    /// The copies beside the record, newest first: name and bytes.
+    /// Backups in the folder of the record, newest first: name and bytes.
     copies: Vec<(String, i64)>,
     queued: u32,
     running: u32,
@@ -70,7 +70,7 @@ async fn show(app: &AppState, caller: &Caller, copied: Option<Copy>) -> Page {
     page(&SystemPage {
         version: env!("CARGO_PKG_VERSION"),
         form: FORM,
-        copies: copies.map_err(|e| Error::Internal(format!("cannot list the copies of the record: {e}")))?,
+        copies: copies.map_err(|e| Error::Internal(format!("cannot list the backups: {e}")))?,
         workers,
         copied,
         queued,

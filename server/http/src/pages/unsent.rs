@@ -1,7 +1,6 @@
-//! What somebody sends after the session has ended: it is not stored, and not lost.
+//! Forms that are sent after the session has ended: they are not stored, and not lost.
 //!
-//! The page that says so asks for name and password and carries the form along; after signing in it is sent with one
-//! press, by whoever signed in.
+//! The answer is a sign-in page that carries the form along. After signing in, the user sends the form with one button.
 
 use super::error::{PageError, is_for_programs, page};
 use crate::AppState;
@@ -15,19 +14,19 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-/// A form that was sent and not taken.
+/// A form that was sent without a session.
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct Unsent {
-    /// Where it was sent to; empty: there is none.
+    /// The address it was sent to; empty if there is no form.
     #[serde(default)]
     pub(super) to: String,
-    /// Its fields, as they were sent.
+    /// Its fields, as sent.
     #[serde(default)]
     pub(super) fields: String,
 }
 
 impl Unsent {
-    /// Whether there is one, for a page of this service.
+    /// Whether there is a form, addressed to this service.
     pub(super) fn is_any(&self) -> bool {
         self.to.starts_with('/') && !self.to.starts_with("//") && !self.to.contains('\\')
     }
@@ -46,7 +45,7 @@ pub(super) struct SignInPage {
     pub(super) unsent: Unsent,
 }
 
-/// After signing in: the form, to be sent.
+/// The page after signing in, which sends the form.
 #[derive(Template)]
 #[template(path = "send_now.html")]
 struct SendNowPage {
@@ -54,12 +53,12 @@ struct SendNowPage {
     fields: Vec<(String, String)>,
 }
 
-/// The page that sends a form whose sender has signed in meanwhile.
+/// Shows the form for sending after signing in.
 pub(super) fn send_now(unsent: &Unsent) -> super::error::Page {
     page(&SendNowPage { to: unsent.to.clone(), fields: unsent.pairs() })
 }
 
-/// Asks whoever sends a form and is not signed in to sign in, and keeps the form for them.
+/// Asks a caller without a session to sign in, and keeps the form.
 pub(super) async fn keep(
     State(app): State<AppState>,
     SignedIn(caller): SignedIn,
@@ -73,14 +72,14 @@ pub(super) async fn keep(
     }
     let kind = request.headers().get(header::CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or_default();
     let is_form = kind.starts_with("application/x-www-form-urlencoded");
-    // A new password is typed once more; a file is chosen once more.
+    // Passwords and files have to be entered again.
     let unsent = if is_form && to != "/account" {
         let body = Bytes::from_request(request, &app).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
         Unsent { to, fields: String::from_utf8_lossy(&body).into_owned() }
     } else {
         Unsent::default()
     };
-    let refused = Some("you are not signed in any more: nothing of what you sent was stored".to_owned());
+    let refused = Some("You are no longer signed in. Your entry was not saved.".to_owned());
     let shown = page(&SignInPage { refused, name: String::new(), unsent })?;
     Ok((StatusCode::UNAUTHORIZED, shown).into_response())
 }

@@ -38,7 +38,7 @@ pub struct NewToken {
 pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<(Token, String), Error> {
     let name = printable::name("name", &new.name, 80)?;
     if new.scopes.is_empty() || new.scopes.contains(&Right::Administer) {
-        let allowed = "some of read, run, answer, rate, device: people administer, programs do not";
+        let allowed = "one or more of read, run, answer, rate, device";
         return Err(Error::invalid("scopes", json!(new.scopes), allowed));
     }
     if new.days.is_some_and(|days| !(1..=LONGEST_DAYS).contains(&days)) {

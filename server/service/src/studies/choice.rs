@@ -115,9 +115,9 @@ fn reason_in_words(reason: ProposalReason) -> String {
     match reason {
         ProposalReason::FirstAction => "first trial, drawn at random",
         ProposalReason::RandomAction => "drawn at random",
-        ProposalReason::ThompsonOnLine => "on a line through the best",
-        ProposalReason::ExpectedBestUtility => "highest expected utility beside the best",
-        ProposalReason::LinesExhausted => "lines exhausted: drawn at random",
+        ProposalReason::ThompsonOnLine => "on a line through the best action",
+        ProposalReason::ExpectedBestUtility => "most useful comparison with the best action",
+        ProposalReason::LinesExhausted => "drawn at random, because no action was left on the lines",
         _ => "chosen by the learner",
     }
     .to_owned()

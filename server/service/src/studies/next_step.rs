@@ -28,7 +28,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     if study.plan.feedback_mode == FeedbackMode::Human {
         match (study.state, comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
             (StudyState::Running, Question::Pair(_)) => {
-                return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into()));
+                return Ok(Step::Act(Act::Ask, "A comparison needs an answer.".into()));
             }
             (StudyState::Waiting, Question::None) => return Ok(Step::Act(Act::Answered, String::new())),
             // The comparison follows as soon as the gait is certified. No trial is proposed before.
@@ -49,7 +49,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     let open = snapshot.open();
     let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
     if tried >= study.plan.trial_budget {
-        let finished = Step::Act(Act::Finish, format!("all {} trials are done", study.plan.trial_budget));
+        let finished = Step::Act(Act::Finish, format!("All {} trials are done.", study.plan.trial_budget));
         return Ok(if open == 0 { finished } else { Step::Nothing });
     }
     if let Some(reason) = snapshot.is_enough() {
@@ -62,7 +62,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     match choice::next_trial(pool, snapshot, &belief) {
         Ok(new) => Ok(Step::Try(new)),
         Err(e) if e.is_exhausted() && open == 0 => {
-            Ok(Step::Act(Act::Finish, "every action of the search space was tried".into()))
+            Ok(Step::Act(Act::Finish, "Every action of the search space was tried.".into()))
         }
         Err(e) if e.is_exhausted() => Ok(Step::Nothing),
         Err(choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),

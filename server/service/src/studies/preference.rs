@@ -54,8 +54,8 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
         return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician or script"));
     }
     if pair.0 == pair.1 {
-        let allowed = format!("another trial than {}: a gait cannot be compared with itself", fields.0);
-        return Err(Error::invalid(fields.1, pair.1.to_string(), &allowed));
+        let allowed = "a different trial: a gait cannot be compared with itself";
+        return Err(Error::invalid(fields.1, pair.1.to_string(), allowed));
     }
     if said.is_about_safety() {
         return report_unsafe(writer, statement).await;

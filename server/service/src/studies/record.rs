@@ -74,7 +74,7 @@ pub async fn ended(
         return Ok(true);
     }
     // Its worker is free again; the trial is solved anew at most twice, and says why.
-    broke(store, lease, "the study heard answers faster than the result could be compared with them").await
+    broke(store, lease, "answers arrived faster than the result could be compared with them").await
 }
 
 /// Records an engineering failure: the job is retried at most twice, then the trial is `failed`.
@@ -99,7 +99,7 @@ pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
     let before = jobs::troubles(&mut writer, lease.job).await?;
     let after = Troubles { losses: before.losses + 1, ..before };
-    let reason = "its worker was not heard of again";
+    let reason = "the lease of its worker ended";
     let recorded = give_up_or_requeue(&mut writer, lease, Happening::Silent(before), after, reason).await?;
     commit(writer).await?;
     Ok(recorded)
@@ -200,14 +200,14 @@ fn message_of(outcome: &SolveOutcome) -> String {
     let worst = outcome.violations.first();
     let cause = match outcome.report.status {
         SolveStatus::Converged => return String::new(),
-        SolveStatus::Infeasible => "no gait meets all constraints near the point that was reached",
-        SolveStatus::Stalled => "the solver made no further progress",
-        SolveStatus::IterationLimit => "the iteration limit was reached",
-        SolveStatus::TimeLimit => "the time limit was reached",
+        SolveStatus::Infeasible => "no gait near the last iterate satisfies all constraints",
+        SolveStatus::Stalled => "the solver stalled",
+        SolveStatus::IterationLimit => "iteration limit reached",
+        SolveStatus::TimeLimit => "time limit reached",
         SolveStatus::Cancelled => "cancelled",
     };
     match worst {
-        Some(row) => format!("{cause}; least satisfied: {} by {:.3e} {}", row.row, row.amount, row.unit),
+        Some(row) => format!("{cause}; largest violation: {}, {:.3e} {}", row.row, row.amount, row.unit),
         None => cause.to_owned(),
     }
 }

@@ -111,14 +111,14 @@ impl StudySnapshot {
         if let Some(budget) = plan.solve_seconds_budget
             && spent >= budget
         {
-            return Some(format!("the solves took {spent:.0} s of {budget:.0} s"));
+            return Some(format!("The solves used {spent:.0} s of the {budget:.0} s allowed."));
         }
         let limit = plan.unchanged_limit? as usize;
         // The best trial at each proposal, newest first.
         let bests: Vec<TrialId> =
             self.trials.iter().rev().filter_map(|trial| trial.best_before).take(limit + 1).collect();
         let same = bests.len() > limit && bests.iter().all(|best| *best == bests[0]);
-        same.then(|| format!("the best action stayed the same over {limit} results"))
+        same.then(|| format!("The best action did not change in {limit} results."))
     }
 
     /// The gait of a trial, if it is walkable.

@@ -264,8 +264,8 @@ pub async fn admit_pair(
     }
     let admit = |field: &str, trial: &Trial| grounds.admit(trial).map_err(|reason| reason.of_field(field, trial.id));
     let (a, b) = (admit(fields.0, &first)?, admit(fields.1, &second)?);
-    let same = format!("another gait than {}: both trials gave the same one", fields.0);
-    WalkablePair::of((a, &first), (b, &second)).ok_or_else(|| Error::invalid(fields.1, pair.1.to_string(), &same))
+    let other = "a different gait: both trials have the same one";
+    WalkablePair::of((a, &first), (b, &second)).ok_or_else(|| Error::invalid(fields.1, pair.1.to_string(), other))
 }
 
 /// The trial of this study that `field` names.

@@ -1,5 +1,4 @@
-//! The reference gait that is chosen in the form for a new study: whether another one is nearer to the subject, and what
-//! it looks like.
+//! The chosen reference gait in the form for a new study: its chart, and whether another one is nearer to the subject.
 
 use super::super::drawn::Drawn;
 use askama::Template;
@@ -17,12 +16,12 @@ const ANGLES: [&str; 5] = ["torso lean", "left hip", "left knee", "left ankle", 
 #[template(path = "chosen_reference.html")]
 struct ChosenReference {
     nearest: String,
-    /// Of some reference gait the distance is known.
+    /// Whether the distance of at least one reference gait is known.
     measured: bool,
     chart: Drawn,
 }
 
-/// Every reference gait as seen from the subject of a study, and which one the study has.
+/// Every reference gait with its distance from the subject of a study, and the chosen one.
 pub(super) struct Choice {
     matches: Vec<Match>,
     chosen: ReferenceGaitId,
@@ -48,21 +47,21 @@ impl Choice {
     }
 }
 
-/// What the matcher says, nearest first.
+/// A sentence about the nearest reference gait, from matches in the order of distance.
 fn nearest(matches: &[Match], chosen: &Match) -> String {
     let known = matches.iter().filter(|found| found.distance.is_some()).count();
     let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
     match matches.first() {
         _ if known == 0 => {
-            let why = "Height and body mass are not both known of any reference gait, so none can be proposed as the nearest.";
-            format!("{why} Taken: {}.", chosen.reference_gait.name)
+            let why = "No reference gait has both height and body mass, so the nearest one is unknown.";
+            format!("{why} Chosen: {}.", chosen.reference_gait.name)
         }
         Some(first) if first.reference_gait.id == chosen.reference_gait.id => {
             let name = &first.reference_gait.name;
-            format!("{name}: the nearest to the subject in height and body mass{}.", away(first))
+            format!("{name}: nearest to the subject in height and body mass{}.", away(first))
         }
         Some(first) => format!(
-            "Nearer to the subject in height and body mass: {}{}, and not this one{}.",
+            "{}{} is nearer to the subject in height and body mass than this one{}.",
             first.reference_gait.name,
             away(first),
             away(chosen)
@@ -71,9 +70,9 @@ fn nearest(matches: &[Match], chosen: &Match) -> String {
     }
 }
 
-/// All angles over one stride.
+/// All joint angles over one stride.
 fn chart(reference: &ReferenceGait) -> Chart {
-    let chart = Chart::new("The reference gait", "gait cycle from right heel strike, %", "angle, °");
+    let chart = Chart::new("Reference gait", "gait cycle from right heel strike, %", "angle, °");
     ANGLES.iter().enumerate().fold(chart, |chart, (column, name)| {
         let rows = reference.definition.angles_rad.iter().enumerate();
         let line = rows.map(|(row, angles)| (row as f64, angles[column].to_degrees())).collect();

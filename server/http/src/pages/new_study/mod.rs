@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// The fields as typed, so that a refused form comes back as it was.
+/// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct Fields {
     #[serde(default)]
@@ -60,7 +60,7 @@ pub(super) struct Fields {
     seed: String,
     #[serde(default)]
     basin_within_percent: String,
-    /// The search space: what the editor knows, and nothing else.
+    /// The entries of the search space, which the editor reads.
     #[serde(flatten)]
     space: BTreeMap<String, String>,
 }
@@ -94,15 +94,14 @@ impl Default for Fields {
     }
 }
 
-/// The learners to choose from: name, name for people, when to take it. The measurements behind this are in the learner's
-/// README.
+/// The learners to choose from: value, label, and when to choose it. The benchmarks of the learner support this advice.
 const LEARNERS: [(&str, &str, &str); 3] = [
-    ("linecospar", "LineCoSpar", "the paper's method: people answer, and an answer may now and then be wrong"),
-    ("eubo", "EUBO", "Gait RMSE answers: from 10 comparisons on it is nearer to the best than LineCoSpar"),
+    ("linecospar", "LineCoSpar", "the method of the paper; for answers by people, some of which may be wrong"),
+    ("eubo", "EUBO", "for answers by Gait RMSE; from 10 comparisons on, closer to the best gait than LineCoSpar"),
     (
         "eubo_uncertain",
         "EUBO for uncertain answers",
-        "people answer, are often unsure, and will answer 50 times or more",
+        "for answers by people who are often unsure, with 50 answers or more",
     ),
 ];
 
@@ -115,13 +114,13 @@ fn learner(name: &str) -> Option<LearnerSettings> {
     }
 }
 
-/// The subject option that means: the person described below it.
+/// The option of the subject field that stands for a new subject.
 const NEW_SUBJECT: &str = "new";
 
 /// The fields that describe a new subject.
 const DESCRIPTION: [&str; 3] = ["pseudonym", "height_m", "body_mass_kg"];
 
-/// What people read beside a field.
+/// The label of a field.
 fn label(field: &str) -> String {
     let named = match field {
         "name" => "Name",
@@ -135,10 +134,10 @@ fn label(field: &str) -> String {
         "feedback_mode" => "Comparisons are answered by",
         "trial_budget" => "Trials",
         "learner" => "Learner",
-        "unchanged_limit" => "Stop early",
-        "parallel_trials" => "At the same time",
+        "unchanged_limit" => "Stop early after",
+        "parallel_trials" => "Parallel trials",
         "seed" => "Seed",
-        "basin_within_percent" => "Of several gaits, the nearest to the reference within, %",
+        "basin_within_percent" => "Objective tolerance, %",
         other => other,
     };
     match field.split_once('_') {
@@ -150,7 +149,7 @@ fn label(field: &str) -> String {
     }
 }
 
-/// What there is to choose from, and how long solves took.
+/// The choices of the form, and measured solve times.
 struct Offered {
     subjects: Vec<Subject>,
     devices: Vec<Device>,
@@ -160,7 +159,7 @@ struct Offered {
 
 impl Offered {
     async fn read(db: &mut Connection) -> Result<Self, Error> {
-        // The first one is chosen where nobody chooses: the built-in one.
+        // The first device is the default: the built-in one.
         let built_in = gait_optimizer::Device::ampro3()?;
         let mut devices = devices::all(db).await?;
         devices.sort_by_key(|device| device.definition != built_in);
@@ -193,29 +192,29 @@ impl NewStudyPage {
         self.refused.as_ref().is_some_and(|refused| refused.field == field)
     }
 
-    /// Attributes of a field: of the one that was refused, that it was and where it is said why, and the focus.
+    /// The attributes that mark a refused field, point to the reason and set the focus.
     fn invalid(&self, field: &str) -> &'static str {
         if self.refuses(field) { " aria-invalid=\"true\" aria-describedby=\"refused\" autofocus" } else { "" }
     }
 
-    /// The same in the table of bounds, where a bound may be refused as a whole.
+    /// The same for the table of bounds, where a bound can be refused as a whole.
     fn invalid_part(&self, part: &str, bound: &str) -> &'static str {
         let of_part = self.invalid(&format!("{part}_{bound}"));
         if of_part.is_empty() { self.invalid(bound) } else { of_part }
     }
 
-    /// Whether something in the table of bounds was refused: it is shown then.
+    /// Whether an entry of the table of bounds was refused, so that the table has to be shown.
     fn refuses_bound(&self) -> bool {
         let of_bound = |field: &str| TunedBounds::NAMES.iter().any(|bound| field.ends_with(bound));
         self.refused.as_ref().is_some_and(|refused| of_bound(&refused.field))
     }
 
-    /// Whether a new subject is described, or something in that description was refused.
+    /// Whether a new subject is entered, or one of its fields was refused.
     fn describes(&self) -> bool {
         self.fields.subject == NEW_SUBJECT || DESCRIPTION.iter().any(|field| self.refuses(field))
     }
 
-    /// Whether one of the fields for experts was changed or refused: they are shown then.
+    /// Whether an expert setting was changed or refused, so that they have to be shown.
     fn expert(&self) -> bool {
         let (typed, default) = (&self.fields, Fields::default());
         let fields = |fields: &Fields| {
@@ -225,7 +224,7 @@ impl NewStudyPage {
         fields(typed) != fields(&default)
     }
 
-    /// How long solves took, in words; the first with muscles, the second without.
+    /// Measured solve times, with and without muscles.
     fn measured(&self) -> String {
         let words = |measured: &Option<trials::Measured>, variant: &str| {
             measured.as_ref().map(|m| format!("{:.1} s {variant} muscles (median of {})", m.median_seconds, m.solves))
@@ -233,9 +232,9 @@ impl NewStudyPage {
         let [with, without] = &self.offered.measured;
         let both: Vec<String> = [words(with, "with"), words(without, "without")].into_iter().flatten().collect();
         if both.is_empty() {
-            return "No solve was measured yet: seconds to a minute each.".to_owned();
+            return "No solve times measured yet; expect some seconds to a minute per solve.".to_owned();
         }
-        format!("What a solve took here: {}.", both.join(", "))
+        format!("Solve time here: {}.", both.join(", "))
     }
 }
 
@@ -269,20 +268,20 @@ pub(super) async fn post(
     Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
 }
 
-/// What is thought of a form that is still being filled in.
+/// The check of a form that is still being filled in.
 #[derive(Debug, Serialize)]
 pub(super) struct Checked {
-    /// The field that would be refused.
+    /// The field that would be refused, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     field: Option<String>,
-    /// Why, or what the study would be.
+    /// Why it would be refused, or the size and duration of the study.
     text: String,
-    /// The reference gait that is chosen, as a part of the page.
+    /// The chosen reference gait, as a part of the page.
     #[serde(skip_serializing_if = "Option::is_none")]
     reference: Option<String>,
 }
 
-/// `POST /studies/new/check`: checks the form as it would be checked when it is sent, and writes nothing.
+/// `POST /studies/new/check`: checks the form as `POST /studies/new` would, and writes nothing.
 pub(super) async fn check(
     _: May<Run>,
     State(app): State<AppState>,
@@ -302,7 +301,7 @@ pub(super) async fn check(
     Ok(Json(checked))
 }
 
-/// A refusal that belongs to a field; any other error is passed on.
+/// Converts an error about a field into a refusal; other errors pass.
 fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
     match error {
         Error::Invalid(field) => {
@@ -319,22 +318,22 @@ fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
     }
 }
 
-/// How large the study is, and how long it will take.
+/// The size of the study and its expected duration.
 async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error> {
     let combinations = format::count(plan.search_space.len());
-    let size = format!("{} of {combinations} combinations of bounds will be tried", plan.trial_budget);
+    let size = format!("The study tries {} of {combinations} combinations of bounds", plan.trial_budget);
     let people = format::besides_solves(plan.feedback_mode);
-    // Trials that run at the same time share the machine: no gain is promised.
+    // Parallel trials share the machine, so they are not counted as faster.
     let took = |measured: trials::Measured| measured.median_seconds * f64::from(plan.trial_budget);
     Ok(match trials::measured(db, plan.muscles).await?.map(took) {
-        Some(seconds) => format!("{size}, in about {}{people}.", format::duration(seconds)),
+        Some(seconds) => format!("{size} and takes about {}{people}.", format::duration(seconds)),
         None => format!(
-            "{size}. Nothing was measured here yet: the first takes up to a minute, later ones seconds{people}."
+            "{size}. No solve times measured yet: the first trial takes up to a minute, later ones some seconds{people}."
         ),
     })
 }
 
-/// Makes the study, and the subject where a new one is described.
+/// Creates the study, and the subject if a new one is entered.
 async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &SpaceEditor) -> Result<Study, Error> {
     let subject = match subject_of(fields)? {
         Chosen::New(new) => person::add(writer, &caller.actor, &new).await?.id,
@@ -343,7 +342,7 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
     plan::create_by(writer, caller, study_of(fields, editor, subject)?).await
 }
 
-/// What [`make`] would make.
+/// The study that [`make`] would create.
 async fn planned(db: &mut Connection, fields: &Fields, editor: &SpaceEditor) -> Result<StudyPlan, Error> {
     match subject_of(fields)? {
         Chosen::New(new) => plan::checked_for_new(db, &new, study_of(fields, editor, SubjectId::fresh())?).await,
@@ -351,7 +350,7 @@ async fn planned(db: &mut Connection, fields: &Fields, editor: &SpaceEditor) -> 
     }
 }
 
-/// Whom the study is of.
+/// The subject of the study.
 enum Chosen {
     New(NewSubject),
     Known(SubjectId),
@@ -360,10 +359,10 @@ enum Chosen {
 fn subject_of(fields: &Fields) -> Result<Chosen, Error> {
     if fields.subject != NEW_SUBJECT {
         nothing_described(fields)?;
-        return Ok(Chosen::Known(number("subject", &fields.subject, "a subject of the list")?));
+        return Ok(Chosen::Known(number("subject", &fields.subject, "a subject from the list")?));
     }
-    let height = "a number of metres with a decimal point, as in 1.75";
-    let mass = "a number of kilograms with a decimal point, as in 65.7";
+    let height = "a number in metres, as in 1.75";
+    let mass = "a number in kilograms, as in 65.7";
     Ok(Chosen::New(NewSubject {
         pseudonym: fields.pseudonym.clone(),
         height_m: number("height_m", &fields.height_m, height)?,
@@ -377,8 +376,8 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
     let learners = LEARNERS.map(|(name, ..)| name).join(", ");
     Ok(NewStudy {
         name: Some(fields.name.clone()),
-        device_id: optional("device", &fields.device, "a device of the list")?,
-        reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait of the list")?,
+        device_id: optional("device", &fields.device, "a device from the list")?,
+        reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait from the list")?,
         muscles: match fields.muscles.as_str() {
             "on" => true,
             "off" => false,
@@ -392,7 +391,7 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
         learner: learner(&fields.learner)
             .ok_or_else(|| Error::invalid("learner", fields.learner.as_str(), &learners))?,
         trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
-        unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or nothing")?,
+        unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or empty")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
         seed: number("seed", &fields.seed, &format!("0 to {}", plan::LARGEST_SEED))?,
         restricted: fields.restricted.is_some(),
@@ -400,10 +399,10 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
     })
 }
 
-/// Nothing: the lowest objective counts alone.
+/// `None` if only the lowest objective counts.
 fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
     let field = "basin_within_percent";
-    let allowed = "0 to 100, or nothing";
+    let allowed = "0 to 100, or empty";
     let Some(within_percent) = optional(field, &fields.basin_within_percent, allowed)? else {
         return Ok(BasinChoice::LowestObjective);
     };
@@ -412,11 +411,11 @@ fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
     Ok(chosen)
 }
 
-/// A person who is described but not chosen would be left out without a word.
+/// Refuses a new subject that is entered but not chosen, instead of ignoring it.
 fn nothing_described(fields: &Fields) -> Result<(), Error> {
     for (field, text) in DESCRIPTION.into_iter().zip([&fields.pseudonym, &fields.height_m, &fields.body_mass_kg]) {
         if !text.trim().is_empty() {
-            let allowed = "nothing, as a subject of the list is chosen; or choose \"A new subject\"";
+            let allowed = "empty, because a subject from the list is chosen; or choose \"A new subject\"";
             return Err(Error::invalid(field, text.as_str(), allowed));
         }
     }
@@ -427,7 +426,7 @@ fn number<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<T, Error
     text.trim().parse().map_err(|_| Error::invalid(field, text, allowed))
 }
 
-/// The same for what may be left empty.
+/// The same for optional fields.
 fn optional<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<Option<T>, Error> {
     if text.trim().is_empty() { Ok(None) } else { number(field, text, allowed).map(Some) }
 }

@@ -1,4 +1,4 @@
-//! The editor of the search space: which bounds are tuned, over which values, and what the others are.
+//! The editor of the search space: tuned bounds with their values, and fixed values of the others.
 
 use gait_learner::{Dimension, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
@@ -6,7 +6,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::search::TABLE_I;
 use std::collections::BTreeMap;
 
-/// One bound as typed.
+/// The entries of one bound.
 pub(super) struct BoundRow {
     pub(super) name: &'static str,
     pub(super) meaning: &'static str,
@@ -17,13 +17,13 @@ pub(super) struct BoundRow {
     pub(super) fixed: String,
 }
 
-/// The editor as typed.
+/// The entries of the editor.
 pub(super) struct SpaceEditor {
     pub(super) rows: Vec<BoundRow>,
 }
 
 impl SpaceEditor {
-    /// What was typed; all of Table I where nothing was.
+    /// Reads the entries; without any, Table I of the paper.
     ///
     /// # Errors
     /// [`Error::Malformed`] for a field that the form does not have.
@@ -79,11 +79,11 @@ impl SpaceEditor {
             dimensions.push(Dimension { name: row.name.to_owned(), values, lengthscale });
         }
         let space = SearchSpace::new(dimensions).map_err(|error| match error {
-            LearnerError::NoDimension => Error::invalid("tuned_a1", "no bound", "at least one bound that is tuned"),
+            LearnerError::NoDimension => Error::invalid("tuned_a1", "no bound", "at least one tuned bound"),
             LearnerError::InvalidDimension { dimension, reason } => Error::invalid(
                 &format!("values_{dimension}"),
                 self.values_of(&dimension),
-                &format!("increasing values; here {reason}"),
+                &format!("increasing values ({reason})"),
             ),
             LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
                 Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))

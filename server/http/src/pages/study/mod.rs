@@ -1,4 +1,4 @@
-//! A study: where it stands, live.
+//! The study page, kept current by events.
 
 mod trials_table;
 mod without_gait;
@@ -61,11 +61,11 @@ struct StudyPage {
     variant: &'static str,
     answers_by: &'static str,
     may_administer: bool,
-    /// Where it came from; empty: it was made here.
+    /// Imports; empty if the study was created here.
     imports: Vec<Import>,
 }
 
-/// The page of a study whose subject withdrew: what was tried, and nothing of what came of it.
+/// The page of a study whose subject withdrew consent: its plan, without gaits, figures or answers.
 #[derive(Template)]
 #[template(path = "study_closed.html")]
 struct ClosedPage {
@@ -81,21 +81,21 @@ struct Live {
     study: Study,
     state: String,
     acts: Vec<ActButton>,
-    /// It can be ended, which is asked once more.
+    /// Whether it can be stopped.
     may_stop: bool,
-    /// It has ended and can be given more trials.
+    /// Whether it has ended and can get more trials.
     may_extend: bool,
     counts: TrialCounts,
     /// Why trials have no gait.
     without_gait: Option<WithoutGait>,
-    /// How many results there are, and of how many.
+    /// Number of results, and number of planned trials.
     progress: [String; 2],
-    /// How long it will go on; empty: it does not.
+    /// Expected remaining time; empty if unknown.
     pace: String,
     running: Vec<RunningRow>,
     best: Option<Best>,
     unanswered: bool,
-    /// Whether people alone say what is better.
+    /// Whether only people answer comparisons.
     people_answer: bool,
     chart: Option<Drawn>,
     table: TrialsTable,
@@ -112,7 +112,7 @@ impl Live {
         self.best.as_ref().is_some_and(|best| best.id == row.id)
     }
 
-    /// Not all answers are listed.
+    /// Whether answers are missing from the list.
     fn has_more_answers(&self) -> bool {
         self.answers.len() >= SHOWN as usize
     }
@@ -141,11 +141,11 @@ struct Best {
     cost: String,
     bounds: Vec<Bound>,
     has_gait: bool,
-    /// A script evaluated it, and told figures alone.
+    /// Whether a script evaluated it and reported figures only.
     by_script: bool,
-    /// What its certificate says.
+    /// The state of its certificate.
     judged: Judged,
-    /// Where that failed, the best trial whose gait passed.
+    /// If it failed, the best trial whose gait passed.
     passing: Option<Passing>,
 }
 
@@ -172,25 +172,25 @@ struct Passing {
 
 struct AnswerRow {
     text: String,
-    /// Where it comes from, and who said it.
+    /// Source and author.
     by: String,
     note: String,
-    /// That it counts no more, and why.
+    /// Why it no longer counts.
     undone: Option<String>,
     at: Instant,
 }
 
-/// A gait that somebody called unsafe.
+/// A gait that was reported as unsafe.
 struct UnsafeGait {
     id: TrialId,
     number: u32,
     by: String,
     at: Instant,
-    /// Staff looked at it and left it so.
+    /// Whether staff reviewed the report and kept the gait unsafe.
     reviewed: bool,
 }
 
-/// So many of the newest trials of a large study are in the chart, and the newest answers in the list.
+/// How many of the newest trials of a large study the chart shows, and how many of the newest answers the list shows.
 const SHOWN: u32 = 200;
 
 /// `GET /studies/{id}`.
@@ -240,7 +240,7 @@ pub(super) async fn live(
     page(&read_live(&mut app, &may.caller, id, choice).await?)
 }
 
-/// How far a running solve is.
+/// The progress of a running solve.
 #[derive(Template)]
 #[template(path = "running.html")]
 struct Running {
@@ -258,11 +258,11 @@ pub(super) async fn running(
     Ok(page(&Running { row: running_row(&trial, Some(&track)) })?.into_response())
 }
 
-/// What a button does.
+/// The form of a button.
 #[derive(Debug, Deserialize)]
 pub(super) struct Do {
     act: String,
-    /// How many trials in all, where there are to be more.
+    /// The new total number of trials, for an extension.
     #[serde(default)]
     trial_budget: String,
 }
@@ -280,7 +280,8 @@ pub(super) async fn post(
         .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop, extend"))?;
     let mut writer = app.write().await?;
     let cancelled = if act == Act::Extend {
-        let refused = || Error::invalid("trial_budget", form.trial_budget.as_str(), "how many trials in all");
+        let refused =
+            || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
         let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
         change::extend(&mut writer, &may.caller.actor, id, &more).await?;
         Vec::new()
@@ -295,12 +296,12 @@ pub(super) async fn post(
     Ok(Redirect::to(&format!("/studies/{id}")))
 }
 
-/// Whether a person does it with a button; the others happen by themselves.
+/// Whether the page has a button for it.
 fn acts_for_pages(act: Act) -> bool {
     matches!(act, Act::Start | Act::Pause | Act::Resume | Act::Stop | Act::Extend)
 }
 
-/// What needs no second thought.
+/// Acts that need no confirmation.
 fn button(act: Act) -> Option<ActButton> {
     match act {
         Act::Start => Some(ActButton { act: "start", label: "Start" }),
@@ -310,15 +311,15 @@ fn button(act: Act) -> Option<ActButton> {
     }
 }
 
-/// What is computed from the snapshot: CPU work.
+/// Figures that are computed from the snapshot on the thread pool.
 #[derive(Default)]
 pub(super) struct Figures {
-    /// People are to answer and nobody has: what the learner believes then is only what it began with.
+    /// Whether people answer and nobody has yet, so that the posterior is only the prior.
     unanswered: bool,
     pub(super) best: Option<TrialId>,
-    /// The trajectory of the best one is here.
+    /// Whether the trajectory of the best gait is stored.
     has_gait: bool,
-    /// The gaits, the best one first, and what their certificates say.
+    /// The gaits from best to worst, and the states of their certificates.
     ranking: Vec<TrialId>,
     judged: Judged,
     /// Why trials have no gait.
@@ -339,7 +340,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
-    // The learner's time grows with the answers, too.
+    // The computing time of the learner also grows with the answers.
     let heard = feedback::count(&mut reader, id).await? as usize;
     let large = counts.total as usize >= MANY || heard > MOST_ANSWERS;
     let snapshot = if large {
@@ -390,7 +391,7 @@ pub(super) fn figures(
     beliefs: &Beliefs,
 ) -> Result<Figures, gait_learner::LearnerError> {
     if large {
-        // Of many trials not all were read: what the learner last believed stands for the posterior.
+        // A large study is not read completely, so the learner's last best action is used instead of the posterior.
         let best = last_believed(snapshot);
         let (ranking, history) = (best.into_iter().collect(), history::known(snapshot));
         let question = snapshot.study.state == StudyState::Waiting;
@@ -413,7 +414,7 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
         || "starting".to_owned(),
         |r| {
             let violation = format::number(r.constraint_violation);
-            // All of them, as the chart counts.
+            // Counts all iterations, like the chart.
             let iteration = records.len() - 1;
             format!("iteration {iteration}, objective {:.4}, violation {violation}", r.objective)
         },
@@ -484,7 +485,7 @@ fn view(
     }
 }
 
-/// Warm-start tree; none before anything did.
+/// Warm-start tree; none before the first warm start.
 pub(super) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>) -> Option<Figure> {
     let places: HashMap<TrialId, usize> = snapshot.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
     let node = |trial: &Trial| Node {
@@ -498,15 +499,15 @@ pub(super) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>) -> Op
     nodes.iter().any(|node| node.parent.is_some()).then(|| Figure::tree(Tree { title, nodes }))
 }
 
-/// What people said, the newest first; what Gait RMSE says is in the table of trials already.
+/// Answers of users and subjects, newest first. Those of Gait RMSE follow from the table of trials.
 fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRow> {
     let of_assessment = |id| assessments.iter().any(|assessment| assessment.feedback_id == Some(id));
     let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
-    let why = |retraction: &Option<Retraction>| Some(format!("taken back: {}", retraction.as_ref()?.reason));
+    let why = |retraction: &Option<Retraction>| Some(format!("retracted: {}", retraction.as_ref()?.reason));
     let lifted = |id| {
         let of_it = |closed: &&Closed| closed.said == SafetyReportSource::Staff(id);
         let review = snapshot.grounds.safety_reports.lifted.iter().find(of_it)?.review.as_ref()?;
-        Some(format!("may be walked with again, {}: {}", review.author, review.reason))
+        Some(format!("cleared for walking by {}: {}", review.author, review.reason))
     };
     let preference = |row: &FeedbackRow| {
         Some(AnswerRow {
@@ -520,7 +521,7 @@ fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRo
     let assessment = |assessment: &Assessment| {
         Some(AnswerRow {
             text: assessment_in_words(assessment, snapshot)?,
-            by: format!("{}, {}", format::person(assessment.source), assessment.author),
+            by: format!("{}, {}", format::source_name(assessment.source), assessment.author),
             note: assessment.note.clone(),
             undone: why(&assessment.retraction).or_else(|| lifted(assessment.id)),
             at: assessment.created_at,
@@ -534,11 +535,13 @@ fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRo
     rows
 }
 
-/// `trial 3 over trial 2`.
+/// `trial 3 is better than trial 2`.
 pub(super) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Option<String> {
     let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
     match row.said {
-        FeedbackContent::Preference { winner, loser } => Some(format!("{} over {}", name(winner)?, name(loser)?)),
+        FeedbackContent::Preference { winner, loser } => {
+            Some(format!("{} is better than {}", name(winner)?, name(loser)?))
+        }
         FeedbackContent::Tie { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
@@ -549,28 +552,26 @@ pub(super) fn assessment_in_words(assessment: &Assessment, snapshot: &StudySnaps
     let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
     let (first, second) = (name(assessment.first)?, name(assessment.second)?);
     Some(match assessment.answer {
-        presentations::Judgement::UnsafeFirst => format!("{first} is unsafe (beside {second})"),
-        presentations::Judgement::UnsafeSecond => format!("{second} is unsafe (beside {first})"),
+        presentations::Judgement::UnsafeFirst => format!("{first} is unsafe (compared with {second})"),
+        presentations::Judgement::UnsafeSecond => format!("{second} is unsafe (compared with {first})"),
         presentations::Judgement::UnsafeBoth => format!("{first} and {second} are unsafe"),
-        _ => format!("cannot tell {first} from {second}"),
+        _ => format!("cannot tell whether {first} or {second} is better"),
     })
 }
 
-/// That nothing is solved for the study, and what stands before it; of all studies the solves that wait and that run.
+/// Why the next solve of the study has not started, from the numbers of queued and running solves of all studies.
 fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
     let solves = |count: u32| if count == 1 { "1 solve".to_owned() } else { format!("{count} solves") };
     match (running, queued.saturating_sub(1)) {
-        (0, _) => "Its next solve waits for a worker; none is at work.".to_owned(),
-        (_, 0) => format!("Its next solve waits for a worker: {} of other studies in progress.", solves(running)),
-        (_, others) => format!(
-            "Its next solve waits for a worker: {} of other studies in progress, {} more in the queue.",
-            solves(running),
-            others
-        ),
+        (0, _) => "The next solve is queued. No worker is running.".to_owned(),
+        (_, 0) => format!("The next solve is queued: {} of other studies running.", solves(running)),
+        (_, others) => {
+            format!("The next solve is queued: {} of other studies running, {} more queued.", solves(running), others)
+        }
     }
 }
 
-/// How long the study will go on by itself, as far as its own solves tell.
+/// The expected remaining time of the study, from the median of its own solves.
 fn pace(snapshot: &StudySnapshot, counts: TrialCounts) -> String {
     let study = &snapshot.study;
     if study.state != StudyState::Running {
@@ -582,18 +583,18 @@ fn pace(snapshot: &StudySnapshot, counts: TrialCounts) -> String {
         if counts.results() > 0 || study.plan.evaluation == Evaluation::Script {
             return String::new();
         }
-        return "The first trial starts from a guess and takes longest: up to a minute.".to_owned();
+        return "The first trial has a cold start and takes the longest, up to a minute.".to_owned();
     };
     let left = study.plan.trial_budget.saturating_sub(counts.results());
     let people = format::besides_solves(study.plan.feedback_mode);
-    format!("About {} to go{people}.", format::duration(median * f64::from(left)))
+    format!("About {} left{people}.", format::duration(median * f64::from(left)))
 }
 
-/// Group of the figures that show the course of a study.
+/// Group of the figures that show the progress of a study.
 pub(super) const COURSE: &str = "course";
 
-/// Gait RMSE of the best action by iteration: of one study with its trials, or of several beside each other; none before
-/// the first converged trial.
+/// Gait RMSE of the best action by iteration, for one study with its trials or for several studies; `None` before the first
+/// converged trial.
 pub(super) fn course(studies: &[(&StudySnapshot, &Figures)]) -> Option<Chart> {
     let title = "Gait RMSE of the best action by iteration";
     let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad");

@@ -1,5 +1,5 @@
-//! The table of trials: sorted, filtered and cut into pages by the query string, so that it needs no script and can be
-//! sent to somebody as an address.
+//! The table of trials. The query string has sorting, filters and page, so the table works without scripts and can be
+//! bookmarked.
 
 use super::super::format::{self, words};
 use gait_optimizer::TunedBounds;
@@ -9,7 +9,7 @@ use gaitwright_store::trials::{TrialCounts, TrialState};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 
-/// So many trials make a page; the downloads have all of them.
+/// Trials per page; the downloads have all of them.
 const PAGE: u32 = 200;
 const DESCENDING: &str = "descending";
 
@@ -71,11 +71,11 @@ pub(super) struct Column {
     pub(super) meaning: &'static str,
     pub(super) numeric: bool,
     pub(super) link: String,
-    /// For assistive technology; empty: the table is sorted by another one.
+    /// `aria-sort` of the column; empty if the table is sorted by another one.
     pub(super) sorted: String,
 }
 
-/// A state to choose, with how many trials are in it.
+/// An option of the state filter.
 pub(super) struct StateChoice {
     pub(super) value: &'static str,
     pub(super) words: String,
@@ -97,7 +97,7 @@ pub(super) struct TrialRow {
     pub(super) message: String,
 }
 
-/// The table as shown.
+/// The visible part of the table.
 pub(super) struct TrialsTable {
     pub(super) any: bool,
     pub(super) choice: Choice,
@@ -105,7 +105,7 @@ pub(super) struct TrialsTable {
     pub(super) figures: Vec<Column>,
     pub(super) bounds: Vec<Column>,
     pub(super) rows: Vec<TrialRow>,
-    /// Which of how many, when not all are on this page or a filter is set.
+    /// Which trials are shown, if the page does not show all of them.
     pub(super) extent: Option<String>,
     pub(super) earlier: Option<String>,
     pub(super) later: Option<String>,
@@ -151,13 +151,13 @@ fn states(chosen: Option<TrialState>) -> Vec<StateChoice> {
 fn extent(shown: u32, offset: u32, matching: u32, total: u32) -> String {
     let count = |value: u32| format::count(value.into());
     if shown == 0 {
-        return format!("None of {} trials.", count(total));
+        return format!("No matching trials among {}.", count(total));
     }
     let (first, last) = (count(offset + 1), count(offset + shown));
     if matching < total {
-        format!("{first} to {last} of {} that fit, of {} trials.", count(matching), count(total))
+        format!("{first} to {last} of {} matching trials; {} trials in total.", count(matching), count(total))
     } else {
-        format!("{first} to {last} of {} trials; all of them are in the downloads.", count(total))
+        format!("{first} to {last} of {} trials. The downloads have all of them.", count(total))
     }
 }
 
@@ -179,10 +179,10 @@ fn columns(choice: &Choice, listing: &Listing, bounds: bool) -> Result<Vec<Colum
 
 fn heading(sort: &'static str) -> (&'static str, &'static str) {
     match sort {
-        "number" => ("Trial", "In the order of proposal"),
+        "number" => ("Trial", "In the order of proposals"),
         "state" => ("State", ""),
         "gait_rmse_rad" => ("RMSE, rad", "Gait RMSE against the reference gait"),
-        "cost_of_transport" => ("Cost", "Cost of transport, dimensionless"),
+        "cost_of_transport" => ("Cost", "Cost of transport, without unit"),
         "iterations" => ("Iterations", "Interior-point iterations of the solve"),
         "seconds_total" => ("Time, s", "Wall time of the solve"),
         bound => (bound, format::meaning(bound)),

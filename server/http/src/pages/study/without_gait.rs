@@ -1,4 +1,4 @@
-//! Why trials of a study have no gait, in a line.
+//! One sentence about why trials of a study have no gait.
 
 use super::format;
 use gaitwright_store::TrialId;
@@ -6,23 +6,23 @@ use gaitwright_store::explanations::{Common, Relief};
 use gaitwright_store::trials::{Trial, TrialState};
 use std::collections::BTreeMap;
 
-/// The trials without a gait.
+/// A sentence about the trials without a gait, and an example.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct WithoutGait {
-    /// What most of them have in common.
+    /// The sentence.
     pub(super) reason: String,
-    /// One of those: identifier and number.
+    /// One of these trials: identifier and number.
     pub(super) instance: (TrialId, u32),
 }
 
 impl WithoutGait {
-    /// None where every trial that the program solved has a gait.
+    /// `None` if every solved trial has a gait.
     pub(super) fn of(trials: &[Trial], common: &Common) -> Option<Self> {
         let explained = common.explained;
         if let Some(Relief { bound, trials, instance }) = &common.relief {
             let limited = format::limited(bound);
             let reason = format!(
-                "{bound} ({limited}) alone, relaxed, gives one in {trials} of {explained} trials that are explained"
+                "Relaxing {bound} ({limited}) alone gives a gait in {trials} of {explained} explained trials without a gait."
             );
             return Some(Self { reason, instance: *instance });
         }
@@ -37,9 +37,10 @@ impl WithoutGait {
         let newest = most.last()?;
         let alone = match explained {
             0 => String::new(),
-            _ => format!("; no bound alone, relaxed, gives one in the {explained} that are explained"),
+            _ => format!(" Relaxing a single bound gives no gait in any of the {explained} explained trials."),
         };
-        let reason = format!("{constraint} was missed most, in {} of {all} trials{alone}", most.len());
+        let reason =
+            format!("{constraint} has the largest violation in {} of {all} trials without a gait.{alone}", most.len());
         Some(Self { reason, instance: (newest.id, newest.number) })
     }
 }

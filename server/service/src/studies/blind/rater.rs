@@ -219,7 +219,7 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Res
         // Staff may have retracted it already.
         && feedback::get(writer, heard).await?.retraction.is_none()
     {
-        answering::retract(writer, caller, Some(shown.study_id), heard, None, "the rater took it back").await?;
+        answering::retract(writer, caller, Some(shown.study_id), heard, None, "by the rater").await?;
     }
     presentations::take_back(writer, shown.id).await?;
     note(writer, caller, &shown, "presentation.take_back").await?;

@@ -1,9 +1,9 @@
-// Lets a recording be chosen as a file: its text goes into the field that works without scripts, too.
+// Adds a file chooser to a text field for a measurement file. Without this script the text can be pasted.
 
-for (const field of document.querySelectorAll("[data-recording]")) {
+for (const field of document.querySelectorAll("[data-file]")) {
   const text = field.querySelector("textarea");
   const label = document.createElement("label");
-  label.textContent = field.dataset.recording || "File";
+  label.textContent = field.dataset.file || "Measurement file";
   const input = document.createElement("input");
   input.type = "file";
   input.accept = ".mot,.sto,.csv,text/plain,text/csv";

@@ -1,6 +1,7 @@
-//! Users and tokens: who may come in.
+//! The page of users, sessions and tokens.
 
 use super::error::{Page, PageError, page};
+use super::{format, refusal};
 use crate::AppState;
 use crate::client_address::Secure;
 use crate::extract::Form;
@@ -13,31 +14,30 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::people::{self, NewUser};
 use gaitwright_service::access::tokens::{self as making, NewToken};
 use gaitwright_service::access::{Administer, Caller, Right, Role, sign_in};
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_store::sessions::Session;
 use gaitwright_store::sign_in_failures::Source;
 use gaitwright_store::tokens::Token;
 use gaitwright_store::users::User;
 use gaitwright_store::{SessionId, TokenId, UserId, Writer, commit, sessions, sign_in_failures, tokens, users};
 use serde::Deserialize;
-use serde_json::Value;
 use std::str::FromStr;
 
-/// What a token may be allowed: people administer, programs do not.
+/// The scopes of tokens. There is none for administration: only users administer.
 const SCOPES: [(Right, &str); 5] = [
     (Right::Read, "see studies, trials and gaits"),
-    (Right::Run, "make, start and end studies; ask for trials and tell what they gave"),
-    (Right::Answer, "say which gait is better, and decide about unsafe ones"),
-    (Right::Rate, "compare gaits blindly"),
-    (Right::Device, "the device in the lab: fetch the controller files of walks (give it nothing else)"),
+    (Right::Run, "create, start and stop studies; ask for trials and report their outcomes"),
+    (Right::Answer, "answer comparisons and review safety reports"),
+    (Right::Rate, "compare gaits blind"),
+    (Right::Device, "fetch the controller files of walks; for the device in the lab, with no other scope"),
 ];
 
-/// Networks with failed sign-ins that are shown.
+/// How many networks with failed sign-ins are shown.
 const MOST_SOURCES: u32 = 20;
 
 #[derive(Template)]
-#[template(path = "people.html")]
-struct PeoplePage {
+#[template(path = "users.html")]
+struct UsersPage {
     users: Vec<User>,
     tokens: Vec<Token>,
     sessions: Vec<Session>,
@@ -47,7 +47,7 @@ struct PeoplePage {
     scopes: [(Right, &'static str); 5],
     outcome: Outcome,
     refused: Option<Refused>,
-    /// A refused form as it was typed. There is no secret in it.
+    /// The entries of a refused form. None of them is secret.
     typed: Asked,
 }
 
@@ -55,18 +55,18 @@ struct PeoplePage {
 struct Refused {
     /// Which form.
     act: String,
-    /// Which field; none: not because of one.
+    /// Which field; none if no single field is at fault.
     field: Option<&'static str>,
     message: String,
 }
 
-/// The fields of both forms: name in the record, form, and what people read beside it.
+/// The fields of both forms: name, form and label.
 const FIELDS: [(&str, &str, &str); 5] = [
     ("name", "add_user", "Name or code"),
     ("role", "add_user", "Role"),
-    ("name", "make_token", "What it is for"),
-    ("days", "make_token", "Ends after, days"),
-    ("scopes", "make_token", "What it allows"),
+    ("name", "make_token", "Purpose"),
+    ("days", "make_token", "Expires after, days"),
+    ("scopes", "make_token", "Scopes"),
 ];
 
 impl Refused {
@@ -74,10 +74,10 @@ impl Refused {
         let find = |name: &str| FIELDS.iter().find(|(field, form, _)| *field == name && *form == act);
         let (field, message) = match error {
             Error::Invalid(fault) => match find(&fault.field) {
-                Some((field, _, label)) => (Some(*field), in_words(label, fault)),
+                Some((field, _, label)) => (Some(*field), refusal::of_field(label, fault)),
                 None => (None, error.to_string()),
             },
-            // A name that is taken is all that the present state has against these two.
+            // The only conflict that these forms can have is a name that is taken.
             Error::Conflict(reason) => (find("name").map(|(field, _, _)| *field), reason.clone()),
             _ => (None, error.to_string()),
         };
@@ -85,26 +85,14 @@ impl Refused {
     }
 }
 
-/// What is wrong with a field, under the name that people read.
-fn in_words(label: &str, fault: &FieldError) -> String {
-    let allowed = fault.allowed.as_deref().unwrap_or_default();
-    match fault.value.as_ref() {
-        Some(Value::String(text)) if !text.is_empty() => {
-            format!("{label}: \u{201c}{text}\u{201d} is not accepted; accepted: {allowed}")
-        }
-        Some(Value::Number(number)) => format!("{label}: {number} is not accepted; accepted: {allowed}"),
-        _ => format!("{label}: needed is {allowed}"),
-    }
-}
-
-impl PeoplePage {
+impl UsersPage {
     /// Why this field of this form was refused.
     fn fault(&self, act: &str, field: &str) -> Option<&str> {
         let refused = self.refused.as_ref()?;
         (refused.act == act && refused.field == Some(field)).then_some(refused.message.as_str())
     }
 
-    /// What marks a refused field.
+    /// The attributes of a refused field.
     fn invalid(&self, act: &str, field: &str) -> &'static str {
         if self.fault(act, field).is_some() {
             " aria-invalid=\"true\" aria-describedby=\"fault\" autofocus"
@@ -113,7 +101,7 @@ impl PeoplePage {
         }
     }
 
-    /// What was typed into a form, if it was that one.
+    /// The entry of a field, if its form was the refused one.
     fn typed<'a>(&self, act: &str, text: &'a str) -> &'a str {
         if self.typed.act == act { text } else { "" }
     }
@@ -134,15 +122,15 @@ impl PeoplePage {
     }
 }
 
-/// What was just done.
+/// The result of an action.
 #[derive(Default)]
 struct Outcome {
     done: Option<String>,
-    /// Something that is shown once and never again: what it is, and itself.
+    /// A secret that is shown once: label and text.
     secret: Option<(&'static str, String)>,
 }
 
-/// What a form asks for.
+/// The fields of every form of the page.
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct Asked {
     act: String,
@@ -158,11 +146,12 @@ pub(super) struct Asked {
     run: Option<String>,
     answer: Option<String>,
     rate: Option<String>,
+    device: Option<String>,
 }
 
 impl Asked {
     fn scopes(&self) -> Vec<Right> {
-        let given = [&self.read, &self.run, &self.answer, &self.rate];
+        let given: [_; SCOPES.len()] = [&self.read, &self.run, &self.answer, &self.rate, &self.device];
         SCOPES.iter().zip(given).filter(|(_, given)| given.is_some()).map(|((right, _), _)| *right).collect()
     }
 
@@ -176,7 +165,7 @@ impl Asked {
     }
 }
 
-/// `GET /people`.
+/// `GET /users`.
 pub(super) async fn get(_: May<Administer>, State(app): State<AppState>) -> Page {
     show(&app, Outcome::default(), None, Asked::default()).await
 }
@@ -187,11 +176,11 @@ async fn show(app: &AppState, outcome: Outcome, refused: Option<Refused>, typed:
     let now = app.access.clock.now(&mut reader).await?;
     let sessions = sign_in::live(&mut reader, None, app.access.limits, now).await?;
     let failures = sign_in_failures::most(&mut reader, MOST_SOURCES).await?;
-    page(&PeoplePage { users, tokens, sessions, failures, roles: Role::ALL, scopes: SCOPES, outcome, refused, typed })
+    page(&UsersPage { users, tokens, sessions, failures, roles: Role::ALL, scopes: SCOPES, outcome, refused, typed })
 }
 
-/// `POST /people`. A link or token is in the answer itself: it is not stored, and a reload does not make another one
-/// without asking.
+/// `POST /users`. Answers with the page instead of a redirect, because a link or token is not stored and can be shown only
+/// here.
 pub(super) async fn post(
     may: May<Administer>,
     State(app): State<AppState>,
@@ -204,7 +193,7 @@ pub(super) async fn post(
     match act(&mut writer, &may.caller, &origin, &asked).await {
         Ok(outcome) => {
             commit(writer).await?;
-            // Event streams of whoever may no more are listening to nothing else.
+            // Event streams check again whether their user still has access.
             app.scheduler.changed();
             Ok(show(&app, outcome, None, Asked::default()).await?.into_response())
         }
@@ -218,7 +207,8 @@ pub(super) async fn post(
     }
 }
 
-/// Where the asking browser reaches this service: `https://gait.clinic.example`. Other names are refused before.
+/// The address under which the browser reaches this service, as in `https://gait.clinic.example`. Unknown host names were
+/// refused before.
 pub(super) fn origin(secure: Secure, headers: &HeaderMap) -> String {
     let host = headers.get(header::HOST).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let scheme = secure.scheme();
@@ -242,31 +232,31 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
         "disable" | "enable" => {
             let disabled = asked.act == "disable";
             let user = people::set_disabled(writer, actor, asked.id()?, disabled).await?;
-            Ok(done(format!("{} is {}.", user.name, if disabled { "shut out" } else { "let in again" })))
+            Ok(done(format!("{} is {}.", user.name, if disabled { "disabled" } else { "enabled again" })))
         }
         "role" => {
             let user = people::set_role(writer, actor, asked.id()?, asked.role()?).await?;
-            Ok(done(format!("{} is {} from now on.", user.name, user.role.as_str())))
+            Ok(done(format!("{} now has the role {}.", user.name, format::role(&user.role))))
         }
         "end_session" => {
             let id: SessionId = asked.id()?;
             let missing = || Error::NotFound { what: "session".to_owned(), id: id.to_string() };
             let session = sessions::get(writer, id).await?.ok_or_else(missing)?;
             sign_in::end(writer, actor, &session).await?;
-            Ok(done(format!("A session of {} was ended.", session.user_name)))
+            Ok(done(format!("Ended a session of {}.", session.user_name)))
         }
         "make_token" => {
             let days = match asked.days.trim() {
                 "" => None,
-                text => Some(text.parse().map_err(|_| Error::invalid("days", text, "1 to 3660, or nothing"))?),
+                text => Some(text.parse().map_err(|_| Error::invalid("days", text, "1 to 3660, or empty"))?),
             };
             let new = NewToken { name: asked.name.clone(), scopes: asked.scopes(), days };
             let (token, secret) = making::make(writer, actor, &new).await?;
-            Ok(Outcome { done: Some(format!("Token {} was made.", token.name)), secret: Some(("Token", secret)) })
+            Ok(Outcome { done: Some(format!("Created token {}.", token.name)), secret: Some(("Token", secret)) })
         }
         "revoke" => {
             let token = making::revoke(writer, actor, asked.id::<TokenId>()?).await?;
-            Ok(done(format!("Token {} was ended.", token.name)))
+            Ok(done(format!("Revoked token {}.", token.name)))
         }
         other => {
             Err(Error::invalid("act", other, "add_user, link, disable, enable, role, end_session, make_token, revoke"))
@@ -276,7 +266,7 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
 
 fn link(user: &User, origin: &str, secret: &str) -> Outcome {
     Outcome {
-        done: Some(format!("A sign-in link for {}: it works once, within a day. Send it to them.", user.name)),
-        secret: Some(("The link", format!("{origin}/sign-in/{secret}"))),
+        done: Some(format!("Created a sign-in link for {}. It works once, within a day.", user.name)),
+        secret: Some(("Sign-in link", format!("{origin}/sign-in/{secret}"))),
     }
 }
