@@ -250,7 +250,7 @@ impl Comparison<'_> {
                 (false, true, Side::Request) => self.breaks(&inside, "the field is required"),
                 (true, false, Side::Answer) => self.breaks(&inside, "the field may be missing"),
                 (false, true, Side::Answer) | (true, false, Side::Request) => {
-                    self.adds(&inside, "always or never there")
+                    self.adds(&inside, "always or never there");
                 }
                 _ => {}
             }

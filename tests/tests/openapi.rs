@@ -220,13 +220,19 @@ impl Description {
             return self.fits(&named, value, &format!("{place}: {name}"));
         }
         if let Some(parts) = schema["oneOf"].as_array() {
-            // Either nothing or one other shape: of several it would not be known which one is meant.
             let null = |part: &&Value| part["type"] == "null";
             if value.is_null() {
                 assert!(parts.iter().any(|part| null(&part)), "{place} is null");
                 return;
             }
-            let rest: Vec<&Value> = parts.iter().filter(|part| !null(part)).collect();
+            // Of several shapes, a property with one possible value tells which one is meant.
+            let meant = |part: &&Value| {
+                let properties = part["properties"].as_object().into_iter().flatten();
+                let mut tags =
+                    properties.filter(|(_, field)| field["enum"].as_array().is_some_and(|all| all.len() == 1));
+                tags.all(|(name, field)| field["enum"][0] == value[name])
+            };
+            let rest: Vec<&Value> = parts.iter().filter(|part| !null(part)).filter(meant).collect();
             let [one] = rest[..] else { panic!("{place} can have several shapes: {rest:?}") };
             return self.fits(one, value, place);
         }

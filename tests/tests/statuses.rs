@@ -39,7 +39,7 @@ impl Scene {
             answer.json()["id"].as_str().unwrap().to_owned()
         };
         let preference = json!({"trial_a": one, "trial_b": two, "answer": "a"});
-        let assessment = json!({"first": one, "second": two, "answer": "cannot_tell"});
+        let assessment = json!({"first": one, "second": two, "answer": "cannot_tell", "author": "somebody else"});
         let user = made("/api/v1/users".to_owned(), json!({"name": "Ada", "role": "rater"})).await;
         let ids = BTreeMap::from([
             ("subjects", service.subject().await.to_string()),
@@ -123,11 +123,13 @@ impl Scene {
         for (name, field) in schema["properties"].as_object().cloned().unwrap_or_else(Map::new) {
             let field = self.resolved(&field);
             let mut bad = Vec::new();
-            if let Some(most) = field["maximum"].as_f64() {
-                bad.push(if field["type"] == "integer" { json!(most as i64 + 1) } else { json!(most + 1.0) });
+            if let Some(most) = field["maximum"].as_i64() {
+                bad.push(json!(most + 1));
+            } else if let Some(most) = field["maximum"].as_f64() {
+                bad.push(json!(most + 1.0));
             }
             if let Some(longest) = field["maxLength"].as_u64() {
-                bad.push(json!("x".repeat(longest as usize + 1)));
+                bad.push(json!("x".repeat(usize::try_from(longest).unwrap() + 1)));
             }
             if field["pattern"].is_string() {
                 bad.push(json!("\u{7}"));

@@ -19,7 +19,7 @@ use gaitwright_service::studies::command;
 use gaitwright_store::listing::{self, Listing, SORTS};
 use gaitwright_store::results::{self, AttemptResult};
 use gaitwright_store::trials::{self, Trial, TrialState};
-use gaitwright_store::{Connection, StudyId, TrialId, gaits, schema, studies};
+use gaitwright_store::{StudyId, TrialId, gaits, schema, studies};
 use serde::Deserialize;
 use std::collections::HashMap;
 

@@ -4,7 +4,7 @@ use gait_optimizer::TunedBounds;
 use gaitwright_charts::power_of_ten;
 use gaitwright_service::access::Role;
 use gaitwright_store::feedback::{FeedbackRow, Source};
-use gaitwright_store::lab_recordings::RecordingKind;
+use gaitwright_store::measurement_files::MeasurementKind;
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::studies::FeedbackMode;
 
@@ -166,10 +166,10 @@ pub(super) fn role(role: &Role) -> &'static str {
 
 /// The kind of a measurement file.
 #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
-pub(super) fn file_kind(kind: &RecordingKind) -> &'static str {
+pub(super) fn file_kind(kind: &MeasurementKind) -> &'static str {
     match kind {
-        RecordingKind::Electromyogram => "EMG recording",
-        RecordingKind::Motion => "joint angles",
+        MeasurementKind::Electromyogram => "EMG recording",
+        MeasurementKind::Motion => "joint angles",
     }
 }
 
