@@ -36,7 +36,7 @@ async fn a_device_is_made_of_another_one_and_errors_stand_at_their_field() {
     assert!(page.contains("name=\"shank_mass_kg\"") && page.contains("0.2 to 15") && page.contains("prosthetic shank"));
     for (field, value, expected) in [
         ("shank_mass_kg", "99", "shank_mass_kg is &#34;99&#34;; it must be 0.2 to 15."),
-        ("shank_length_m", "long", "allowed: 0.2 to 0.6"),
+        ("shank_length_m", "long", "it must be 0.2 to 0.6"),
         ("name", "", "1 to 80 printable characters"),
         ("colour", "red", "a field of this form"),
     ] {

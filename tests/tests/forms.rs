@@ -416,10 +416,10 @@ async fn a_refused_new_study_says_which_field_in_its_own_words_and_opens_it() {
     for (changed, field, said) in [
         ("lengthscale_a1=-5", "lengthscale_a1", "Lengthscale of a1 is -5.0; it must be 0.05 to 50000"),
         ("lengthscale_a3=0", "lengthscale_a3", "Lengthscale of a3 is 0.0; it must be 0.001 to 2000"),
-        ("values_a1=15,x", "values_a1", "Values of a1: "),
-        ("trial_budget=many", "trial_budget", "Trials: "),
-        ("seed=x", "seed", "Seed: "),
-        ("height_m=1.7", "height_m", "Height, m: "),
+        ("values_a1=15,x", "values_a1", "Values of a1 is "),
+        ("trial_budget=many", "trial_budget", "Trials is "),
+        ("seed=x", "seed", "Seed is "),
+        ("height_m=1.7", "height_m", "Height, m is "),
     ] {
         let refused = service.post_text("/studies/new", FORM, &form(changed)).await;
         is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, said);
@@ -495,7 +495,7 @@ async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_f
     let send = async |body: &str| service.post_text("/users", FORM, body).await;
     assert!(send("act=add_user&name=K1&role=clinician").await.status.is_success());
     let taken = send("act=add_user&name=K1&role=admin").await;
-    is_page(&taken, StatusCode::CONFLICT, "there is a user");
+    is_page(&taken, StatusCode::CONFLICT, "There is already a user");
     for kept in [
         "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",
         "value=\"admin\" selected",
