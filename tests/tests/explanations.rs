@@ -225,7 +225,7 @@ async fn what_cannot_be_explained_is_said_and_not_tried_again() {
     let refused = ask(&service, trial).await;
     assert_eq!(refused.status, StatusCode::CONFLICT);
     assert!(
-        refused.text.contains("trial 2 cannot be explained") && refused.text.contains("panicked"),
+        refused.text.contains("Trial 2 cannot be explained") && refused.text.contains("panicked"),
         "{}",
         refused.text
     );

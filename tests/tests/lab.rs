@@ -203,7 +203,11 @@ async fn walked(service: &Service, study: StudyId, trials: &[Trial]) -> (String,
     let session = planned(service, study, trials).await;
     let lab = format!("/api/v1/lab-sessions/{}", id(&session));
     let early = service.post(&format!("{lab}/answers"), &json!({"number": 1, "answer": "first"})).await;
-    assert!(early.status == StatusCode::CONFLICT && early.text.contains("walk 1 was not recorded"), "{}", early.text);
+    assert!(
+        early.status == StatusCode::CONFLICT && early.text.contains("Walk 1 is not recorded yet"),
+        "{}",
+        early.text
+    );
     for walk in 1..=3 {
         service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
     }
@@ -329,7 +333,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     assert!(service.fetch(&format!("{lab}/next-walk")).await.text.contains("Walk 2"));
     assert_eq!(service.post_text(&format!("{page}/close"), FORM, "note=").await.status, StatusCode::SEE_OTHER);
     let again = service.post_text(&format!("{page}/close"), FORM, "note=").await;
-    assert!(again.status == StatusCode::CONFLICT && again.text.contains("the session is closed"), "{}", again.text);
+    assert!(again.status == StatusCode::CONFLICT && again.text.contains("The session is closed"), "{}", again.text);
     assert_eq!(service.post_text(&format!("{page}/unblind"), FORM, "note=over").await.status, StatusCode::SEE_OTHER);
     assert!(!service.fetch(&page).await.text.contains("one of the two gaits (blinded)"));
     service.stop().await;
@@ -391,7 +395,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
     let bring = format!("{api}/measurement-files/emg");
     let early = service.post(&bring, &with_heel(1, &electromyogram(1.0))).await;
     assert!(
-        early.status == StatusCode::CONFLICT && early.text.contains("walk 1 was not recorded yet"),
+        early.status == StatusCode::CONFLICT && early.text.contains("Walk 1 is not recorded yet"),
         "{}",
         early.text
     );
@@ -499,7 +503,7 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
         (json!({"recording": motion().replace("\n5,", "\n5,x")}), "recording, line 502, column 2"),
         (json!({"recording": "time_s,knee\n0,1"}), "recording"),
         (json!({"reading": {"cutoff_hz": 90.0}}), "reading.cutoff_hz"),
-        (json!({"walk": 2}), "walk 2 was not recorded yet"),
+        (json!({"walk": 2}), "Walk 2 is not recorded yet"),
     ] {
         let mut body = json!({"walk": 1, "recording": motion()});
         body.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
@@ -516,7 +520,7 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
     assert_eq!(service.fetch(&format!("{api}/measurement-files")).await.items(), json!([]), "nothing was kept");
     service.post(&format!("{api}/close"), &json!({})).await;
     let closed = service.post(&format!("{api}/measurement-files/emg"), &with_heel(1, &whole)).await;
-    assert!(closed.status == StatusCode::CONFLICT && closed.text.contains("the session is closed"), "{}", closed.text);
+    assert!(closed.status == StatusCode::CONFLICT && closed.text.contains("The session is closed"), "{}", closed.text);
     service.stop().await;
 }
 
