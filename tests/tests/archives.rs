@@ -506,7 +506,7 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
     (earlier["signed_by"], earlier["trusted"]) = (json!(key), json!(1));
     let last = Service::start_as_is(&folder.path().join("e.db"), Consistent::default(), 1).await;
     import(&last.store, &rows.packed()).await.unwrap();
-    let from = last.fetch(&format!("/api/v1/studies/{study}/imports")).await.json();
+    let from = last.fetch(&format!("/api/v1/studies/{study}/imports")).await.items();
     for import in from.as_array().unwrap() {
         assert_eq!((&import["signed_by"], &import["trusted"]), (&Value::Null, &json!(false)), "{from}");
     }

@@ -280,7 +280,7 @@ async fn a_rater_who_was_a_clinician_before_is_recorded_as_not_blind() {
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
-    let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.json();
+    let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.items();
     let id = users.as_array().unwrap().iter().find(|user| user["name"] == "a rater").unwrap()["id"].clone();
     for role in ["clinician", "rater"] {
         let path = format!("/api/v1/users/{}/role", id.as_str().unwrap());

@@ -21,7 +21,8 @@ use gaitwright_store::studies::{Chosen, FeedbackMode, Study, StudyPlan};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
     Connection, FeedbackId, Instant, StoreError, StudyId, TrialId, archive, assessments, devices, feedback, gaits,
-    lab_sessions, measurement_files, now, presentations, reference_gaits, results, safety_reviews, studies, subjects, trials,
+    lab_sessions, measurement_files, now, presentations, reference_gaits, results, safety_reviews, studies, subjects,
+    trials,
 };
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
