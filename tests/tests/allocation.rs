@@ -136,6 +136,7 @@ async fn orders_of_10_000_lab_sessions_of_many_subjects_are_balanced() {
     for (place, orders) in &of_place {
         let ones = orders.iter().filter(|first| **first).count();
         let chi = chi_squared(ones, orders.len());
+        println!("place {place:?}: gait one first in {ones} of {}, chi-squared {chi:.2}", orders.len());
         assert!(chi < CRITICAL, "place {place:?}: {ones} of {}: {chi}", orders.len());
     }
     // Sessions of the same study say nothing about each other.
@@ -169,6 +170,7 @@ async fn sides_of_10_000_pairs_are_balanced_and_follow_from_no_earlier_pair() {
     drop(writer);
     let swapped: Vec<bool> = rows.iter().map(|row| row.get(0)).collect();
     let ones = swapped.iter().filter(|one| **one).count();
+    println!("sides exchanged in {ones} of 10000, chi-squared {:.2}", chi_squared(ones, 10_000));
     assert!(chi_squared(ones, 10_000) < CRITICAL, "{ones}");
     for distance in 1..=4 {
         let same = swapped.iter().zip(&swapped[distance..]).filter(|(a, b)| a == b).count();
@@ -288,6 +290,7 @@ async fn a_program_that_reads_everything_but_allocations_guesses_1_000_orders_no
     let mut tried = 0;
     for (rule, guess) in guesses(&seen, "lab_sessions") {
         let right = guess.iter().zip(&truth).filter(|(a, b)| a == b).count();
+        println!("guessed by {rule}: {right} of 1000");
         assert!(is_chance(right, 1000), "{rule}: {right} of 1000");
         tried += 1;
     }

@@ -156,7 +156,7 @@ fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
-const FORGERIES: [Forgery; 56] = [
+const FORGERIES: [Forgery; 57] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its figures differ from its solve report"),
     ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated Gait RMSE is 0.01 rad"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
@@ -349,6 +349,20 @@ const FORGERIES: [Forgery; 56] = [
         "the source of a preference is convergence",
     ),
     (
+        "an answer given twice",
+        |r| {
+            let mut row = of_source(r, "clinician").clone();
+            // The first one was retracted.
+            for (number, author) in [(1, "Nina"), (2, " NINA")] {
+                row["seq"] = (90_000 + number).into();
+                row["id"] = format!("01900000-0000-7000-8000-{number:012}").into();
+                row["author"] = author.into();
+                r.add("feedback", row.clone());
+            }
+        },
+        "has answered this comparison already",
+    ),
+    (
         "a suggestion out of space",
         |r| {
             r.copy("feedback", |f| {
@@ -485,6 +499,18 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
     let from = again.fetch(&format!("/api/v1/studies/{study}/imports")).await.items();
     assert_eq!(from.as_array().unwrap().len(), 2);
     again.stop().await;
+
+    // An archive that nobody vouches for vouches for no earlier one.
+    let mut rows = Rows::of(&answer.1);
+    let (earlier, key) = (rows.first("imports"), own.to_string());
+    (earlier["signed_by"], earlier["trusted"]) = (json!(key), json!(1));
+    let last = Service::start_as_is(&folder.path().join("e.db"), Consistent::default(), 1).await;
+    import(&last.store, &rows.packed()).await.unwrap();
+    let from = last.fetch(&format!("/api/v1/studies/{study}/imports")).await.items();
+    for import in from.as_array().unwrap() {
+        assert_eq!((&import["signed_by"], &import["trusted"]), (&Value::Null, &json!(false)), "{from}");
+    }
+    last.stop().await;
 }
 
 /// The rows of one archive with the last line of another.

@@ -275,6 +275,32 @@ async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
 }
 
 #[tokio::test]
+async fn a_rater_who_was_a_clinician_before_is_recorded_as_not_blind() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
+    let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.items();
+    let id = users.as_array().unwrap().iter().find(|user| user["name"] == "a rater").unwrap()["id"].clone();
+    for role in ["clinician", "rater"] {
+        let path = format!("/api/v1/users/{}/role", id.as_str().unwrap());
+        let body = json!({"role": role}).to_string();
+        let given = send(&service, &admin, &Method::POST, &path, "application/json", &body).await;
+        assert_eq!(given.status, StatusCode::OK, "{}", given.text);
+    }
+    let next = format!("/api/v1/studies/{study}/blind/next");
+    let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
+    for page in ["/rate".to_owned(), format!("/rate/pair/{}", pair["token"].as_str().unwrap())] {
+        let page = send(&service, &rater, &Method::GET, &page, "", "").await;
+        assert!(page.text.contains("recorded as not blind"), "{}", page.text);
+    }
+    let path = format!("/api/v1/blind/{}/answer", pair["token"].as_str().unwrap());
+    send(&service, &rater, &Method::POST, &path, "application/json", "{\"answer\": \"first\"}").await;
+    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn a_rater_who_may_read_by_the_time_of_the_answer_is_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;

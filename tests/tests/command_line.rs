@@ -115,6 +115,7 @@ fn a_warm_start_file_of_another_kind_is_refused() {
 #[test]
 fn a_service_without_sign_in_listens_to_this_machine_only() {
     refused(&["serve", "--no-sign-in", "--listen", "0.0.0.0:0"], "without sign-in");
+    refused(&["serve", "--no-sign-in", "--listen", "127.0.0.1:0", "--trusted-proxy", "10.1.0.1"], "without sign-in");
     refused(&["serve", "--trusted-proxy", "proxy.example"], "addresses and networks such as 127.0.0.1");
     refused(&["serve", "--proxy-headers", "via"], "x-forwarded, forwarded");
     refused(&["serve", "--listen", "here"], "listen (flag)");

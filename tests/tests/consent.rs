@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
 use gaitwright_http::openapi;
 use gaitwright_store::audit;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
@@ -252,4 +253,39 @@ async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() 
     let refused = import(&other.store, &archives[1]).await.unwrap_err().to_string();
     assert!(refused.contains("withdrew consent") && refused.contains("nothing was changed"), "{refused}");
     other.stop().await;
+}
+
+#[tokio::test]
+async fn answers_kept_for_repeated_requests_are_not_given_out_after_withdrawal() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let finished = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(finished, &[StudyState::Finished]).await;
+    let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
+    let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
+    let trials = service.trials(finished).await;
+    let told = (
+        format!("/api/v1/trials/{}/tell", asked["id"].as_str().unwrap()),
+        json!({"outcome": "converged", "gait_rmse_rad": 0.3125}),
+    );
+    let preferred = (
+        format!("/api/v1/studies/{finished}/preferences"),
+        json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"}),
+    );
+    let send = async |(path, body): &(String, Value)| {
+        let request = Request::post(path).header("content-type", "application/json").header("idempotency-key", path);
+        service.send(request.body(Body::from(body.to_string())).unwrap()).await
+    };
+    for request in [&told, &preferred] {
+        let (first, again) = (send(request).await, send(request).await);
+        assert!(first.status.is_success() && again.text == first.text, "{}", first.text);
+    }
+    let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
+    assert_eq!(service.post(&withdraw, &json!({"reason": "moved away"})).await.status, StatusCode::OK);
+    for request in [&told, &preferred] {
+        let again = send(request).await;
+        assert_eq!(again.status, StatusCode::CONFLICT, "{}", again.text);
+        assert!(again.text.contains("withdrew consent") && !again.text.contains("0.3125"), "{}", again.text);
+    }
+    service.stop().await;
 }

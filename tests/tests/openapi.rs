@@ -184,6 +184,19 @@ async fn the_description_is_served_and_its_page_needs_nothing_from_elsewhere() {
     for elsewhere in ["http://", "https://", "//cdn"] {
         assert!(!page.text.contains(elsewhere), "{elsewhere}");
     }
+    // The page names exactly the changes that refuse an Idempotency-Key.
+    let sentence =
+        page.text.split("<code>Idempotency-Key</code>, except").nth(1).unwrap().split("</p>").next().unwrap();
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut refusing = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap().iter().filter(|(method, _)| *method != "get") {
+            let named = sentence.contains(&format!("<code>{} {path}</code>", method.to_uppercase()));
+            assert_eq!(named, !takes_key(operation), "{method} {path}");
+            refusing += usize::from(named);
+        }
+    }
+    assert!(refusing >= 2, "{sentence}");
     service.stop().await;
 }
 

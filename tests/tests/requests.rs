@@ -233,6 +233,18 @@ async fn a_request_without_exactly_one_host_is_refused() {
     service.stop().await;
 }
 
+#[tokio::test]
+async fn a_request_with_two_idempotency_keys_is_refused() {
+    let (_folder, service) = service().await;
+    let body = json!({"pseudonym": "S1", "height_m": 1.8, "body_mass_kg": 70}).to_string();
+    let request = Request::post("/api/v1/subjects").header(header::CONTENT_TYPE, "application/json");
+    let request = request.header("idempotency-key", "one").header("idempotency-key", "two");
+    let refused = service.send(request.body(Body::from(body)).unwrap()).await;
+    assert_eq!(refused.status, StatusCode::BAD_REQUEST, "{}", refused.text);
+    assert!(refused.text.contains("given more than once"), "{}", refused.text);
+    service.stop().await;
+}
+
 /// A service that believes a proxy on this machine and answers to one name.
 async fn behind_a_proxy() -> (TempDir, Service, Router) {
     let (folder, service) = callers::service().await;

@@ -82,8 +82,8 @@ struct Waiting {
     rows: HashMap<Access, Tally>,
     /// When each row was last written.
     written: HashMap<Access, Instant>,
-    /// A task will write what waits.
-    scheduled: bool,
+    /// A task writes what waits.
+    is_kept: bool,
 }
 
 impl AccessLog {
@@ -92,7 +92,7 @@ impl AccessLog {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts an access; whether a task must be started that writes it.
+    /// Counts an access; whether the task that writes is still to be started.
     fn count(&self, mut access: Access) -> bool {
         let mut waiting = self.waiting();
         if waiting.rows.len() >= MOST_WAITING && access.kind == Kind::Refused && !waiting.rows.contains_key(&access) {
@@ -103,7 +103,7 @@ impl AccessLog {
         let at = now();
         let tally = waiting.rows.entry(access).or_insert(Tally { first_at: at, last_at: at, times: 0 });
         (tally.last_at, tally.times) = (at, tally.times.saturating_add(1));
-        !std::mem::replace(&mut waiting.scheduled, true)
+        !std::mem::replace(&mut waiting.is_kept, true)
     }
 
     /// Takes the rows that are due: all, or those that were not written within the last minute.
@@ -131,18 +131,29 @@ impl AccessLog {
     /// # Errors
     /// Errors of the database. No row is lost then.
     pub async fn write(&self, store: &Store, all: bool) -> Result<(), Error> {
-        let due = self.due(all);
-        for (done, rows) in due.chunks(AT_ONCE).enumerate() {
-            if let Err(error) = append(store, rows).await {
-                self.put_back(&due[done * AT_ONCE..]);
-                return Err(error.into());
-            }
+        let mut unwritten = Unwritten { log: self, rows: self.due(all) };
+        while !unwritten.rows.is_empty() {
+            let first = unwritten.rows.len().saturating_sub(AT_ONCE);
+            append(store, &unwritten.rows[first..]).await?;
+            unwritten.rows.truncate(first);
         }
         if let Some(spool) = access_spool::take(store.path())? {
             append(store, &spool.noted).await?;
             spool.clear()?;
         }
         Ok(())
+    }
+}
+
+/// Rows that wait again where writing them fails, panics or is given up.
+struct Unwritten<'a> {
+    log: &'a AccessLog,
+    rows: Vec<(Access, Tally)>,
+}
+
+impl Drop for Unwritten<'_> {
+    fn drop(&mut self) {
+        self.log.put_back(&self.rows);
     }
 }
 
@@ -154,18 +165,28 @@ async fn append(store: &Store, rows: &[(Access, Tally)]) -> StoreResult<()> {
     commit(writer).await
 }
 
-/// Writes what waits until nothing waits any more.
+/// Writes what waits, as a task of the service.
 async fn keep_writing(app: AppState) {
+    let scheduler = app.scheduler.clone();
+    scheduler.keep("writing the access log", |task| write_what_waits(app.clone(), task)).await;
+}
+
+async fn write_what_waits(app: AppState, task: Task) -> Result<(), Error> {
+    let mut failing = false;
     loop {
         tokio::time::sleep(WITHIN).await;
-        let log = &app.access.log;
-        if let Err(error) = log.write(app.store(), false).await {
-            tracing::error!(%error, "the access log cannot be written; its rows wait");
-        }
-        let mut waiting = log.waiting();
-        if waiting.rows.is_empty() {
-            waiting.scheduled = false;
-            return;
+        match app.access.log.write(app.store(), false).await {
+            Ok(()) => {
+                task.works();
+                failing = false;
+            }
+            // The record takes no changes, as `/ready` says: nothing is lost, and the log says so once.
+            Err(error) if error.is_of_machine() => {
+                if !std::mem::replace(&mut failing, true) {
+                    tracing::error!(%error, "the access log cannot be written; its rows wait");
+                }
+            }
+            Err(error) => return Err(error),
         }
     }
 }

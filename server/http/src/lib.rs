@@ -19,6 +19,7 @@ mod may;
 pub mod metrics;
 mod once;
 pub mod openapi;
+mod openapi_depends;
 mod openapi_rules;
 pub mod pages;
 mod paging;

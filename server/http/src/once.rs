@@ -3,6 +3,7 @@
 use super::AppState;
 use super::extract::{body, unreadable};
 use super::may::permitted;
+use super::reached::OfStudy;
 use crate::problem::Refusal;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
@@ -12,7 +13,7 @@ use gaitwright_service::access::{Caller, Permission};
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::idempotency::{self, KEY_UNIQUE, Kept, fingerprint};
-use gaitwright_store::{LentWriter, OnConstraint, commit};
+use gaitwright_store::{LentWriter, OnConstraint, StudyId, commit, consents};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::marker::PhantomData;
@@ -29,6 +30,7 @@ pub(crate) struct Once<P> {
     pub(crate) caller: Caller,
     key: Option<String>,
     request: String,
+    study: Option<StudyId>,
     right: PhantomData<P>,
 }
 
@@ -44,6 +46,10 @@ impl<P: Permission> Once<P> {
         match idempotency::find(&mut writer, &self.actor, key).await? {
             None => Ok(Ok(writer)),
             Some(kept) if kept.request == self.request => {
+                // What may no longer be shown is not shown once more either.
+                if let Some(study) = self.study {
+                    consents::may_be_shown(&mut writer, study).await?;
+                }
                 let mut answer = response(&kept);
                 answer.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
                 Ok(Err(answer))
@@ -126,22 +132,18 @@ impl<P: Permission> Once<P> {
         app.scheduler.changed();
         Ok(response(&kept))
     }
+}
 
-    fn new(caller: Caller, headers: &HeaderMap, method: &str, path: &str, bytes: &[u8]) -> Result<Self, Error> {
-        let key = match headers.get(&IDEMPOTENCY_KEY) {
-            None => None,
-            Some(value) => Some(value.to_str().ok().filter(|key| (1..=200).contains(&key.len())).ok_or_else(|| {
-                Error::Malformed("Idempotency-Key: 1 to 200 printable ASCII characters are accepted".to_owned())
-            })?),
-        };
-        Ok(Self {
-            actor: caller.actor.clone(),
-            caller,
-            key: key.map(str::to_owned),
-            request: fingerprint(method, path, bytes),
-            right: PhantomData,
-        })
+/// The one key in a request.
+fn key_in(headers: &HeaderMap) -> Result<Option<String>, Error> {
+    let malformed = |reason: &str| Error::Malformed(format!("Idempotency-Key: {reason}"));
+    let mut all = headers.get_all(&IDEMPOTENCY_KEY).iter();
+    let Some(value) = all.next() else { return Ok(None) };
+    if all.next().is_some() {
+        return Err(malformed("given more than once; one is accepted"));
     }
+    let key = value.to_str().ok().filter(|key| (1..=200).contains(&key.len()));
+    Ok(Some(key.ok_or_else(|| malformed("1 to 200 printable ASCII characters are accepted"))?.to_owned()))
 }
 
 fn response(kept: &Kept) -> Response {
@@ -160,8 +162,17 @@ async fn read<P: Permission, S: Send + Sync>(
     let caller = permitted::<P>(request.extensions())?;
     let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
     let headers = request.headers().clone();
+    let study = request.extensions().get::<OfStudy>().and_then(|of| of.0);
     let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
-    Ok((Once::new(caller, &headers, &method, &path, &bytes)?, headers, bytes))
+    let once = Once {
+        actor: caller.actor.clone(),
+        caller,
+        key: key_in(&headers)?,
+        request: fingerprint(&method, &path, &bytes),
+        study,
+        right: PhantomData,
+    };
+    Ok((once, headers, bytes))
 }
 
 impl<P: Permission, S: Send + Sync> FromRequest<S> for Once<P> {

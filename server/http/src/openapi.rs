@@ -19,7 +19,7 @@ use utoipa_axum::router::OpenApiRouter;
         title = "Gaitwright",
         description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
                        not a medical device.\n\nLengths are metres, masses kilograms, angles radians unless a name says \
-                       otherwise, times RFC 3339 in UTC.\n\nA list is answered by pages: `items`, and in `next` the \
+                       otherwise, times RFC 3339 in UTC. Whole numbers have no fraction.\n\nA list is answered by pages: `items`, and in `next` the \
                        `cursor` of the next page.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),

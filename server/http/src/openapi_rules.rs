@@ -4,9 +4,12 @@
 //! the same rules everywhere, so they are stated once. The ranges of solver and learner settings come from the errors
 //! of their own checks.
 
+use super::openapi_depends;
 use gait_learner::LearnerSettings;
+use gait_optimizer::emg::CHANNELS;
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
 use gait_optimizer::{Device, GaitSettings, SolveOptions, Subject, TunedBounds};
+use gaitwright_service::access::Right;
 use gaitwright_service::document;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::plan::LARGEST_SEED;
@@ -36,10 +39,6 @@ const NAMES: [(&str, &str, u32); 11] = [
 
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
-
-/// What a schema cannot say of a recording.
-const RECORDING: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five joint angles over at least \
-                         one whole stride of a walking person. Heel strikes and columns that are named must be in it.";
 
 /// Adds the rules to a description.
 pub(super) fn state(document: &mut Value) {
@@ -72,7 +71,8 @@ pub(super) fn state(document: &mut Value) {
         // A code of the site, without addresses, dates and long numbers.
         let pseudonym = r"^(?!(.*[0-9]){6})[A-Za-z0-9_.:/#+()\-][A-Za-z0-9 _.:/#+()\-]*$";
         add(schemas, "NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
-        add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": ["read", "run", "answer", "rate"] } }));
+        let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
+        add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
         let people =
             json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who says so" });
         schemas.insert("PersonSource".to_owned(), people);
@@ -100,7 +100,17 @@ pub(super) fn state(document: &mut Value) {
             tell.insert("else".to_owned(), reason);
         }
         add(schemas, "NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
-        add(schemas, "NewReferenceGait", "recording", &json!({ "minLength": 1, "x-depends": RECORDING }));
+        for component in ["NewReferenceGait", "NewEmg", "NewMotion"] {
+            add(schemas, component, "recording", &json!({ "minLength": 1 }));
+        }
+        add(schemas, "EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
+        add(schemas, "MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
+        for (field, least) in [("band_low_hz", 1.0), ("band_high_hz", 2.0), ("envelope_hz", 0.5)] {
+            add(schemas, "EmgSettings", field, &json!({ "minimum": least }));
+        }
+        add(schemas, "EmgSettings", "order", &json!({ "enum": [2, 4, 6, 8, null] }));
+        let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });
+        add(schemas, "Suggestion", "bounds", &bounds);
         for (field, (least, most)) in
             [("height_m", Subject::HEIGHT_RANGE_M), ("body_mass_kg", Subject::BODY_MASS_RANGE_KG)]
         {
@@ -118,8 +128,8 @@ pub(super) fn state(document: &mut Value) {
         }
         add(schemas, "Dimension", "name", &json!({ "enum": TunedBounds::NAMES }));
         add(schemas, "Dimension", "values", &json!({ "minItems": 1, "maxItems": 1000, "uniqueItems": true }));
-        for field in ["base_bounds", "search_space"] {
-            describe(schemas, field);
+        if let Some(bounds) = schemas.get_mut("Bounds").and_then(Value::as_object_mut) {
+            bounds.insert("additionalProperties".to_owned(), json!(false));
         }
         let mut gait = settings(GaitSettings::default(), |s: &GaitSettings| s.validate().err().map(Error::from));
         if let Some(muscles) = gait.pointer_mut("/properties/muscles") {
@@ -137,6 +147,7 @@ pub(super) fn state(document: &mut Value) {
         ] {
             put(schemas, name, schema);
         }
+        openapi_depends::state(schemas);
     }
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
         for (_, item) in paths {
@@ -151,6 +162,13 @@ pub(super) fn state(document: &mut Value) {
 }
 
 fn state_parameter(parameter: &mut Value) {
+    // A header or query parameter is present or absent, but never null.
+    if let Some(kind) = parameter.pointer_mut("/schema/type")
+        && let Value::Array(kinds) = kind
+        && let Some(own) = kinds.iter().find(|kind| *kind != "null").cloned()
+    {
+        *kind = own;
+    }
     let rule = match parameter.get("name").and_then(Value::as_str).unwrap_or_default() {
         "rate_hz" => json!({ "minimum": 10, "maximum": 5000 }),
         "walk" => json!({ "minimum": 2, "maximum": 3 }),
@@ -226,13 +244,6 @@ fn put(schemas: &mut Map<String, Value>, component: &str, mut schema: Value) {
     let Some(present) = schemas.get_mut(component) else { return };
     schema["description"] = present["description"].take();
     *present = schema;
-}
-
-/// Says of a field what a schema cannot: how its parts depend on each other.
-fn describe(schemas: &mut Map<String, Value>, field: &str) {
-    const DEPENDS: &str = "a3 is smaller than a4 by 0.001 or more. The values of a dimension increase, each within the range of its \
-                           bound; its lengthscale lies between a hundredth of their smallest step and 10,000 times their range.";
-    add(schemas, "NewStudy", field, &json!({ "x-depends": DEPENDS }));
 }
 
 /// The schema of a device file; no two devices have one name.

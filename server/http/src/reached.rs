@@ -92,6 +92,10 @@ async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result
     Ok(study)
 }
 
+/// The study of what the path names, for [`Once`](super::once::Once), which reads the request afterwards.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OfStudy(pub(super) Option<StudyId>);
+
 /// The identifier in the path, `{id}`, of something with which the caller may do `P`.
 #[derive(Debug)]
 pub(crate) struct Id<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
@@ -117,6 +121,7 @@ pub(super) async fn in_path<T: Located, P: Permission>(
     let unknown = || Error::NotFound { what: "object with the identifier".to_owned(), id: text.to_owned() };
     let id: T = text.parse().map_err(|_| unknown())?;
     let study = located(&mut *app.read().await?, reach, id).await?;
+    parts.extensions.insert(OfStudy(study));
     Ok((id, study))
 }
 

@@ -57,10 +57,14 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
     Ok(text)
 }
 
-/// Whether two names are of one person: upper and lower case and spaces do not tell people apart.
+/// What tells a person from others by name: neither upper and lower case nor spaces do.
+pub(crate) fn person(name: &str) -> String {
+    name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
+}
+
+/// Whether two names are of one person.
 pub(crate) fn is_same_name(one: &str, other: &str) -> bool {
-    let letters = |name: &str| name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
-    letters(one) == letters(other)
+    person(one) == person(other)
 }
 
 #[cfg(test)]

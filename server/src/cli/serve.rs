@@ -47,14 +47,21 @@ impl Serve {
 
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let (listen, sign_in, tls) = (settings.listen()?, settings.sign_in()?, settings.tls()?);
-        if !listen.ip().is_loopback() && !sign_in {
-            let allowed = "a loopback address such as 127.0.0.1:8080: without sign-in, whoever reaches the service may \
-                           change everything";
-            return Err(settings.refused("listen", allowed));
+        let proxies = settings.proxies()?;
+        if !sign_in {
+            // Whoever reaches the service may change everything.
+            if !listen.ip().is_loopback() {
+                let allowed = "without sign-in, a loopback address such as 127.0.0.1:8080";
+                return Err(settings.refused("listen", allowed));
+            }
+            if proxies.are_any() {
+                let allowed = "without sign-in, no proxy: it would let other machines change everything";
+                return Err(settings.refused("trusted_proxies", allowed));
+            }
         }
         let local = listen.ip().is_loopback();
         let (workers, sessions, database) = (settings.workers()?, settings.session_limits()?, settings.database());
-        let (proxies, limits) = (settings.proxies()?, settings.connections()?.within_descriptors());
+        let limits = settings.connections()?.within_descriptors();
         let access_log_days = settings.access_log_days()?;
         let backups = settings.backups()?;
         // Check all settings before any file is created.

@@ -18,10 +18,11 @@ pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
 /// size.
 ///
 /// # Errors
-/// As [`of_store`].
+/// As [`of_store`], and [`StoreError::NearlyFull`].
 pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
     let _turn = store.copying.lock().await;
     let to = free_name(store.path(), "backup");
+    store.room_for_copy(&to)?;
     of_store(store, &to).await?;
     let size = std::fs::metadata(&to).map_err(|source| StoreError::Open { path: to.clone(), source })?.len();
     Ok((to, size))
@@ -34,11 +35,12 @@ const SCHEDULED: &str = "scheduled";
 /// ones beyond `keep`. Returns the new file and its size.
 ///
 /// # Errors
-/// As [`of_store`], and when an old copy cannot be removed.
+/// As [`of_store`], [`StoreError::NearlyFull`], and when an old copy cannot be removed.
 pub async fn into_folder(store: &Store, folder: &Path, keep: usize) -> StoreResult<(PathBuf, u64)> {
     let _turn = store.copying.lock().await;
     let name = store.path().file_name().unwrap_or_default();
     let to = free_name(&folder.join(name), SCHEDULED);
+    store.room_for_copy(&to)?;
     of_store(store, &to).await?;
     let cannot = |source| StoreError::Open { path: folder.to_owned(), source };
     let size = std::fs::metadata(&to).map_err(cannot)?.len();

@@ -278,6 +278,12 @@ impl Store {
         self.writing.space().room()
     }
 
+    /// Refuses a file beside the record, or elsewhere on its disk, that would leave less free than is kept in reserve.
+    fn room_for_copy(&self, to: &Path) -> StoreResult<()> {
+        let bytes = std::fs::metadata(&self.path).map_or(0, |about| about.len());
+        if self.writing.space().holds(to) { self.writing.space().room_for(bytes) } else { Ok(()) }
+    }
+
     /// Writes durably, and changes nothing: whether the record takes changes. Asked often, it answers what it found within
     /// the last second.
     ///
@@ -291,6 +297,7 @@ impl Store {
             return found.clone();
         }
         let found = match tokio::time::timeout(SLOWEST_PROBE, self.write_nothing()).await {
+            Ok(Ok(())) if !self.writing.space().takes_a_change() => Err("the disk of the record is full".to_owned()),
             Ok(written) => written.map_err(|error| error.to_string()),
             Err(_) => Err(format!("a test write took longer than {} s", SLOWEST_PROBE.as_secs())),
         };

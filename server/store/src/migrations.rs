@@ -15,6 +15,7 @@ const FILES: &[(i64, &str, &str)] = &[
     (5, "access_log", include_str!("../../../migrations/0005_access_log.sql")),
     (6, "allocations", include_str!("../../../migrations/0006_allocations.sql")),
     (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
+    (8, "role changes", include_str!("../../../migrations/0008_role_changes.sql")),
 ];
 
 /// Newest schema version.

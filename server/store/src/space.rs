@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Default reserve.
 pub const DEFAULT_RESERVE_BYTES: u64 = 500 << 20;
+/// An ordinary change takes less.
+const ONE_CHANGE_BYTES: u64 = 1 << 20;
 
 /// The disk of the record.
 #[derive(Debug)]
@@ -27,12 +29,31 @@ impl Space {
 
     /// Fails if less space is free than the reserve.
     pub(super) fn room(&self) -> StoreResult<()> {
-        let reserve = self.reserve.load(Ordering::Relaxed);
+        self.room_for(0)
+    }
+
+    /// Refuses where less than the reserve would be free after so many bytes were written.
+    pub(super) fn room_for(&self, bytes: u64) -> StoreResult<()> {
+        let reserve = self.reserve.load(Ordering::Relaxed).max(ONE_CHANGE_BYTES);
         match free_bytes(&self.folder) {
-            Some(free) if free < reserve => {
+            Some(free) if free < reserve.saturating_add(bytes) => {
                 Err(StoreError::NearlyFull { free_mb: free >> 20, reserve_mb: reserve >> 20 })
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Whether a change fits. The write-ahead log has room for small writes when the disk has none for an ordinary one.
+    pub(super) fn takes_a_change(&self) -> bool {
+        can_allocate(&self.folder, ONE_CHANGE_BYTES)
+    }
+
+    /// Whether a file would lie on the disk of the record.
+    pub(super) fn holds(&self, file: &Path) -> bool {
+        let own = Self::of(file);
+        match (device(&self.folder), device(&own.folder)) {
+            (Some(here), Some(there)) => here == there,
+            _ => true,
         }
     }
 }
@@ -47,5 +68,33 @@ fn free_bytes(folder: &Path) -> Option<u64> {
 /// Free bytes for this process, if the system reports them.
 #[cfg(not(target_os = "linux"))]
 fn free_bytes(_: &Path) -> Option<u64> {
+    None
+}
+
+/// Reserves space in a file without a name, so that quotas count as well as the size of the disk.
+#[cfg(target_os = "linux")]
+fn can_allocate(folder: &Path, bytes: u64) -> bool {
+    use rustix::fs::{FallocateFlags, Mode, OFlags, fallocate, open};
+    use rustix::io::Errno;
+    let nameless = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
+    let allocated = open(folder, nameless, Mode::RUSR | Mode::WUSR)
+        .and_then(|file| fallocate(&file, FallocateFlags::empty(), 0, bytes));
+    // File systems that know no such files do not say.
+    !matches!(allocated, Err(Errno::NOSPC | Errno::DQUOT))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn can_allocate(_: &Path, _: u64) -> bool {
+    true
+}
+
+#[cfg(unix)]
+fn device(folder: &Path) -> Option<u64> {
+    use std::os::unix::fs::MetadataExt;
+    std::fs::metadata(folder).ok().map(|about| about.dev())
+}
+
+#[cfg(not(unix))]
+fn device(_: &Path) -> Option<u64> {
     None
 }

@@ -1,4 +1,4 @@
-//! The access log, to read.
+//! REST: lists the access log.
 
 use crate::AppState;
 use crate::may::May;
@@ -11,7 +11,7 @@ use gaitwright_store::SubjectId;
 use gaitwright_store::access_log::{self, AccessRow};
 use serde::Deserialize;
 
-/// Which rows.
+/// Filter of rows.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
@@ -20,14 +20,16 @@ pub(super) struct Filter {
     subject_id: Option<SubjectId>,
 }
 
-/// `GET /access-log`: who saw or exported data of subjects, and who was refused; newest first.
+/// List the access log
+///
+/// Views and exports of subjects' data, and refusals, newest first.
 #[utoipa::path(
     get,
     path = "/access-log",
     operation_id = "list_access_log",
     tag = "operation",
     params(
-        ("contains" = Option<String>, Query, max_length = 200, description = "Rows with these characters in kind, actor, address, object, study or pseudonym"),
+        ("contains" = Option<String>, Query, max_length = 200, description = "Text in kind, actor, address, object, study or pseudonym"),
         ("subject_id" = Option<SubjectId>, Query, description = "Rows of this subject")
     ),
     responses((status = 200, description = "A page", body = Page<AccessRow>)),

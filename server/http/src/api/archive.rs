@@ -1,4 +1,4 @@
-//! A whole study as one file, and where a study came from.
+//! REST: exports a study as an archive, and lists its imports.
 
 use crate::AppState;
 use crate::may::May;
@@ -22,17 +22,19 @@ use std::io::Write;
 use tokio::sync::mpsc::{self, Sender};
 use tokio_stream::wrappers::ReceiverStream;
 
-/// Bytes that are sent together.
+/// Size of the chunks of a response.
 const CHUNK_BYTES: usize = 1 << 16;
 
-/// `GET /studies/{id}/archive`: every row, blind sessions included, as `gaitwright export` writes it.
+/// Export a study as an archive
+///
+/// The archive has every row of the study, without blinded allocations, as `gaitwright export` writes it.
 #[utoipa::path(
     get,
     path = "/studies/{id}/archive",
     operation_id = "get_study_archive",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "An archive for `gaitwright import`, not signed", body = Vec<u8>, content_type = "application/octet-stream"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Unsigned archive for `gaitwright import`", body = Vec<u8>, content_type = "application/octet-stream"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn of_study(
@@ -40,7 +42,7 @@ pub(super) async fn of_study(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Administer>,
 ) -> Result<Response, Refusal> {
-    // Who takes a study away is on record before the first byte leaves.
+    // The export is recorded before the first byte is sent.
     let mut writer = app.write().await?;
     let study = studies::get(&mut writer, id).await?;
     consents::may_be_shown(&mut writer, id).await?;
@@ -56,7 +58,7 @@ pub(super) async fn of_study(
         export.await.map_err(|e| Error::Internal(e.to_string()))??;
         return Err(Error::Internal("the archive is empty".to_owned()).into());
     };
-    // An archive that cannot be written to its end breaks off, so that nobody takes it for whole.
+    // If the export fails, the connection is aborted, so that the client notices the incomplete archive.
     let failure = stream::once(export).filter_map(async |done| match done {
         Ok(Ok(())) => None,
         Ok(Err(error)) => Some(Err(std::io::Error::other(error.to_string()))),
@@ -70,7 +72,7 @@ pub(super) async fn of_study(
     Ok((headers, Body::from_stream(whole)).into_response())
 }
 
-/// Sends what is written, in pieces; what was not flushed is dropped.
+/// A writer that sends chunks. Data that is not flushed is dropped.
 struct Chunks {
     sender: Sender<Bytes>,
     buffer: Vec<u8>,
@@ -97,14 +99,16 @@ impl Write for Chunks {
     }
 }
 
-/// `GET /studies/{id}/imports`: where a study came from that was not made here.
+/// List the imports of a study
+///
+/// One import for each record that the study passed through; empty for a study that was made here.
 #[utoipa::path(
     get,
     path = "/studies/{id}/imports",
     operation_id = "list_study_imports",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "One import for each record that it came through, the last one into this record; empty: the study was made here", body = Page<Import>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Imports, the one into this record last", body = Page<Import>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn imports_of_study(

@@ -1,4 +1,4 @@
-//! Assessments: what is said of two gaits that is no preference.
+//! REST: assessments, which are answers about two gaits that state no preference.
 
 use super::preferences::Retract;
 use crate::AppState;
@@ -16,14 +16,16 @@ use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_store::assessments::{self, Assessment};
 use gaitwright_store::{AssessmentId, StudyId, studies};
 
-/// `GET /studies/{id}/assessments`: as made, those that were taken back included.
+/// List assessments of a study
+///
+/// Answers about two gaits that state no preference, retracted ones included, oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/assessments",
     operation_id = "list_assessments",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Every assessment, by time", body = Page<Assessment>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, by time", body = Page<Assessment>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -37,8 +39,10 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut(assessments::of_study(&mut reader, id).await?, |assessment| assessment.id)?))
 }
 
-/// `POST /studies/{id}/assessments`: that nobody can tell which of two gaits is better, or that one must not be walked. A
-/// gait that was called unsafe is not recommended, not asked about and not planned for a lab session.
+/// Record an assessment of two gaits
+///
+/// States that nobody can tell which gait is better, or that a gait is unsafe. An unsafe gait is no longer recommended,
+/// compared or planned for lab sessions, until staff have reviewed the report.
 #[utoipa::path(
     post,
     path = "/studies/{id}/assessments",
@@ -46,7 +50,7 @@ pub(super) async fn of_study(
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = NewAssessment,
-    responses((status = 201, description = "Recorded", body = Assessment)),
+    responses((status = 201, description = "Assessment", body = Assessment)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn create(
@@ -63,14 +67,14 @@ pub(super) async fn create(
     once.created(&app, writer, format!("/api/v1/assessments/{made}"), &row).await
 }
 
-/// `GET /assessments/{id}`.
+/// Get an assessment
 #[utoipa::path(
     get,
     path = "/assessments/{id}",
     operation_id = "get_assessment",
     tag = "preferences",
     params(("id" = AssessmentId, Path, description = "The assessment")),
-    responses((status = 200, description = "The assessment", body = Assessment), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Assessment", body = Assessment), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -81,7 +85,9 @@ pub(super) async fn get(
     Ok(Json(assessments::get(&mut *app.read().await?, id).await?))
 }
 
-/// `POST /assessments/{id}/retract`.
+/// Retract an assessment
+///
+/// The assessment stays on record. The learner no longer uses the preference derived from it.
 #[utoipa::path(
     post,
     path = "/assessments/{id}/retract",
@@ -89,7 +95,7 @@ pub(super) async fn get(
     tag = "preferences",
     params(("id" = AssessmentId, Path, description = "The assessment")),
     request_body = Retract,
-    responses((status = 200, description = "Taken back, with what the learner heard of it: the row stays", body = Assessment)),
+    responses((status = 200, description = "Retracted assessment", body = Assessment)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn retract(

@@ -1,4 +1,4 @@
-//! The audit trail, to read.
+//! REST: lists the audit trail.
 
 use crate::AppState;
 use crate::may::May;
@@ -10,7 +10,7 @@ use gaitwright_service::access::Administer;
 use gaitwright_store::audit::{self, AuditRow};
 use serde::Deserialize;
 
-/// Which rows.
+/// Filter of rows.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
@@ -18,13 +18,15 @@ pub(super) struct Filter {
     contains: String,
 }
 
-/// `GET /audit`: who changed what; newest first.
+/// List the audit trail
+///
+/// Every change by a person, newest first.
 #[utoipa::path(
     get,
     path = "/audit",
     operation_id = "list_audit_trail",
     tag = "operation",
-    params(("contains" = Option<String>, Query, max_length = 200, description = "Rows with these characters in actor, action or object")),
+    params(("contains" = Option<String>, Query, max_length = 200, description = "Text in actor, action or object")),
     responses((status = 200, description = "A page", body = Page<AuditRow>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]

@@ -1,4 +1,4 @@
-//! Copies of the record, made by the service that owns it.
+//! REST: backups of the record.
 
 use crate::AppState;
 use crate::once::Once;
@@ -13,30 +13,30 @@ use serde::Serialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// A copy of the record.
+/// Backup of the record.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Copy {
-    /// Its name; it lies beside the record.
+    /// File name, in the folder of the database.
     pub(crate) file: String,
-    /// Its size.
+    /// Size in bytes.
     bytes: u64,
 }
 
 impl Copy {
-    /// Copies the record to a new file beside it, and checks the copy.
+    /// Writes a backup next to the database, and checks it.
     async fn make(app: &AppState) -> Result<Self, Refusal> {
         let (file, bytes) = backup::beside_record(app.store()).await?;
         Ok(Self { file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(), bytes })
     }
 
-    /// Writes down that it was made.
+    /// Records the backup in the audit trail.
     async fn record(&self, writer: &mut Writer, actor: &Actor) -> Result<(), Refusal> {
         let detail = json!({ "bytes": self.bytes });
         audit::append(writer, actor, "record.backup", &format!("file {}", self.file), &detail).await?;
         Ok(())
     }
 
-    /// Makes one for somebody at a page.
+    /// Makes a backup for a page.
     pub(crate) async fn for_page(app: AppState, actor: Actor) -> Result<Self, Refusal> {
         to_its_end(async move {
             let copy = Self::make(&app).await?;
@@ -51,31 +51,33 @@ impl Copy {
         .await
     }
 
-    /// A copy that the audit trail does not know is none.
+    /// Deletes the backup if it could not be recorded.
     fn unless_refused<T>(&self, app: &AppState, recorded: Result<T, Refusal>) -> Result<T, Refusal> {
         if recorded.is_err()
             && let Err(error) = std::fs::remove_file(app.store().path().with_file_name(&self.file))
         {
-            tracing::warn!(file = self.file, %error, "a copy that was not recorded is left over");
+            tracing::warn!(file = self.file, %error, "cannot delete a backup that was not recorded");
         }
         recorded
     }
 }
 
-/// Goes on when whoever asked goes away or the answer takes too long.
+/// Runs work to its end, even if the client goes away or the request times out.
 async fn to_its_end<T: Send + 'static>(
     work: impl Future<Output = Result<T, Refusal>> + Send + 'static,
 ) -> Result<T, Refusal> {
     tokio::spawn(work).await.map_err(|error| Error::Internal(error.to_string()))?
 }
 
-/// `POST`: copies the record to a new file beside it, and checks the copy.
+/// Back up the record
+///
+/// Writes a backup next to the database and checks it.
 #[utoipa::path(
     post,
     path = "/backups",
     operation_id = "create_backup",
     tag = "operation",
-    responses((status = 200, description = "Copied and checked", body = Copy)),
+    responses((status = 200, description = "Checked backup", body = Copy)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn create(State(app): State<AppState>, once: Once<Administer>) -> Result<Response, Refusal> {

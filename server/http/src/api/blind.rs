@@ -1,4 +1,4 @@
-//! Blind comparisons: what a rater may see, and what is known of raters.
+//! REST: blind comparisons for raters, reliability of raters, and unblinding.
 
 use crate::AppState;
 use crate::blind_motion::{Figure, blind_motion, phase};
@@ -18,35 +18,36 @@ use gaitwright_store::{StudyId, allocations, gaits, presentations, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A pair to compare, as a rater sees it.
+/// Pair to compare, as shown to a rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Pair {
-    /// What the pair is known by.
+    /// Token of the pair.
     token: String,
     /// Number of the pair for this rater.
     number: u32,
-    /// Where the motion that is shown first is.
+    /// Address of the motion that is shown first.
     first: String,
-    /// Where the motion that is shown second is.
+    /// Address of the motion that is shown second.
     second: String,
 }
 
-/// The next pair, or none.
+/// Next pair of a rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct NextPair {
-    /// None: the study asks for nothing now.
+    /// The pair. Null if no comparison is pending.
     pair: Option<Pair>,
 }
 
-/// `POST /studies/{id}/blind-pairs/next`: the pair that this rater should compare. Asking again before answering gives the
-/// same one.
+/// Get the next pair for a rater
+///
+/// Returns the same pair until it is answered.
 #[utoipa::path(
     post,
     path = "/studies/{id}/blind-pairs/next",
     operation_id = "draw_blind_pair",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "The pair, or none", body = NextPair)),
+    responses((status = 200, description = "Pair, or null if no comparison is pending", body = NextPair)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn next(
@@ -68,16 +69,16 @@ pub(super) async fn next(
     once.done(&answering, writer, &NextPair { pair }).await
 }
 
-/// A motion to compare.
+/// Motion to compare.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct BlindMotion {
-    /// 101 figures over one stride, each ten places: hip, shoulder, then knee, ankle, heel, toe of the left and of the
-    /// right leg; forward and up, m.
+    /// 101 figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left and of the
+    /// right leg) as forward and upward coordinates, m.
     #[schema(value_type = Vec<Vec<Vec<f64>>>)]
     figures: Vec<Figure>,
 }
 
-/// Which motion of a pair.
+/// Motion of a pair.
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Side {
@@ -85,8 +86,9 @@ pub(super) enum Side {
     Second,
 }
 
-/// `GET /blind-pairs/{token}/motions/{side}`: where in the stride a motion begins differs from pair to pair, and is the
-/// same for both motions of a pair.
+/// Get a motion of a blind pair
+///
+/// The phase at which motions start differs between pairs, and is the same for both motions of a pair.
 #[utoipa::path(
     get,
     path = "/blind-pairs/{token}/motions/{side}",
@@ -96,7 +98,7 @@ pub(super) enum Side {
         ("token" = String, Path, description = "The pair"),
         ("side" = inline(Side), Path, description = "Which motion of the pair")
     ),
-    responses((status = 200, description = "The motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn motion(
@@ -119,14 +121,14 @@ pub(super) async fn motion(
         Err(error) => Err(error.into()),
     };
     let motion = motion.flatten();
-    // An error here must not say which trial it was, nor of which person or device.
+    // The error must not reveal the trial, the subject or the device.
     motion.map(|figures| Json(BlindMotion { figures })).map_err(|error| {
-        tracing::error!(%error, "a gait cannot be shown to a rater");
+        tracing::error!(%error, "cannot show a gait to a rater");
         Refusal(Error::NotFound { what: "the motion of the comparison".to_owned(), id: "with this token".to_owned() })
     })
 }
 
-/// `POST /blind-pairs/{token}/answer`.
+/// Answer a blind pair
 #[utoipa::path(
     post,
     path = "/blind-pairs/{token}/answer",
@@ -134,7 +136,7 @@ pub(super) async fn motion(
     tag = "blind",
     params(("token" = String, Path, description = "The pair")),
     request_body = RaterAnswer,
-    responses((status = 200, description = "Recorded", body = Answered)),
+    responses((status = 200, description = "Confirmation", body = Answered)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
@@ -150,15 +152,16 @@ pub(super) async fn answer(
     once.done(&app, writer, &answered).await
 }
 
-/// `GET /studies/{id}/raters`: agreement with themselves, position bias of those who were unblinded, answers that were
-/// not blind.
+/// Get the reliability of raters
+///
+/// Agreement with their own earlier answers, position bias of unblinded raters, and unblinded answers.
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",
     operation_id = "get_rater_agreement",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "One row per rater", body = Page<RaterFigures>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "One row for each rater", body = Page<RaterFigures>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn raters(
@@ -174,26 +177,28 @@ pub(super) async fn raters(
     Ok(Json(paging.cut_by_place(blind::figures(&shown, &sides))?))
 }
 
-/// Who is unblinded, and why.
+/// Rater to unblind, with the reason.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Unblind {
-    /// The rater.
+    /// Name of the rater.
     rater: String,
-    /// Why: 1 to 2000 characters.
+    /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
     reason: String,
 }
 
-/// What a rater was shown.
+/// Pairs of an unblinded rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct UnblindedRater {
-    /// Every pair of the rater, in order.
+    /// All pairs of the rater, in order.
     pairs: Vec<UnblindedPair>,
 }
 
-/// `POST /studies/{id}/unblind`: shows which gait a rater saw on which side. It is in the audit trail, and what the rater is
-/// shown from now on is marked.
+/// Unblind a rater
+///
+/// Reveals which gait the rater saw on which side. The audit trail records it, and later answers of the rater do not
+/// count as blind.
 #[utoipa::path(
     post,
     path = "/studies/{id}/unblind",
@@ -201,7 +206,7 @@ pub(super) struct UnblindedRater {
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Unblind,
-    responses((status = 200, description = "Every pair of the rater, in order", body = UnblindedRater)),
+    responses((status = 200, description = "Pairs of the rater, in order", body = UnblindedRater)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(

@@ -1,4 +1,4 @@
-//! Certificates: a certification of a trial's gait that is independent of its optimisation.
+//! REST: certificates of gaits.
 
 use super::jobs::Job;
 use crate::AppState;
@@ -18,14 +18,16 @@ use gaitwright_service::studies::job::{JobId, JobKind};
 use gaitwright_service::studies::job_status;
 use gaitwright_store::{TrialId, certificates, schema};
 
-/// `GET /trials/{id}/certificate`: as it was made.
+/// Get the certificate of a trial
+///
+/// The result of checking the gait independently of the optimiser.
 #[utoipa::path(
     get,
     path = "/trials/{id}/certificate",
     operation_id = "get_certificate",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "The certificate", body = schema::Certificate), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Certificate", body = schema::Certificate), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -37,16 +39,18 @@ pub(super) async fn get(
     certificates::find(&mut *app.read().await?, id).await?.map(Json).ok_or_else(missing).map_err(Refusal)
 }
 
-/// `POST /trials/{id}/certificate`: has it made, where it is not there yet.
+/// Request the certificate of a trial
+///
+/// The gait of the trial must have converged.
 #[utoipa::path(
     post,
     path = "/trials/{id}/certificate",
     operation_id = "request_certificate",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial; its gait has converged")),
+    params(("id" = TrialId, Path, description = "The trial")),
     responses(
-        (status = 200, description = "It was made before", body = schema::Certificate),
-        (status = 202, description = "The job that makes it, in some seconds", body = Job)
+        (status = 200, description = "Existing certificate", body = schema::Certificate),
+        (status = 202, description = "Job that makes the certificate, in some seconds", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

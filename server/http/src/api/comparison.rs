@@ -1,4 +1,4 @@
-//! Several studies side by side.
+//! REST: comparison of several studies.
 
 use crate::AppState;
 use crate::may::May;
@@ -20,17 +20,17 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use utoipa::ToSchema;
 
-/// Most studies that are compared at once.
+/// Maximum number of compared studies.
 const MOST: usize = 20;
 
-/// Which studies.
+/// Studies to compare.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Which {
     ids: String,
 }
 
-/// A study beside others.
+/// Study in a comparison.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Compared {
     id: StudyId,
@@ -41,25 +41,27 @@ pub(super) struct Compared {
     trials: TrialCounts,
     /// Number of the recommended trial.
     best_trial: Option<u32>,
-    /// Its action.
+    /// Action of the recommended trial.
     #[schema(value_type = Option<schema::Bounds>)]
     best_action: Option<TunedBounds>,
-    /// Its Gait RMSE, rad.
+    /// Gait RMSE of the recommended trial, rad.
     best_gait_rmse_rad: Option<f64>,
-    /// Its cost of transport.
+    /// Cost of transport of the recommended trial.
     best_cost_of_transport: Option<f64>,
-    /// Time of all solves together, s.
+    /// Total time of all solves, s.
     solve_seconds: f64,
 }
 
-/// `GET /study-comparison`: several studies side by side, in the order in which they are named.
+/// Compare several studies
+///
+/// Results keep the order of `ids`.
 #[utoipa::path(
     get,
     path = "/study-comparison",
     operation_id = "compare_studies",
     tag = "studies",
-    params(("ids" = String, Query, description = "2 to 20 identifiers of studies, with commas between them")),
-    responses((status = 200, description = "One row per study", body = Page<Compared>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
+    params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of studies")),
+    responses((status = 200, description = "One row for each study", body = Page<Compared>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -70,12 +72,9 @@ pub(super) async fn get(
     let which = &paging.filter;
     let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
     if !(2..=MOST).contains(&named.len()) {
-        return Err(Error::invalid(
-            "ids",
-            which.ids.as_str(),
-            &format!("2 to {MOST} identifiers, with commas between them"),
-        )
-        .into());
+        return Err(
+            Error::invalid("ids", which.ids.as_str(), &format!("2 to {MOST} comma-separated identifiers")).into()
+        );
     }
     let mut rows = Vec::with_capacity(named.len());
     for id in named {

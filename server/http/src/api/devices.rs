@@ -1,4 +1,4 @@
-//! Devices: the built-in one, and those of data files.
+//! REST: devices.
 
 use crate::AppState;
 use crate::may::May;
@@ -16,7 +16,9 @@ use gaitwright_store::devices::{self, Device};
 use gaitwright_store::{DeviceId, schema};
 use std::cmp::Reverse;
 
-/// `GET /devices`: newest first.
+/// List devices
+///
+/// Newest first.
 #[utoipa::path(
     get,
     path = "/devices",
@@ -34,7 +36,9 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |one| Reverse(one.id))?))
 }
 
-/// `POST`: adds the device of a data file.
+/// Add a device from a data file
+///
+/// An identical file returns the existing device.
 #[utoipa::path(
     post,
     path = "/devices",
@@ -42,8 +46,8 @@ pub(super) async fn list(
     tag = "devices",
     request_body(content = schema::DeviceDefinition, description = "A device file, as `optimizer/data/README.md` describes it"),
     responses(
-        (status = 200, description = "The very same file was added before", body = Device),
-        (status = 201, description = "Added", body = Device)
+        (status = 200, description = "Existing device with the same definition", body = Device),
+        (status = 201, description = "Device", body = Device)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -63,14 +67,14 @@ pub(super) async fn create(
     once.created(&app, writer, location, &device).await
 }
 
-/// `GET {id}`.
+/// Get a device
 #[utoipa::path(
     get,
     path = "/devices/{id}",
     operation_id = "get_device",
     tag = "devices",
     params(("id" = DeviceId, Path, description = "The device")),
-    responses((status = 200, description = "The device", body = Device)),
+    responses((status = 200, description = "Device", body = Device)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(

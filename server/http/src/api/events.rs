@@ -1,8 +1,8 @@
-//! Live events of a study (Server-Sent Events).
+//! REST: the event stream of a study.
 //!
-//! What is recorded has an id and is replayed after `Last-Event-ID`; iterations of running solves have none: who
-//! misses one sees the next. A stream begins with where the study stands, so that who listens to one that has ended
-//! knows; it stays open, because a study that has ended can be extended.
+//! Recorded events have an id and are replayed after `Last-Event-ID`. Iterations of running solves have none, and can be
+//! missed. A stream starts with the state of the study, and stays open after the end of the study, because the study can be
+//! extended.
 
 use crate::AppState;
 use crate::event_stream::{Gone, Listening, Sender};
@@ -22,26 +22,30 @@ use std::collections::HashMap;
 use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
 
-/// Shortest time between two iterations shown of one solve.
+/// Least time between two iterations of a solve in the stream.
 const THROTTLE: Duration = Duration::from_millis(250);
-/// Events read at a time.
+/// Number of events read at a time.
 const BATCH: u32 = 200;
 
-/// Where to begin.
+/// Where to start.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct From {
     after: Option<i64>,
 }
 
-/// `GET /studies/{id}/events`.
+/// Follow the events of a study
+///
+/// Sends `study_state` with the current state, then recorded events with an id, which are replayed after
+/// `Last-Event-ID`, and `progress` of running solves. The stream stays open after the end of the study, because the
+/// study can be extended.
 #[utoipa::path(
     get,
     path = "/studies/{id}/events",
     operation_id = "follow_study_events",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Begin after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "The last event that was seen")),
-    responses((status = 200, description = "Server-sent events. First `study_state`: where the study stands; then what is recorded, with an id, replayed after `Last-Event-ID`; and `progress` of running solves. The stream stays open when the study has ended: it can be extended", body = String, content_type = "text/event-stream"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
+    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Start after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "Last event that was received")),
+    responses((status = 200, description = "Server-sent events", body = String, content_type = "text/event-stream"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -54,7 +58,7 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let last = events::last(&mut reader, id).await?;
-    // What was seen may be of a record in whose place an older copy was put: its numbers come again.
+    // After a restore, a client may have seen larger numbers than the record has.
     let after = last_seen(&headers)?.or(from.after).map_or(last, |seen| seen.min(last));
     drop(reader);
     let stands = json!({ "state": study.state, "reason": study.state_reason });

@@ -1,4 +1,4 @@
-//! Explanations: which bound must give way where a trial has no gait.
+//! REST: infeasibility explanations of trials.
 
 use super::jobs::Job;
 use crate::AppState;
@@ -22,37 +22,36 @@ use gaitwright_store::{Instant, TrialId, schema, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Why a trial has no gait.
+/// Infeasibility explanation of a trial.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct TrialExplanation {
     trial_id: TrialId,
-    /// All of it in sentences, as pages and command line say them.
+    /// The explanation in sentences.
     sentences: Vec<String>,
-    /// How its solve ended.
+    /// Status of the solve.
     #[schema(value_type = schema::SolveStatus)]
     status: SolveStatus,
-    /// What the last iterate violates, worst first.
+    /// Violations of the last iterate, worst first.
     #[schema(value_type = Vec<schema::Violation>)]
     violations: Vec<Violation>,
-    /// The tuned bounds that contradict each other; further ones where no single bound resolves the first. Explanations of
-    /// earlier versions have none.
+    /// Tuned bounds that conflict, and further conflicts if no single bound resolves the first one. Empty in older
+    /// explanations.
     #[schema(value_type = Vec<schema::Conflict>)]
     conflicts: Vec<Conflict>,
-    /// The search for a conflict found a gait with the bounds as they are: the solve missed it.
+    /// Whether the search for a conflict found a gait with the given bounds, which the solve had missed.
     gait_found: bool,
-    /// The tuned bounds that the last iterate runs into.
+    /// Tuned bounds that are active at the last iterate.
     #[schema(value_type = Vec<schema::BoundAtLimit>)]
     at_limit: Vec<BoundAtLimit>,
-    /// What relaxing each bound of the first conflict alone achieves: the smallest relaxation first, those that do not help
-    /// last.
+    /// Effect of relaxing each bound of the first conflict alone: the smallest relaxation first, ineffective ones last.
     #[schema(value_type = Vec<schema::Relaxation>)]
     relaxations: Vec<Relaxation>,
-    /// What relaxing several together achieves, where no single one helps.
+    /// Effect of relaxing several bounds together, if no single one helps.
     #[schema(value_type = Vec<schema::JointRelaxation>)]
     together: Vec<JointRelaxation>,
-    /// Which version of the program found it out.
+    /// Version of the program that made it.
     program: String,
-    /// SHA-256 of what it was made from: the trial's `problem.json`.
+    /// SHA-256 of the trial's `problem.json`.
     problem_sha256: String,
     created_at: Instant,
 }
@@ -77,7 +76,9 @@ impl TrialExplanation {
     }
 }
 
-/// `GET /trials/{id}/explanation`.
+/// Get the infeasibility explanation of a trial
+///
+/// Names the bounds that conflict, and relaxations that give a gait.
 #[utoipa::path(
     get,
     path = "/trials/{id}/explanation",
@@ -85,7 +86,7 @@ impl TrialExplanation {
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
-        (status = 200, description = "The explanation, as it was made", body = TrialExplanation),
+        (status = 200, description = "Explanation", body = TrialExplanation),
         (status = 409, description = "The trial cannot be explained, or the subject withdrew consent")
     ),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -106,16 +107,18 @@ pub(super) async fn get(
     }
 }
 
-/// `POST /trials/{id}/explanation`: has it made, where it is not there yet.
+/// Request the explanation of a trial
+///
+/// The trial must have been solved by the service and not have converged.
 #[utoipa::path(
     post,
     path = "/trials/{id}/explanation",
     operation_id = "request_explanation",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial; the program solved it, and it did not converge")),
+    params(("id" = TrialId, Path, description = "The trial")),
     responses(
-        (status = 200, description = "It was made before", body = TrialExplanation),
-        (status = 202, description = "The job that makes it, behind all solves, in some minutes", body = Job)
+        (status = 200, description = "Existing explanation", body = TrialExplanation),
+        (status = 202, description = "Job that makes the explanation, in some minutes, at lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

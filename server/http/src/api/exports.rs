@@ -1,4 +1,4 @@
-//! A trial's gait for other programs.
+//! REST: downloads of a trial: problem file, OpenSim motion, controller file.
 
 use crate::AppState;
 use crate::extract::Params;
@@ -18,11 +18,11 @@ use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::{TrialId, consents, gaits, schema, trials};
 use serde::Deserialize;
 
-/// How densely a gait is sampled.
+/// Sampling of a gait.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Sampling {
-    /// Samples per second.
+    /// Sampling rate, Hz.
     #[serde(default = "two_hundred")]
     rate_hz: f64,
 }
@@ -31,14 +31,16 @@ pub(super) fn two_hundred() -> f64 {
     200.0
 }
 
-/// `GET /trials/{id}/problem.json`: everything that the solve of the trial depends on.
+/// Download the problem file of a trial
+///
+/// Everything that the solve depends on: subject, device, bounds, settings, reference gait, limits and warm start.
 #[utoipa::path(
     get,
     path = "/trials/{id}/problem.json",
     operation_id = "get_solve_problem",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial; what it started from was not dropped")),
-    responses((status = 200, description = "What `gaitwright solve --problem` solves again", body = schema::SolveProblem), (status = 409, description = "The subject withdrew consent")),
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "Input for `gaitwright solve --problem`", body = schema::SolveProblem), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn problem(
@@ -54,14 +56,14 @@ pub(super) async fn problem(
     Ok(file("application/json", &format!("problem-trial-{number}.json"), text))
 }
 
-/// `GET /trials/{id}/gait.mot`: OpenSim motion file.
+/// Download the gait as an OpenSim motion
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.mot",
     operation_id = "get_gait_motion_file",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
-    responses((status = 200, description = "OpenSim motion file: degrees, OpenSim's signs", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
+    params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
+    responses((status = 200, description = "OpenSim motion file in degrees, with OpenSim's signs", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn motion_file(
@@ -80,14 +82,16 @@ pub(super) async fn motion_file(
     Ok(file("text/plain; charset=utf-8", &format!("gait-trial-{}.mot", trial.number), text))
 }
 
-/// `GET /trials/{id}/controller.json`: what the device's controller needs.
+/// Download the controller file of a trial
+///
+/// The gait must be walkable: converged, with a certificate, without an open safety report.
 #[utoipa::path(
     get,
     path = "/trials/{id}/controller.json",
     operation_id = "get_controller_file",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial; its gait has converged and is certified, and no safety report against it is open"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
-    responses((status = 200, description = "Controller file: curves and phase of every domain, set points of the prosthetic joints", body = schema::ControllerFile), (status = 409, description = "The gait may not be walked with, or the subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
+    params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
+    responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = schema::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn controller(
@@ -110,7 +114,7 @@ pub(super) async fn controller(
     Ok(file("application/json", &format!("device-trial-{number}.json"), text))
 }
 
-/// An answer that a browser saves under `name`.
+/// A response that a browser saves as `name`.
 pub(super) fn file(kind: &'static str, name: &str, text: String) -> Response {
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),

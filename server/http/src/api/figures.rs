@@ -1,4 +1,4 @@
-//! Figures as files: SVG that stands alone, PNG, and the numbers behind them as CSV.
+//! REST: downloads of figures as SVG, PNG and CSV.
 
 use crate::AppState;
 use crate::extract::Params;
@@ -17,13 +17,13 @@ use gaitwright_service::error::Error;
 use gaitwright_store::{LabSessionId, ReferenceGaitId, StudyId, TrialId, reference_gaits};
 use serde::Deserialize;
 
-/// A second study, or a second trial.
+/// A second study or trial for comparison.
 #[derive(Debug, Deserialize)]
 pub(super) struct Beside<T> {
     other: Option<Named<T>>,
 }
 
-/// `GET /studies/{id}/figures/{file}`: those of the page with the figures of a study.
+/// Download a figure of a study
 #[utoipa::path(
     get,
     path = "/studies/{id}/figures/{file}",
@@ -31,10 +31,10 @@ pub(super) struct Beside<T> {
     tag = "figures",
     params(
         ("id" = StudyId, Path, description = "The study"),
-        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
-        ("other" = Option<StudyId>, Query, description = "A study that is drawn beside it")
+        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
+        ("other" = Option<StudyId>, Query, description = "Study for comparison")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -49,8 +49,9 @@ pub(super) async fn of_study(
     answer(&mut app, figures, file).await
 }
 
-/// `GET /trials/{id}/figures/{file}`: those of the page of a gait; while its solve runs, how far that is. With another
-/// trial beside it, the joint angles of both.
+/// Download a figure of a trial
+///
+/// While the solve is running, its progress. With another trial, the joint angles of both.
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",
@@ -58,10 +59,10 @@ pub(super) async fn of_study(
     tag = "figures",
     params(
         ("id" = TrialId, Path, description = "The trial"),
-        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
-        ("other" = Option<TrialId>, Query, description = "A converged trial of the same study that is drawn beside it")
+        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
+        ("other" = Option<TrialId>, Query, description = "Converged trial of the same study for comparison")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_trial(
@@ -79,7 +80,9 @@ pub(super) async fn of_trial(
     answer(&mut app, figures, file).await
 }
 
-/// `GET /lab-sessions/{id}/figures/{file}`: muscle activity and limit cycles of a lab session.
+/// Download a figure of a lab session
+///
+/// Muscle activity and limit cycles.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/figures/{file}",
@@ -87,9 +90,9 @@ pub(super) async fn of_trial(
     tag = "figures",
     params(
         ("id" = LabSessionId, Path, description = "The session"),
-        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv")
+        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_session(
@@ -102,7 +105,7 @@ pub(super) async fn of_session(
     answer(&mut app, figures, file).await
 }
 
-/// `GET /studies/{id}/belief/figures/{file}`: what the learner believes, as on its page.
+/// Download a figure of the posterior
 #[utoipa::path(
     get,
     path = "/studies/{id}/belief/figures/{file}",
@@ -110,11 +113,11 @@ pub(super) async fn of_session(
     tag = "figures",
     params(
         ("id" = StudyId, Path, description = "The study"),
-        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
-        ("right" = Option<String>, Query, description = "The bound of the maps that runs to the right; by default the first one"),
-        ("down" = Option<String>, Query, description = "The one that runs downwards; by default the second one")
+        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
+        ("right" = Option<String>, Query, description = "Bound on the horizontal axis of maps. The first one by default"),
+        ("down" = Option<String>, Query, description = "Bound on the vertical axis of maps. The second one by default")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_belief(
@@ -128,7 +131,7 @@ pub(super) async fn of_belief(
     answer(&mut app, figures, file).await
 }
 
-/// `GET /reference-gaits/{id}/figures/{file}`: the joint angles of a reference gait.
+/// Download a figure of a reference gait
 #[utoipa::path(
     get,
     path = "/reference-gaits/{id}/figures/{file}",
@@ -136,9 +139,9 @@ pub(super) async fn of_belief(
     tag = "figures",
     params(
         ("id" = ReferenceGaitId, Path, description = "The reference gait"),
-        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv")
+        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
     ),
-    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_reference(
@@ -151,7 +154,7 @@ pub(super) async fn of_reference(
     answer(&mut app, figures::of_reference(&reference), file).await
 }
 
-/// One of the figures in the form that the name of the file says.
+/// Responds with a figure in the format of the file name.
 async fn answer(app: &mut AppState, figures: Vec<Figure>, file: String) -> Result<Response, Refusal> {
     let missing = || Error::NotFound { what: "the figure".to_owned(), id: file.clone() };
     let (name, form) = file.rsplit_once('.').ok_or_else(missing)?;
@@ -175,7 +178,7 @@ async fn answer(app: &mut AppState, figures: Vec<Figure>, file: String) -> Resul
     Ok((headers, bytes).into_response())
 }
 
-/// Forms of files.
+/// File format.
 #[derive(Debug, Clone, Copy)]
 enum Form {
     Svg,

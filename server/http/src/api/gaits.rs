@@ -1,4 +1,4 @@
-//! Gaits: the trajectory of a trial.
+//! REST: gaits of trials.
 
 use crate::AppState;
 use crate::csv_answer::csv_file;
@@ -13,14 +13,16 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_store::{StoreError, TrialId, gaits, schema, trials};
 
-/// `GET /trials/{id}/gait`: as the optimiser wrote it.
+/// Get the gait of a trial
+///
+/// The trajectory in the format of the optimiser.
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait",
     operation_id = "get_gait",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "The trajectory as the optimiser wrote it", body = schema::GaitDocument), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Gait", body = schema::GaitDocument), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -33,14 +35,14 @@ pub(super) async fn get(
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }
 
-/// `GET /trials/{id}/gait.csv`.
+/// Download the gait of a trial as CSV
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.csv",
     operation_id = "get_gait_csv",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "One row per node", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "One row for each node", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get_csv(

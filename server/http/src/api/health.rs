@@ -1,4 +1,4 @@
-//! Whether the service is ready.
+//! Health and readiness of the service.
 
 use crate::AppState;
 use crate::problem::Refusal;
@@ -8,20 +8,22 @@ use gaitwright_service::error::Error;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// What `/health` answers.
+/// Health of the service.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Health {
-    /// `ready`, or `short_of_space` when less of the disk is free than is kept in reserve.
+    /// `ready`, or `short_of_space` if less disk space is free than the reserve.
     pub status: &'static str,
     /// Version of the program.
     pub version: &'static str,
 }
 
-/// `GET /health`: 200 when the database answers. Nothing here says what the service is doing: anybody may ask, and solves tell
-/// a rater what an answer led to. `/metrics` has the queue.
+/// Check that the service is healthy
+///
+/// Succeeds if the database responds. Needs no sign-in, and therefore reveals nothing about solves, from which a rater could
+/// infer the effect of an answer.
 ///
 /// # Errors
-/// When it does not.
+/// If the database does not respond.
 #[utoipa::path(
     get,
     path = "/health",
@@ -30,25 +32,25 @@ pub struct Health {
     responses((status = 200, description = "The service is ready", body = Health)),
 )]
 pub(crate) async fn get(State(app): State<AppState>) -> Result<Json<Health>, Refusal> {
-    // A connection is handed out once the database has answered on it.
+    // The pool returns a connection only after the database has responded.
     drop(app.read().await?);
     let status = if app.store().room().is_ok() { "ready" } else { "short_of_space" };
     Ok(Json(Health { status, version: env!("CARGO_PKG_VERSION") }))
 }
 
-/// `GET /ready`: 200 when the service does its work and takes changes, otherwise 503 with the reason.
+/// `GET /ready`: 200 if all tasks run and the record can be written, otherwise 503 with the reason.
 ///
 /// # Errors
-/// [`Error::NotReady`] with the reason, [`Error::StorageFull`] when the disk is full.
+/// [`Error::NotReady`] with the reason, [`Error::StorageFull`] if the disk is full.
 pub(crate) async fn ready(State(app): State<AppState>) -> Result<String, Refusal> {
     if app.scheduler.stopping().is_cancelled() {
-        return Err(Error::NotReady("the service is stopping".to_owned()).into());
+        return Err(Error::NotReady("The service is stopping.".to_owned()).into());
     }
-    let not_writable = |reason: String| Error::NotReady(format!("the record takes no changes: {reason}"));
+    let not_writable = |reason: String| Error::NotReady(format!("The record cannot be written: {reason}"));
     app.store().probe().await.map_err(not_writable)?;
     if let Some(trouble) = app.scheduler.trouble() {
         return Err(Error::NotReady(trouble).into());
     }
-    // Answers still fit: what is large is refused, with the same words.
+    // Below the reserve, answers still fit and only large work is refused.
     Ok(app.store().room().map_or_else(|shortage| format!("ready; {shortage}"), |()| "ready".to_owned()))
 }

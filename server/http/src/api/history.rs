@@ -1,4 +1,4 @@
-//! The best action by iteration.
+//! REST: the history of the recommendation.
 
 use crate::AppState;
 use crate::csv_answer::csv_answer;
@@ -19,7 +19,9 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::{StudyId, studies};
 use std::sync::Arc;
 
-/// `GET /studies/{id}/history`.
+/// Get the history of the recommendation
+///
+/// The best trial after each iteration.
 #[utoipa::path(
     get,
     path = "/studies/{id}/history",
@@ -38,14 +40,16 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut_by_place(read(&mut app, id).await?)?))
 }
 
-/// `GET /studies/{id}/history.csv`.
+/// Download the history as CSV
+///
+/// The best trial after each iteration.
 #[utoipa::path(
     get,
     path = "/studies/{id}/history.csv",
     operation_id = "get_study_history_csv",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "By iteration", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "One row for each iteration", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(

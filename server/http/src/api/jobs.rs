@@ -1,4 +1,4 @@
-//! Jobs, and who does them.
+//! REST: jobs and workers.
 
 use crate::AppState;
 use crate::may::May;
@@ -18,25 +18,25 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// Work that the service does in the background.
+/// Background work of the service.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Job {
     /// Identifier.
     #[schema(value_type = String)]
     id: JobId,
-    /// What it makes.
+    /// Kind of the job.
     kind: JobKind,
-    /// Where it stands.
+    /// State of the job.
     state: JobState,
-    /// Of which trial.
+    /// Trial of the job.
     trial_id: TrialId,
-    /// The study of the trial.
+    /// Study of the trial.
     study_id: StudyId,
-    /// Address of the result; null until the job is done.
+    /// Address of the result. Null until the job is done.
     result: Option<String>,
-    /// Why it failed; null where it did not.
+    /// Reason if it failed. Null otherwise.
     reason: Option<String>,
-    /// Attempts and worker of a solve that has not ended; null otherwise.
+    /// Attempts and worker of an open solve. Null otherwise.
     solve: Option<OpenSolve>,
 }
 
@@ -53,13 +53,13 @@ impl From<JobStatus> for Job {
 }
 
 impl Job {
-    /// Where a job is.
+    /// The address of a job.
     pub(super) fn address(id: JobId) -> String {
         format!("/api/v1/jobs/{id}")
     }
 }
 
-/// Which jobs.
+/// Filter of jobs.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
@@ -67,7 +67,9 @@ pub(super) struct Filter {
     study_id: Option<StudyId>,
 }
 
-/// `GET /jobs`: the jobs that have not ended, of studies that the caller reaches, by kind and trial.
+/// List jobs
+///
+/// Jobs that have not ended, of studies that the caller can access.
 #[utoipa::path(
     get,
     path = "/jobs",
@@ -91,14 +93,16 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |job| job.id)?.map(Job::from)))
 }
 
-/// `GET /jobs/{id}`: also one that has ended.
+/// Get a job
+///
+/// Includes jobs that have ended.
 #[utoipa::path(
     get,
     path = "/jobs/{id}",
     operation_id = "get_job",
     tag = "operation",
     params(("id" = String, Path, description = "The job")),
-    responses((status = 200, description = "The job", body = Job), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Job", body = Job), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -109,14 +113,16 @@ pub(super) async fn get(
     Ok(Json(job_status::find(&mut *app.read().await?, &app.scheduler, id).await?.into()))
 }
 
-/// `POST /jobs/{id}/cancel`: a solve stops within one iteration, and its trial is cancelled.
+/// Cancel a job
+///
+/// A solve stops within one iteration, and its trial is cancelled.
 #[utoipa::path(
     post,
     path = "/jobs/{id}/cancel",
     operation_id = "cancel_job",
     tag = "operation",
-    params(("id" = String, Path, description = "The job; it has not ended")),
-    responses((status = 200, description = "Cancelled", body = Job)),
+    params(("id" = String, Path, description = "The job")),
+    responses((status = 200, description = "Cancelled job", body = Job)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn cancel(
@@ -136,30 +142,32 @@ pub(super) async fn cancel(
     Ok(answer)
 }
 
-/// Who solves.
+/// Workers of the service.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Workers {
-    /// How many solves can run at the same time.
+    /// Number of solves that can run in parallel.
     pub(crate) places: usize,
-    /// Solves by the name of the worker that runs them.
+    /// Number of running solves by worker.
     pub(crate) at_work: BTreeMap<String, u32>,
 }
 
 impl Workers {
     pub(crate) async fn read(app: &AppState) -> Result<Self, Refusal> {
-        // Names of workers alone: they say nothing of a study.
+        // Names of workers reveal nothing about studies.
         let at_work = jobs::by_worker(&mut *app.read().await?).await?;
         Ok(Self { places: app.scheduler.workers(), at_work })
     }
 }
 
-/// `GET /workers`: who solves at the moment. A worker behind a broker is known while it has a solve.
+/// List workers
+///
+/// A remote worker is known only while it has a solve.
 #[utoipa::path(
     get,
     path = "/workers",
     operation_id = "get_workers",
     tag = "operation",
-    responses((status = 200, description = "Who solves", body = Workers)),
+    responses((status = 200, description = "Workers", body = Workers)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn workers(_: May<Read>, State(app): State<AppState>) -> Result<Json<Workers>, Refusal> {

@@ -1,4 +1,4 @@
-//! Lab sessions: planned here, walked in the lab, closed, unblinded.
+//! REST: lab sessions.
 
 use super::exports;
 use crate::AppState;
@@ -20,14 +20,16 @@ use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, schema, stud
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-/// `GET /studies/{id}/lab-sessions`: in their order.
+/// List lab sessions of a study
+///
+/// Without blinded data.
 #[utoipa::path(
     get,
     path = "/studies/{id}/lab-sessions",
     operation_id = "list_lab_sessions",
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Every session, without what is blinded", body = Page<SessionView>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Lab sessions, by number", body = Page<SessionView>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -42,8 +44,9 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut(all, |session| session.number)?.map(|session| SessionView::from(&session))))
 }
 
-/// `POST /studies/{id}/lab-sessions`: plans one: a walk without the device, then one with each gait, in an order that is
-/// drawn now and kept.
+/// Plan a lab session
+///
+/// A walk without the device, then one with each gait, in an order that is drawn now and concealed.
 #[utoipa::path(
     post,
     path = "/studies/{id}/lab-sessions",
@@ -51,7 +54,7 @@ pub(super) async fn of_study(
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = NewSession,
-    responses((status = 201, description = "Planned", body = SessionView)),
+    responses((status = 201, description = "Lab session", body = SessionView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
@@ -68,14 +71,16 @@ pub(super) async fn create(
     once.created(&app, writer, location, &SessionView::from(&session)).await
 }
 
-/// `GET /lab-sessions/{id}`.
+/// Get a lab session
+///
+/// Without blinded data.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}",
     operation_id = "get_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "The session, without what is blinded", body = SessionView), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Lab session", body = SessionView), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -86,7 +91,7 @@ pub(super) async fn get(
     Ok(Json(SessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
 }
 
-/// Which walk.
+/// Walk and sampling.
 #[derive(Debug, Deserialize)]
 pub(super) struct OfWalk {
     walk: u8,
@@ -94,11 +99,11 @@ pub(super) struct OfWalk {
     rate_hz: f64,
 }
 
-/// `GET /lab-sessions/{id}/controller.json`: what the device's controller needs for a walk.
+/// Download the controller file of a lab walk
 ///
-/// It names no trial, but whoever holds it against the controller files of the two gaits learns the order. So it is for the
-/// device: a token with the scope `device` and no other. Of everybody else who fetches it, that is recorded, in the session and
-/// in the audit trail, and their later answers are not blind.
+/// The file does not name the trial, but comparing it with the controller files of both gaits reveals the allocation.
+/// It is meant for the device: a token with the scope `device` only. If anybody else fetches it, the session and the
+/// audit trail record it, and later answers of that caller do not count as blind.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/controller.json",
@@ -106,10 +111,10 @@ pub(super) struct OfWalk {
     tag = "lab",
     params(
         ("id" = LabSessionId, Path, description = "The session"),
-        ("walk" = u8, Query, description = "2 or 3: walk 1 is without the device"),
-        ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")
+        ("walk" = u8, Query, description = "2 or 3. Walk 1 is without the device"),
+        ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")
     ),
-    responses((status = 200, description = "Controller file", body = schema::ControllerFile), (status = 409, description = "The gait may not be walked with, or the subject withdrew consent"), (status = 422, description = "A parameter is not acceptable")),
+    responses((status = 200, description = "Controller file", body = schema::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["device"]), ("session" = ["device"])),
 )]
 pub(super) async fn controller(
@@ -120,7 +125,7 @@ pub(super) async fn controller(
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
     let session = lab_sessions::get(&mut reader, id).await?;
-    // Both files are made, whichever is given out: a refusal of one of them, or the time it takes, would tell the order.
+    // Make both files, because an error for one of them, or the time that it takes, would reveal the allocation.
     let (one, two) = lab::gaits_to_walk_with(&mut reader, &session, of.walk).await?;
     let of_one = one.trajectory(&mut reader).await?;
     let of_two = two.trajectory(&mut reader).await?;
@@ -141,17 +146,19 @@ pub(super) async fn controller(
     Ok(exports::file("application/json", &format!("controller-walk-{}.json", of.walk), text))
 }
 
-/// A note at the end.
+/// Closing of a session.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Closing {
-    /// At most 2000 characters; may be left out.
+    /// Note, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
     note: String,
 }
 
-/// `POST /lab-sessions/{id}/close`: nothing is recorded any more.
+/// Close a lab session
+///
+/// A closed session accepts no more data.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/close",
@@ -159,7 +166,7 @@ pub(super) struct Closing {
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Closing,
-    responses((status = 200, description = "Closed", body = SessionView)),
+    responses((status = 200, description = "Closed session", body = SessionView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn close(
@@ -175,18 +182,19 @@ pub(super) async fn close(
     once.done(&app, writer, &SessionView::from(&session)).await
 }
 
-/// Why the session is unblinded.
+/// Unblinding of a session.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Told {
-    /// 1 to 2000 characters.
+    /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
     reason: String,
 }
 
-/// `POST /lab-sessions/{id}/unblind`: shows which walk is with which gait, from now on to everybody who may read. It is in
-/// the audit trail, what is walked from now on is marked, and what the person who walked said becomes a preference of the
-/// study.
+/// Unblind a lab session
+///
+/// Reveals which gait each walk used, to all readers. The audit trail records it, later walks are marked, and the
+/// answer of the subject becomes a preference of the study.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/unblind",
@@ -194,7 +202,7 @@ pub(super) struct Told {
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Told,
-    responses((status = 200, description = "The session with the conditions of its walks", body = SessionView)),
+    responses((status = 200, description = "Session with the condition of each walk", body = SessionView)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
@@ -210,14 +218,16 @@ pub(super) async fn unblind(
     once.done(&app, writer, &SessionView::from(&session)).await
 }
 
-/// `GET /lab-sessions/{id}/next-walk`: the session as the person who walks and the rater see it.
+/// Get the next walk of a lab session
+///
+/// The view for the lab, without anything that reveals a gait.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/next-walk",
     operation_id = "get_next_walk",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "Which walk is next, and nothing that could tell a gait", body = InTheLab), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Next walk", body = InTheLab), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn in_the_lab(
@@ -228,7 +238,7 @@ pub(super) async fn in_the_lab(
     Ok(Json(lab::in_the_lab(&mut *app.read().await?, id).await?))
 }
 
-/// `POST /lab-sessions/{id}/walks`: the next walk was recorded.
+/// Record a walk
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/walks",
@@ -236,7 +246,7 @@ pub(super) async fn in_the_lab(
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = RecordedWalk,
-    responses((status = 200, description = "Recorded; which walk is next", body = InTheLab)),
+    responses((status = 200, description = "Next walk", body = InTheLab)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn walk(
@@ -252,8 +262,9 @@ pub(super) async fn walk(
     once.done(&app, writer, &next).await
 }
 
-/// `POST /lab-sessions/{id}/answers`: which walk the subject found better. The record keeps the number of the walk; the answer
-/// reaches the learner at unblinding.
+/// Record the answer of the subject
+///
+/// States which walk was better. The answer reaches the learner at unblinding.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/answers",
@@ -261,7 +272,7 @@ pub(super) async fn walk(
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewAnswer,
-    responses((status = 200, description = "Recorded, and read back", body = InTheLab)),
+    responses((status = 200, description = "Session with the answer", body = InTheLab)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
@@ -277,14 +288,14 @@ pub(super) async fn answer(
     once.done(&app, writer, &seen).await
 }
 
-/// `POST /lab-sessions/{id}/retract-answer`: takes the answer back.
+/// Retract the answer of the subject
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/retract-answer",
     operation_id = "retract_lab_answer",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "Retracted; the question is open again", body = InTheLab)),
+    responses((status = 200, description = "Session without an answer", body = InTheLab)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn retract(

@@ -1,4 +1,4 @@
-//! What is measured in the walks of a lab session.
+//! REST: measurement files of lab sessions, and their processing.
 
 use super::exports;
 use crate::AppState;
@@ -21,14 +21,16 @@ use gaitwright_store::{LabSessionId, MeasurementFileId, schema};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-/// `GET /lab-sessions/{id}/measurement-files`: every file that was added, oldest first; the newest of a walk counts.
+/// List measurement files of a lab session
+///
+/// Oldest first. The newest file of each kind and walk is used.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/measurement-files",
     operation_id = "list_measurement_files",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "All of them", body = Page<MeasurementFile>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page", body = Page<MeasurementFile>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
@@ -41,14 +43,14 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |recording| recording.id)?))
 }
 
-/// `GET /measurement-files/{id}`.
+/// Get a measurement file
 #[utoipa::path(
     get,
     path = "/measurement-files/{id}",
     operation_id = "get_measurement_file",
     tag = "lab",
     params(("id" = MeasurementFileId, Path, description = "The file")),
-    responses((status = 200, description = "The file, without its content", body = MeasurementFile), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Description of the file", body = MeasurementFile), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -59,14 +61,16 @@ pub(super) async fn get(
     Ok(Json(measurement_files::get(&mut *app.read().await?, id).await?))
 }
 
-/// `GET /measurement-files/{id}/content`: the file byte for byte. Its ETag is its SHA-256.
+/// Download a measurement file
+///
+/// The file as uploaded, byte for byte. Its ETag is its SHA-256.
 #[utoipa::path(
     get,
     path = "/measurement-files/{id}/content",
     operation_id = "get_measurement_file_content",
     tag = "lab",
     params(("id" = MeasurementFileId, Path, description = "The file")),
-    responses((status = 200, description = "The file; CSV, or an OpenSim file", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "CSV or OpenSim file", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn content(
@@ -87,8 +91,9 @@ pub(super) async fn content(
     Ok(answer)
 }
 
-/// `POST /lab-sessions/{id}/measurement-files/emg`: the electromyograms of a walk. A file that is not whole, or holds no
-/// stride, is refused, and nothing of it is kept.
+/// Upload an EMG recording of a walk
+///
+/// An incomplete file, or one without a complete stride, is refused.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/measurement-files/emg",
@@ -96,7 +101,7 @@ pub(super) async fn content(
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewEmg,
-    responses((status = 201, description = "Kept", body = MeasurementFile)),
+    responses((status = 201, description = "Measurement file", body = MeasurementFile)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn emg(
@@ -111,7 +116,9 @@ pub(super) async fn emg(
     keep(&app, id, &once, &checked).await
 }
 
-/// `POST /lab-sessions/{id}/measurement-files/motion`: the joint angles of a walk, for its limit cycles.
+/// Upload joint angles of a walk
+///
+/// For limit cycles.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/measurement-files/motion",
@@ -119,7 +126,7 @@ pub(super) async fn emg(
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewMotion,
-    responses((status = 201, description = "Kept", body = MeasurementFile)),
+    responses((status = 201, description = "Measurement file", body = MeasurementFile)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn motion(
@@ -143,17 +150,18 @@ async fn keep(app: &AppState, id: LabSessionId, once: &Once<Run>, checked: &Chec
     once.created(app, writer, format!("/api/v1/measurement-files/{}", kept.id), &kept).await
 }
 
-/// How electromyograms are filtered.
+/// Settings of EMG processing.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Processing {
-    /// band_low_hz, band_high_hz, envelope_hz, order: what is left out has its default.
+    /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings have their defaults.
     #[schema(value_type = schema::EmgSettings)]
     settings: EmgSettings,
 }
 
-/// `POST /lab-sessions/{id}/emg-results`: filters, cuts and normalises the newest electromyograms; with other settings as
-/// often as wanted.
+/// Process EMG recordings
+///
+/// Filters, cuts and normalises the newest EMG recordings. Can be repeated with other settings.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/emg-results",
@@ -161,7 +169,7 @@ pub(super) struct Processing {
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Processing,
-    responses((status = 200, description = "The result", body = EmgView)),
+    responses((status = 200, description = "Result", body = EmgView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn process(
@@ -182,15 +190,16 @@ pub(super) async fn process(
     once.done(&app, writer, &view).await
 }
 
-/// `GET /lab-sessions/{id}/emg-results`: the newest result of the electromyograms, and after unblinding the muscles of the
-/// model for comparison.
+/// Get the processed EMG
+///
+/// The newest result. After unblinding, includes the muscle activity of the model.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/emg-results",
     operation_id = "get_emg_results",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "The newest result; null: nothing was processed yet", body = Option<EmgView>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Newest result, or null", body = Option<EmgView>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn result(
@@ -201,14 +210,16 @@ pub(super) async fn result(
     Ok(Json(lab::emg(app.store_mut(), id).await?))
 }
 
-/// `GET /lab-sessions/{id}/limit-cycles`: angle and velocity of every joint that was recorded.
+/// Get limit cycles
+///
+/// Angle and velocity of every recorded joint, from the newest joint angles of each walk.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/limit-cycles",
     operation_id = "get_limit_cycles",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "The newest motion of each walk", body = Page<LimitCycles>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "One entry for each walk", body = Page<LimitCycles>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn limit_cycles(

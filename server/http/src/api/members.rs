@@ -1,4 +1,4 @@
-//! Who reaches a study: its members, and whether it is restricted to them.
+//! REST: members of studies, restriction of access, and invitations of raters.
 
 use crate::AppState;
 use crate::may::May;
@@ -16,10 +16,10 @@ use gaitwright_store::{MemberId, StudyId};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// `GET /studies/{id}/members`: who reaches the study besides administrators.
+/// List members of a study
 ///
-/// Raters reach the studies that they are members of. Clinicians, and tokens that may do more than rate, reach every study
-/// that is not restricted, and restricted ones as members. A study that a caller does not reach is answered with 404.
+/// Raters can access studies of which they are members. Clinicians, and tokens with more scopes than `rate`, can access
+/// every unrestricted study, and restricted studies as members. An inaccessible study is answered with 404.
 #[utoipa::path(
     get,
     path = "/studies/{id}/members",
@@ -39,14 +39,14 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut(all, |member| member.id)?))
 }
 
-/// `GET /studies/{id}/access`: whether the study is restricted to its members and administrators.
+/// Get the access restriction of a study
 #[utoipa::path(
     get,
     path = "/studies/{id}/access",
     operation_id = "get_study_access",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Who reaches it", body = StudyAccess)),
+    responses((status = 200, description = "Access", body = StudyAccess)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn access(
@@ -58,7 +58,9 @@ pub(super) async fn access(
     Ok(Json(StudyAccess { restricted }))
 }
 
-/// `POST /studies/{id}/members`: assigns a rater, or adds a clinician or a token.
+/// Add a member to a study
+///
+/// Assigns a rater, or adds a clinician or a token.
 #[utoipa::path(
     post,
     path = "/studies/{id}/members",
@@ -66,7 +68,7 @@ pub(super) async fn access(
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = NewMember,
-    responses((status = 201, description = "Added", body = Member)),
+    responses((status = 201, description = "Member", body = Member)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn add(
@@ -82,19 +84,21 @@ pub(super) async fn add(
     once.created(&app, writer, address(member.id), &member).await
 }
 
-/// Where a membership is.
+/// The address of a membership.
 fn address(id: MemberId) -> String {
     format!("/api/v1/study-members/{id}")
 }
 
-/// `GET /study-members/{id}`.
+/// Get a study member
+///
+/// Includes memberships that have ended.
 #[utoipa::path(
     get,
     path = "/study-members/{id}",
     operation_id = "get_study_member",
     tag = "access",
     params(("id" = MemberId, Path, description = "The membership")),
-    responses((status = 200, description = "The membership, also one that has ended", body = Member)),
+    responses((status = 200, description = "Member", body = Member)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -105,14 +109,14 @@ pub(super) async fn get(
     Ok(Json(members::get(&mut *app.read().await?, id).await?))
 }
 
-/// `POST /study-members/{id}/remove`: the member does not reach the study any more, unless it is open to it.
+/// Remove a study member
 #[utoipa::path(
     post,
     path = "/study-members/{id}/remove",
     operation_id = "remove_study_member",
     tag = "access",
     params(("id" = MemberId, Path, description = "The membership")),
-    responses((status = 200, description = "Removed", body = Member)),
+    responses((status = 200, description = "Removed member", body = Member)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn end(
@@ -128,16 +132,18 @@ pub(super) async fn end(
     once.done(&app, writer, &member).await
 }
 
-/// Who reaches a study.
+/// Access to a study.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StudyAccess {
-    /// Whether only members and administrators reach it. Raters need to be members in any case.
+    /// Whether only members and administrators can access the study. Raters must be members in any case.
     restricted: bool,
 }
 
-/// `PUT /studies/{id}/access`: restricts the study to its members and administrators, or opens it to all staff. Whoever
-/// restricts it stays a member.
+/// Restrict or open a study
+///
+/// Restricts the study to members and administrators, or opens it to all staff. The caller who restricts it becomes a
+/// member.
 #[utoipa::path(
     put,
     path = "/studies/{id}/access",
@@ -145,7 +151,7 @@ pub(super) struct StudyAccess {
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = StudyAccess,
-    responses((status = 200, description = "Who reaches it now", body = StudyAccess)),
+    responses((status = 200, description = "Access", body = StudyAccess)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn restrict(
@@ -161,26 +167,27 @@ pub(super) async fn restrict(
     once.done(&app, writer, &wanted).await
 }
 
-/// A rater to invite.
+/// Rater to invite.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Invitation {
-    /// Name or code of a rater, 1 to 80 characters; who does not exist yet is added.
+    /// Name or code of the rater, 1 to 80 characters. A new name adds a rater.
     #[schema(min_length = 1, max_length = 80)]
     name: String,
 }
 
-/// An invited rater.
+/// Invited rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Invited {
     /// The membership.
     member: Member,
-    /// Path of a one-time sign-in link on this service; shown once, good for a day.
+    /// Path of the one-time sign-in link, which is shown once and valid for a day.
     path: String,
 }
 
-/// `POST /studies/{id}/invitations`: assigns a rater to the study and makes a one-time sign-in link. Never repeated: an
-/// Idempotency-Key is refused.
+/// Invite a rater
+///
+/// Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
 #[utoipa::path(
     post,
     path = "/studies/{id}/invitations",
@@ -188,7 +195,7 @@ pub(super) struct Invited {
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Invitation,
-    responses((status = 201, description = "Shown once", body = Invited)),
+    responses((status = 201, description = "Invitation; the link is shown once", body = Invited)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]

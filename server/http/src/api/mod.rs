@@ -1,5 +1,5 @@
-//! REST under `/api/v1`: one file per resource. Route and description are one thing: what is not described here is
-//! not reachable.
+//! The REST interface under `/api/v1`, one file for each resource. Routes come from the descriptions, so every route is
+//! described.
 
 mod access_log;
 mod archive;
@@ -42,7 +42,7 @@ pub(super) use jobs::Workers;
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouterExt};
 use utoipa_axum::routes;
 
-/// Bodies that hold a recording.
+/// The body limit for uploads of measurement files.
 pub(super) fn recordings() -> DefaultBodyLimit {
     DefaultBodyLimit::max(RECORDING_LIMIT_BYTES)
 }

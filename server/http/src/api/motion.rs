@@ -1,4 +1,4 @@
-//! The motion of a gait: what an animation draws.
+//! REST: the motion of a gait, for animations.
 
 use crate::AppState;
 use crate::may::May;
@@ -15,18 +15,18 @@ use gaitwright_store::{TrialId, gaits, schema};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// A gait in motion, over one stride from right heel strike.
+/// Motion of a gait over one stride from right heel strike.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Motion {
     /// Stride time, s.
     stride_time_s: f64,
-    /// How far one stride goes, m.
+    /// Stride length, m.
     stride_length_m: f64,
-    /// Nodes in time; between two of them positions change evenly.
+    /// Nodes by time. Interpolate linearly between them.
     frames: Vec<Frame>,
 }
 
-/// A gait at a node.
+/// Node of a motion.
 #[derive(Debug, Serialize, ToSchema)]
 struct Frame {
     #[serde(flatten)]
@@ -34,24 +34,26 @@ struct Frame {
     figure: StickFigure,
     /// Name of the domain.
     domain: String,
-    /// Ground forces on left heel, left toe, right heel, right toe: forward and up, N.
+    /// Ground forces on left heel, left toe, right heel and right toe, forward and up, N.
     #[schema(value_type = Vec<Vec<f64>>)]
     forces_n: [[f64; 2]; 4],
-    /// Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R; absent without
-    /// muscles.
+    /// Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent
+    /// without muscles.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Vec<f64>>)]
     activations: Option<[f64; 10]>,
 }
 
-/// `GET /trials/{id}/motion`.
+/// Get the motion of a gait
+///
+/// Stick figures over one stride, for an animation.
 #[utoipa::path(
     get,
     path = "/trials/{id}/motion",
     operation_id = "get_gait_motion",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Stick figures over one stride", body = Motion), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Motion", body = Motion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(

@@ -1,4 +1,4 @@
-//! Preferences: answers to comparisons.
+//! REST: preferences.
 
 use crate::AppState;
 use crate::csv_answer::csv_answer;
@@ -19,7 +19,9 @@ use gaitwright_store::{FeedbackId, StudyId, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// `GET /studies/{id}/preferences`: as given, retracted ones included.
+/// List preferences of a study
+///
+/// Retracted ones included, oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/preferences",
@@ -41,14 +43,16 @@ pub(super) async fn of_study(
     Ok(Json(paging.page(rows, |row| row.seq)?))
 }
 
-/// `GET /studies/{id}/preferences.csv`: in a preference, `trial_a` is the winner.
+/// Download preferences as CSV
+///
+/// In a preference, `trial_a` is the winner.
 #[utoipa::path(
     get,
     path = "/studies/{id}/preferences.csv",
     operation_id = "list_preferences_csv",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "All of them, by time", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "All preferences, by time", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
@@ -101,14 +105,14 @@ fn table(rows: &[FeedbackRow]) -> CsvTable {
     table
 }
 
-/// `GET /preferences/{id}`.
+/// Get a preference
 #[utoipa::path(
     get,
     path = "/preferences/{id}",
     operation_id = "get_preference",
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "The answer")),
-    responses((status = 200, description = "The answer", body = FeedbackRow), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Preference", body = FeedbackRow), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -119,16 +123,16 @@ pub(super) async fn get(
     Ok(Json(feedback::get(&mut *app.read().await?, id).await?))
 }
 
-/// An answer as recorded.
+/// Recorded preference.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Recorded {
     #[serde(flatten)]
     row: FeedbackRow,
-    /// Answers of others to the same comparison, the newest twenty at most: all of them count.
+    /// Answers of other people to the same comparison, at most the newest twenty.
     other_answers: Vec<FeedbackId>,
 }
 
-/// `POST /studies/{id}/preferences`.
+/// Record a preference
 #[utoipa::path(
     post,
     path = "/studies/{id}/preferences",
@@ -136,7 +140,7 @@ pub(super) struct Recorded {
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Answer,
-    responses((status = 201, description = "Recorded", body = Recorded)),
+    responses((status = 201, description = "Preference", body = Recorded)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn create(
@@ -155,18 +159,20 @@ pub(super) async fn create(
     once.created(&app, writer, location, &Recorded { row, other_answers }).await
 }
 
-/// Why an answer or an assessment is taken back.
+/// Retraction of a preference or an assessment.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Retract {
     #[schema(min_length = 1, max_length = 2000)]
     pub(super) reason: String,
-    /// By default the name of the caller.
+    /// Author of the retraction. Defaults to the caller's name.
     #[serde(default)]
     pub(super) author: Option<String>,
 }
 
-/// `POST /preferences/{id}/retract`.
+/// Retract a preference
+///
+/// The preference stays on record, but the learner no longer uses it.
 #[utoipa::path(
     post,
     path = "/preferences/{id}/retract",
@@ -174,7 +180,7 @@ pub(super) struct Retract {
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "The answer")),
     request_body = Retract,
-    responses((status = 200, description = "Taken back: the row stays, the learner does not hear it any more", body = FeedbackRow)),
+    responses((status = 200, description = "Retracted preference", body = FeedbackRow)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn retract(

@@ -1,4 +1,4 @@
-//! What a study recommends.
+//! REST: the recommendation of a study.
 
 use crate::AppState;
 use crate::csv_answer::csv_answer;
@@ -24,36 +24,36 @@ use serde::Serialize;
 use std::sync::Arc;
 use utoipa::ToSchema;
 
-/// The best action of a study so far whose gait is certified.
+/// Best action of a study.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Recommendation {
     study_id: StudyId,
     study: String,
     #[serde(flatten)]
     best: Recommended,
-    /// What the certificate of its gait says.
+    /// State of the certificate of its gait.
     certificate: CertificateState,
-    /// Why that failed, in words.
+    /// Reasons if it failed.
     objections: Vec<String>,
-    /// Where it failed: the best action whose gait is known to pass.
+    /// If it failed, the best action whose gait passed.
     passing: Option<Recommended>,
-    /// A better gait, or one that passes, may follow: gaits of the study are being certified. Ask again.
+    /// Whether gaits of the study are being certified, so that the recommendation may change.
     certifying: bool,
 }
 
-/// An action that a trial tried.
+/// Recommended action.
 #[derive(Debug, Serialize, ToSchema)]
 struct Recommended {
-    /// The trial that tried it.
+    /// Trial of the action.
     trial_id: TrialId,
-    /// Its number.
+    /// Number of the trial.
     number: u32,
-    /// The bounds.
+    /// Action as bounds.
     #[schema(value_type = schema::Bounds)]
     bounds: TunedBounds,
-    /// Its Gait RMSE, rad.
+    /// Gait RMSE of the trial, rad.
     gait_rmse_rad: Option<f64>,
-    /// Its cost of transport.
+    /// Cost of transport of the trial.
     cost_of_transport: Option<f64>,
 }
 
@@ -69,7 +69,9 @@ impl Recommended {
     }
 }
 
-/// `GET /studies/{id}/recommendation`: the visited action that the learner believes to be the best.
+/// Get the recommendation of a study
+///
+/// The tried action that the learner believes to be the best.
 #[utoipa::path(
     get,
     path = "/studies/{id}/recommendation",
@@ -77,8 +79,8 @@ impl Recommended {
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses(
-        (status = 200, description = "The best action so far", body = Recommendation),
-        (status = 409, description = "There is none yet")
+        (status = 200, description = "Best action", body = Recommendation),
+        (status = 409, description = "No recommendation yet")
     ),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -90,7 +92,9 @@ pub(super) async fn of_study(
     Ok(Json(read(&mut app, id).await?))
 }
 
-/// `GET /studies/{id}/recommendation.csv`: the bounds alone, each with what it limits and its unit.
+/// Download the recommended bounds as CSV
+///
+/// Each bound with its unit and what it limits.
 #[utoipa::path(
     get,
     path = "/studies/{id}/recommendation.csv",
@@ -98,8 +102,8 @@ pub(super) async fn of_study(
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses(
-        (status = 200, description = "The bounds of the best action so far", body = String, content_type = "text/csv"),
-        (status = 409, description = "There is none yet")
+        (status = 200, description = "Recommended bounds", body = String, content_type = "text/csv"),
+        (status = 409, description = "No recommendation yet")
     ),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -136,13 +140,13 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
     };
     let (snapshot, ranking) = app.compute(rank).await?;
     let ranking = ranking.map_err(Error::Learner)?;
-    let best = *ranking.first().ok_or_else(|| {
-        Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better")
-    })?;
+    let best = *ranking
+        .first()
+        .ok_or_else(|| Error::conflict("The study recommends nothing yet, because it has no gait or no preference."))?;
     let mut reader = app.read().await?;
     let without_certificate = recommended::judged(&mut reader, &ranking).await?.without_certificate;
     let certifying = without_certificate.is_some_and(|next| app.scheduler.certify_best_of(id, next));
-    // Read after that: once nothing is being certified, every certificate is known here.
+    // Read last, so that it includes every certificate if none is being made.
     let grounds = Grounds::read(&mut reader, id).await?;
     let walkable = ranking.iter().enumerate().find_map(|(place, id)| {
         let trial = snapshot.trial(*id)?;
@@ -150,9 +154,11 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
     });
     let Some((place, trial, gait)) = walkable else {
         let why = if certifying {
-            "nothing is recommended yet: the best gait is being certified; ask again".to_owned()
+            "The study recommends nothing yet, because its best gait is being certified. Try again later.".to_owned()
         } else {
-            format!("nothing is recommended: the best gait has no certificate; POST /api/v1/trials/{best}/certificate")
+            format!(
+                "The study recommends nothing, because its best gait has no certificate. Request one with POST /api/v1/trials/{best}/certificate."
+            )
         };
         return Err(Error::conflict(why).into());
     };

@@ -1,4 +1,4 @@
-//! Reference gaits: the built-in one, and those made of recordings.
+//! REST: reference gaits.
 
 use crate::AppState;
 use crate::may::May;
@@ -15,7 +15,9 @@ use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::{ReferenceGaitId, SubjectId, subjects};
 use std::cmp::Reverse;
 
-/// `GET /reference-gaits`: newest first.
+/// List reference gaits
+///
+/// Newest first.
 #[utoipa::path(
     get,
     path = "/reference-gaits",
@@ -33,7 +35,10 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |one| Reverse(one.id))?))
 }
 
-/// `POST`: makes one of a recording: cuts it at right heel strikes, averages its strides.
+/// Import a reference gait from a recording
+///
+/// Cuts the recording at right heel strikes and averages its strides. An identical recording returns the existing
+/// reference gait.
 #[utoipa::path(
     post,
     path = "/reference-gaits",
@@ -41,8 +46,8 @@ pub(super) async fn list(
     tag = "reference-gaits",
     request_body = NewReferenceGait,
     responses(
-        (status = 200, description = "The very same recording was imported before", body = ReferenceGait),
-        (status = 201, description = "Imported; its provenance says what was done", body = ReferenceGait)
+        (status = 200, description = "Existing reference gait", body = ReferenceGait),
+        (status = 201, description = "Reference gait, with its provenance", body = ReferenceGait)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -66,14 +71,14 @@ pub(super) async fn create(
     once.created(&app, writer, location, &gait).await
 }
 
-/// `GET {id}`.
+/// Get a reference gait
 #[utoipa::path(
     get,
     path = "/reference-gaits/{id}",
     operation_id = "get_reference_gait",
     tag = "reference-gaits",
     params(("id" = ReferenceGaitId, Path, description = "The reference gait")),
-    responses((status = 200, description = "The reference gait", body = ReferenceGait)),
+    responses((status = 200, description = "Reference gait", body = ReferenceGait)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -84,14 +89,16 @@ pub(super) async fn get(
     Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?))
 }
 
-/// `GET /subjects/{id}/reference-gaits`: all of them, the nearest to the subject in height and body mass first.
+/// Rank reference gaits for a subject
+///
+/// The nearest in height and body mass first. Those without height and mass come last.
 #[utoipa::path(
     get,
     path = "/subjects/{id}/reference-gaits",
     operation_id = "list_nearest_reference_gaits",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "The nearest first; those that do not say whose they are come last", body = Page<Match>)),
+    responses((status = 200, description = "Reference gaits with distances", body = Page<Match>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_subject(

@@ -1,4 +1,4 @@
-//! Gaits that somebody called unsafe, and what staff decided who looked at them.
+//! REST: safety reports and their reviews.
 
 use crate::AppState;
 use crate::may::May;
@@ -18,18 +18,18 @@ use gaitwright_store::{Instant, StudyId, TrialId, studies};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// That somebody called a gait unsafe.
+/// Safety report about a gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct SafetyReport {
-    /// The trial whose gait it is.
+    /// Trial of the gait.
     trial_id: TrialId,
-    /// Who said so.
+    /// Who reported it.
     by: String,
-    /// When.
+    /// Time of the report.
     at: Instant,
-    /// Whether the gait must not be walked because of it.
+    /// Whether the report is open, so that the gait must not be walked.
     stands: bool,
-    /// What staff decided who looked at it; none: it waits for that.
+    /// Newest review. Null while the report awaits review.
     review: Option<SafetyReview>,
 }
 
@@ -41,17 +41,17 @@ impl From<Closed> for SafetyReport {
     }
 }
 
-/// `GET /studies/{id}/safety-reports`: every time that a gait was called unsafe, also what was lifted since.
+/// List safety reports of a study
 ///
-/// By raters, in assessments and in lab sessions; what its author took back is left out. Before a lab session is unblinded,
-/// both of its gaits are named.
+/// From raters, assessments and lab sessions, lifted reports included, retracted ones excluded. For a blinded lab
+/// session, both of its gaits are listed.
 #[utoipa::path(
     get,
     path = "/studies/{id}/safety-reports",
     operation_id = "list_safety_reports",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Every time that a gait was called unsafe, by time", body = Page<SafetyReport>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Safety reports, by time", body = Page<SafetyReport>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -69,19 +69,18 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut(all, at)?))
 }
 
-/// `POST /trials/{id}/safety-reviews`: staff looked at a gait that was called unsafe, and decide.
+/// Review the safety reports of a gait
 ///
-/// Where it may be walked with again it can be recommended, asked about and planned; what was said stays in the record, and what
-/// the learner heard of it is taken back. When a lab session is unblinded later, a safety report of that session closes its
-/// gait again.
+/// If the gait may be walked again, it can be recommended, compared and planned again, and the preferences derived from
+/// the reports are retracted. A report from a lab session that is unblinded later closes its gait again.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reviews",
     operation_id = "create_safety_review",
     tag = "preferences",
-    params(("id" = TrialId, Path, description = "The trial whose gait it is")),
+    params(("id" = TrialId, Path, description = "The trial")),
     request_body = Decision,
-    responses((status = 200, description = "Recorded", body = SafetyReview)),
+    responses((status = 200, description = "Review", body = SafetyReview)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn review(

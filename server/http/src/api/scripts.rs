@@ -1,4 +1,4 @@
-//! Ask and tell: for scripts of the lab that evaluate trials themselves.
+//! REST: ask and tell, for lab scripts that evaluate trials.
 
 use crate::AppState;
 use crate::once::OnceWith;
@@ -13,18 +13,20 @@ use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, TrialId};
 use std::sync::Arc;
 
-/// So often a decision is made anew when the study moved on meanwhile.
+/// How often a decision is repeated because the study has changed in the meantime.
 const TRIES: usize = 20;
 
-/// `POST /studies/{id}/ask`: a trial to evaluate. Asking again before telling gives the same one.
+/// Ask for a trial to evaluate
+///
+/// Returns the same trial until its outcome is told.
 #[utoipa::path(
     post,
     path = "/studies/{id}/ask",
     operation_id = "ask_for_trial",
     tag = "scripts",
-    params(("id" = StudyId, Path, description = "The study: one with `evaluation` = `script`")),
-    request_body(content = Ask, description = "May be left out"),
-    responses((status = 200, description = "The trial to evaluate", body = Trial)),
+    params(("id" = StudyId, Path, description = "A study with `evaluation` = `script`")),
+    request_body(content = Ask, description = "Optional"),
+    responses((status = 200, description = "Trial to evaluate", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn ask(
@@ -44,11 +46,12 @@ pub(super) async fn ask(
             return once.done(&app, writer, &trial).await;
         }
     }
-    Err(Error::conflict("the study changes too fast; try again").into())
+    Err(Error::conflict("The study is changing too fast. Try again.").into())
 }
 
-/// `POST /trials/{id}/tell`: what a trial gave. That there is no gait is a result, too; a failure of the script is
-/// none: cancel the trial then.
+/// Tell the outcome of a trial
+///
+/// A missing gait is a result too. If the script fails, cancel the trial instead.
 #[utoipa::path(
     post,
     path = "/trials/{id}/tell",
@@ -56,7 +59,7 @@ pub(super) async fn ask(
     tag = "scripts",
     params(("id" = TrialId, Path, description = "The trial")),
     request_body = Tell,
-    responses((status = 200, description = "Recorded", body = Trial)),
+    responses((status = 200, description = "Trial with its outcome", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn tell(
@@ -74,5 +77,5 @@ pub(super) async fn tell(
             return once.done(&app, writer, &trial).await;
         }
     }
-    Err(Error::conflict("the study changes too fast; try again").into())
+    Err(Error::conflict("The study is changing too fast. Try again.").into())
 }

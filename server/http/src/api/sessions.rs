@@ -1,4 +1,4 @@
-//! Sessions of people who signed in: one's own, and all for administrators.
+//! REST: sessions of users.
 
 use crate::AppState;
 use crate::may::May;
@@ -15,13 +15,15 @@ use gaitwright_store::sessions::{self, Session};
 use gaitwright_store::{Instant, SessionId};
 use std::cmp::Reverse;
 
-/// `GET /sessions`: the newest first.
+/// List sessions
+///
+/// Active sessions of the caller, or of all users for an administrator, newest first.
 #[utoipa::path(
     get,
     path = "/sessions",
     operation_id = "list_sessions",
     tag = "access",
-    responses((status = 200, description = "Sessions that have not ended: the caller's own; an administrator gets everybody's", body = Page<Session>)),
+    responses((status = 200, description = "Sessions", body = Page<Session>)),
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn list(
@@ -34,21 +36,23 @@ pub(super) async fn list(
     let now = app.access.clock.now(&mut reader).await?;
     let of = match may.caller.user {
         _ if may.caller.may(Right::Administer) => None,
-        // A program has no session.
+        // A token has no sessions.
         None => return Ok(Json(paging.page(Vec::new(), at)?)),
         own => own,
     };
     Ok(Json(paging.cut(sign_in::live(&mut reader, of, app.access.limits, now).await?, at)?))
 }
 
-/// `POST /sessions/{id}/end`: one's own; an administrator ends any.
+/// End a session
+///
+/// Of the caller, or of any user for an administrator.
 #[utoipa::path(
     post,
     path = "/sessions/{id}/end",
     operation_id = "end_session",
     tag = "access",
     params(("id" = SessionId, Path, description = "The session")),
-    responses((status = 200, description = "It has ended", body = Session)),
+    responses((status = 200, description = "Ended session", body = Session)),
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn end(

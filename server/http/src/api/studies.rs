@@ -1,4 +1,4 @@
-//! Studies.
+//! REST: studies.
 
 use crate::AppState;
 use crate::may::May;
@@ -21,13 +21,13 @@ use gaitwright_store::{Connection, LentWriter, StudyId, SubjectId};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A study as answered.
+/// Study with its possible commands.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct StudyView {
     #[serde(flatten)]
     study: Study,
     trials: TrialCounts,
-    /// What can be done to it where it stands.
+    /// Commands that are possible in the current state.
     possible: Vec<&'static str>,
 }
 
@@ -39,7 +39,7 @@ impl StudyView {
     }
 }
 
-/// Which studies.
+/// Filter of studies.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
@@ -47,7 +47,9 @@ pub(super) struct Filter {
     state: Option<StudyState>,
 }
 
-/// `GET /studies`: newest first.
+/// List studies
+///
+/// Newest first.
 #[utoipa::path(
     get,
     path = "/studies",
@@ -77,7 +79,9 @@ pub(super) async fn list(
     Ok(Json(Page::of_parts(views, next)))
 }
 
-/// `GET {id}`: its entity tag is its revision.
+/// Get a study
+///
+/// The ETag is the revision of the study.
 #[utoipa::path(
     get,
     path = "/studies/{id}",
@@ -88,7 +92,7 @@ pub(super) async fn list(
         status = 200,
         description = "The study",
         body = StudyView,
-        headers(("ETag" = String, description = "Its revision: give it as If-Match with a change"))
+        headers(("ETag" = String, description = "Revision, for the If-Match header of a change"))
     )),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -103,14 +107,16 @@ pub(super) async fn get(
     Ok(tagged(Json(StudyView::of(&mut reader, study).await?).into_response(), revision))
 }
 
-/// `POST`: makes one, and starts it unless `start` is false.
+/// Create a study
+///
+/// Starts it, unless `start` is false.
 #[utoipa::path(
     post,
     path = "/studies",
     operation_id = "create_study",
     tag = "studies",
     request_body = NewStudy,
-    responses((status = 201, description = "Made", body = StudyView)),
+    responses((status = 201, description = "Study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
@@ -125,25 +131,25 @@ pub(super) async fn create(
     made(&app, &once, writer, study).await
 }
 
-/// Why something is done.
+/// Reason for a command.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Why {
-    /// At most 2000 characters; may be left out.
+    /// Reason, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
     reason: String,
 }
 
-/// `POST {id}/start`.
+/// Start a study
 #[utoipa::path(
     post,
     path = "/studies/{id}/start",
     operation_id = "start_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "May be left out"),
-    responses((status = 200, description = "Started", body = StudyView)),
+    request_body(content = Why, description = "Optional"),
+    responses((status = 200, description = "Started study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn start(
@@ -155,15 +161,17 @@ pub(super) async fn start(
     act(&app, id, expected, &once, Act::Start, &why).await
 }
 
-/// `POST {id}/pause`.
+/// Pause a study
+///
+/// Running solves finish, and no new one starts.
 #[utoipa::path(
     post,
     path = "/studies/{id}/pause",
     operation_id = "pause_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "May be left out"),
-    responses((status = 200, description = "Held: solves that run are finished, nothing new starts", body = StudyView)),
+    request_body(content = Why, description = "Optional"),
+    responses((status = 200, description = "Paused study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn pause(
@@ -175,15 +183,15 @@ pub(super) async fn pause(
     act(&app, id, expected, &once, Act::Pause, &why).await
 }
 
-/// `POST {id}/resume`.
+/// Resume a study
 #[utoipa::path(
     post,
     path = "/studies/{id}/resume",
     operation_id = "resume_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "May be left out"),
-    responses((status = 200, description = "Goes on", body = StudyView)),
+    request_body(content = Why, description = "Optional"),
+    responses((status = 200, description = "Resumed study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn resume(
@@ -195,15 +203,17 @@ pub(super) async fn resume(
     act(&app, id, expected, &once, Act::Resume, &why).await
 }
 
-/// `POST {id}/stop`.
+/// Stop a study
+///
+/// Cancels open trials.
 #[utoipa::path(
     post,
     path = "/studies/{id}/stop",
     operation_id = "stop_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "May be left out"),
-    responses((status = 200, description = "Ended: open trials are cancelled", body = StudyView)),
+    request_body(content = Why, description = "Optional"),
+    responses((status = 200, description = "Stopped study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn stop(
@@ -238,7 +248,9 @@ async fn act(
     Ok(tagged(answer, revision))
 }
 
-/// `PATCH {id}`: changes it in place.
+/// Update a study
+///
+/// Changes its name, priority or number of parallel trials.
 #[utoipa::path(
     patch,
     path = "/studies/{id}",
@@ -246,7 +258,7 @@ async fn act(
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body = Change,
-    responses((status = 200, description = "Changed", body = StudyView)),
+    responses((status = 200, description = "Updated study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn patch(
@@ -266,7 +278,9 @@ pub(super) async fn patch(
     Ok(tagged(once.done(&app, writer, &view).await?, revision))
 }
 
-/// `POST {id}/extend`: more trials; an ended study goes on.
+/// Raise the trial budget of a study
+///
+/// A study that has ended resumes.
 #[utoipa::path(
     post,
     path = "/studies/{id}/extend",
@@ -274,7 +288,7 @@ pub(super) async fn patch(
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body = Extend,
-    responses((status = 200, description = "Extended", body = StudyView)),
+    responses((status = 200, description = "Extended study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn extend(
@@ -294,15 +308,17 @@ pub(super) async fn extend(
     Ok(tagged(once.done(&app, writer, &view).await?, revision))
 }
 
-/// `POST {id}/fork`: a study with the same set-up and none of the trials.
+/// Fork a study
+///
+/// Creates a study with the same set-up, without the trials.
 #[utoipa::path(
     post,
     path = "/studies/{id}/fork",
     operation_id = "fork_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    request_body(content = Fork, description = "What differs; may be left out"),
-    responses((status = 201, description = "Made", body = StudyView)),
+    request_body(content = Fork, description = "Changes, optional"),
+    responses((status = 201, description = "New study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn fork(

@@ -1,4 +1,4 @@
-//! Subjects.
+//! REST: subjects, with consents, corrections and muscle measurements.
 
 use crate::AppState;
 use crate::may::May;
@@ -17,7 +17,9 @@ use gaitwright_store::consents::{self, Consent};
 use gaitwright_store::subjects::{self, Correction, Subject};
 use gaitwright_store::{SubjectId, schema};
 
-/// `GET /subjects`: newest first.
+/// List subjects
+///
+/// Newest first.
 #[utoipa::path(
     get,
     path = "/subjects",
@@ -35,14 +37,14 @@ pub(super) async fn list(
     Ok(Json(paging.page(found, |subject| subject.id)?))
 }
 
-/// `GET {id}`.
+/// Get a subject
 #[utoipa::path(
     get,
     path = "/subjects/{id}",
     operation_id = "get_subject",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "The subject", body = Subject)),
+    responses((status = 200, description = "Subject", body = Subject)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -53,14 +55,14 @@ pub(super) async fn get(
     Ok(Json(subjects::get(&mut *app.read().await?, id).await?))
 }
 
-/// `POST`: adds one.
+/// Add a subject
 #[utoipa::path(
     post,
     path = "/subjects",
     operation_id = "create_subject",
     tag = "subjects",
     request_body = NewSubject,
-    responses((status = 201, description = "Added", body = Subject)),
+    responses((status = 201, description = "Subject", body = Subject)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
@@ -76,14 +78,16 @@ pub(super) async fn create(
     once.created(&app, writer, location, &subject).await
 }
 
-/// `GET {id}/consents`: what the subject signed and withdrew, oldest first; the last one counts.
+/// List consents of a subject
+///
+/// Consents and withdrawals, oldest first. The last entry applies.
 #[utoipa::path(
     get,
     path = "/subjects/{id}/consents",
     operation_id = "list_consents",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Oldest first", body = Page<Consent>)),
+    responses((status = 200, description = "A page, oldest first", body = Page<Consent>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn consents(
@@ -97,7 +101,7 @@ pub(super) async fn consents(
     Ok(Json(paging.cut(consents::of_subject(&mut reader, id).await?, |consent| consent.seq)?))
 }
 
-/// `POST {id}/consents`: what the subject signed.
+/// Record consent
 #[utoipa::path(
     post,
     path = "/subjects/{id}/consents",
@@ -105,7 +109,7 @@ pub(super) async fn consents(
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = NewConsent,
-    responses((status = 200, description = "Recorded", body = Consent)),
+    responses((status = 200, description = "Consent", body = Consent)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn consent(
@@ -121,8 +125,9 @@ pub(super) async fn consent(
     once.done(&app, writer, &row).await
 }
 
-/// `POST {id}/withdraw`: the subject does not take part any more. Every study of the subject stops; the record is
-/// kept, but nothing is added to it and nothing is given out.
+/// Withdraw consent
+///
+/// Stops every study of the subject. The data is kept, but nothing can be added, shown or exported.
 #[utoipa::path(
     post,
     path = "/subjects/{id}/withdraw",
@@ -130,7 +135,7 @@ pub(super) async fn consent(
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = Withdrawal,
-    responses((status = 200, description = "Written down, and done", body = Consent)),
+    responses((status = 200, description = "Withdrawal", body = Consent)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn withdraw(
@@ -150,14 +155,16 @@ pub(super) async fn withdraw(
     Ok(answer)
 }
 
-/// `GET {id}/corrections`: corrections of height and mass, oldest first; the last one counts.
+/// List corrections of a subject
+///
+/// Corrections of height and mass, oldest first. The last entry applies.
 #[utoipa::path(
     get,
     path = "/subjects/{id}/corrections",
     operation_id = "list_subject_corrections",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Oldest first", body = Page<Correction>)),
+    responses((status = 200, description = "A page, oldest first", body = Page<Correction>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn corrections(
@@ -171,8 +178,9 @@ pub(super) async fn corrections(
     Ok(Json(paging.cut(subjects::corrections(&mut reader, id).await?, |correction| correction.seq)?))
 }
 
-/// `POST {id}/corrections`: the right height and mass. Studies made from now on solve with them; those that are there keep
-/// the numbers that they were made with.
+/// Correct height and mass of a subject
+///
+/// New studies use the corrected values. Existing studies keep theirs.
 #[utoipa::path(
     post,
     path = "/subjects/{id}/corrections",
@@ -180,7 +188,7 @@ pub(super) async fn corrections(
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = NewCorrection,
-    responses((status = 200, description = "Corrected", body = Correction)),
+    responses((status = 200, description = "Correction", body = Correction)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn correct(
@@ -196,7 +204,9 @@ pub(super) async fn correct(
     once.done(&app, writer, &row).await
 }
 
-/// `GET {id}/muscles`: how the subject's muscles differ from the published table.
+/// Get measured muscle values of a subject
+///
+/// Values that override the published table.
 #[utoipa::path(
     get,
     path = "/subjects/{id}/muscles",
@@ -216,7 +226,9 @@ pub(super) async fn muscles(
     Ok(Json(subjects::muscles(&mut reader, id).await?))
 }
 
-/// `PUT /subjects/{id}/muscles`: studies made from now on use them.
+/// Set measured muscle values of a subject
+///
+/// New studies use them.
 #[utoipa::path(
     put,
     path = "/subjects/{id}/muscles",
@@ -224,7 +236,7 @@ pub(super) async fn muscles(
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body(content = schema::MuscleParameters, description = "As in `gait_settings.muscles` of a study; empty: the published table"),
-    responses((status = 200, description = "Recorded", body = schema::MuscleParameters)),
+    responses((status = 200, description = "Muscle values", body = schema::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn set_muscles(

@@ -1,4 +1,4 @@
-//! Suggestions: what would have been better than a trial.
+//! REST: suggestions.
 
 use crate::AppState;
 use crate::may::May;
@@ -15,7 +15,9 @@ use gaitwright_service::studies::suggestion::{self, Suggestion};
 use gaitwright_store::feedback::{self, FeedbackRow};
 use gaitwright_store::{StudyId, studies};
 
-/// `GET /studies/{id}/suggestions`: as given, retracted ones included.
+/// List suggestions of a study
+///
+/// Retracted ones included, oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/suggestions",
@@ -37,8 +39,9 @@ pub(super) async fn of_study(
     Ok(Json(paging.page(rows, |row| row.seq)?))
 }
 
-/// `POST /studies/{id}/suggestions`. The learner hears it like an answer; it is taken back like one
-/// (`POST /preferences/{id}/retract`).
+/// Record a suggestion
+///
+/// The learner uses it like a preference. Retract it with `POST /preferences/{id}/retract`.
 #[utoipa::path(
     post,
     path = "/studies/{id}/suggestions",
@@ -46,7 +49,7 @@ pub(super) async fn of_study(
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Suggestion,
-    responses((status = 201, description = "Recorded", body = FeedbackRow)),
+    responses((status = 201, description = "Suggestion", body = FeedbackRow)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn create(

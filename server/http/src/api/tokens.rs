@@ -1,4 +1,4 @@
-//! Tokens of scripts.
+//! REST: tokens of programs.
 
 use crate::AppState;
 use crate::may::May;
@@ -16,17 +16,19 @@ use gaitwright_store::tokens::{self, Token};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// A token that was just made.
+/// New token.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct MadeToken {
     /// The token.
     #[serde(flatten)]
     token: Token,
-    /// Its secret, shown once: send it as `Authorization: Bearer ...`.
+    /// Secret, shown once. Send it as `Authorization: Bearer SECRET`.
     secret: String,
 }
 
-/// `GET /tokens`: oldest first.
+/// List tokens
+///
+/// Oldest first.
 #[utoipa::path(
     get,
     path = "/tokens",
@@ -44,14 +46,14 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |one| one.id)?))
 }
 
-/// `GET /tokens/{id}`.
+/// Get a token
 #[utoipa::path(
     get,
     path = "/tokens/{id}",
     operation_id = "get_token",
     tag = "access",
     params(("id" = TokenId, Path, description = "The token")),
-    responses((status = 200, description = "The token, without its secret", body = Token)),
+    responses((status = 200, description = "Token, without its secret", body = Token)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn get(
@@ -62,14 +64,16 @@ pub(super) async fn get(
     Ok(Json(tokens::get(&mut *app.read().await?, id).await?))
 }
 
-/// `POST /tokens`. Never repeated: an Idempotency-Key is refused, because the secret is not stored.
+/// Create a token
+///
+/// Does not accept an Idempotency-Key, because the secret is not stored.
 #[utoipa::path(
     post,
     path = "/tokens",
     operation_id = "create_token",
     tag = "access",
     request_body = NewToken,
-    responses((status = 201, description = "Made; the secret is shown once", body = MadeToken)),
+    responses((status = 201, description = "Token; the secret is shown once", body = MadeToken)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -83,14 +87,14 @@ pub(super) async fn create(
     once.created(&app, writer, location, &MadeToken { token, secret }).await
 }
 
-/// `POST /tokens/{id}/revoke`.
+/// Revoke a token
 #[utoipa::path(
     post,
     path = "/tokens/{id}/revoke",
     operation_id = "revoke_token",
     tag = "access",
     params(("id" = TokenId, Path, description = "The token")),
-    responses((status = 200, description = "Ended", body = Token)),
+    responses((status = 200, description = "Revoked token", body = Token)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn revoke(

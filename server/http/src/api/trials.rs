@@ -1,4 +1,4 @@
-//! Trials.
+//! REST: trials.
 
 use crate::AppState;
 use crate::csv_answer::csv_answer;
@@ -23,7 +23,7 @@ use gaitwright_store::{StudyId, TrialId, gaits, schema, studies};
 use serde::Deserialize;
 use std::collections::HashMap;
 
-/// Which trials, and in which order.
+/// Filter and order of trials.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
@@ -31,7 +31,7 @@ pub(super) struct Filter {
     sort: Option<String>,
 }
 
-/// The order that `sort` names: a column, with a minus where the largest comes first.
+/// Parses `sort`: a column, with a leading minus for descending order.
 fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
     let (descending, name) = sort.strip_prefix('-').map_or((false, sort), |name| (true, name));
     let column = SORTS.into_iter().find(|column| *column == name);
@@ -41,7 +41,9 @@ fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
     Ok((column, descending))
 }
 
-/// `GET /studies/{id}/trials`: by number, unless `sort` names another order.
+/// List trials of a study
+///
+/// By number, unless `sort` names another column.
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials",
@@ -50,7 +52,7 @@ fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
     params(
         ("id" = StudyId, Path, description = "The study"),
         ("state" = Option<TrialState>, Query, description = "Trials in this state"),
-        ("sort" = Option<String>, Query, description = "Column that they are sorted by, such as `gait_rmse_rad`; after a minus the largest first. Trials without the figure come last")
+        ("sort" = Option<String>, Query, description = "Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a value come last")
     ),
     responses((status = 200, description = "A page", body = Page<Trial>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -88,14 +90,14 @@ pub(super) async fn of_study(
     Ok(Json(Page::of_parts(found, next)))
 }
 
-/// `GET /studies/{id}/trials.csv`.
+/// Download trials as CSV
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials.csv",
     operation_id = "list_trials_csv",
     tag = "trials",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "All of them", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "All trials, by number", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
@@ -106,14 +108,14 @@ pub(super) async fn of_study_csv(
     table(&mut app, id).await
 }
 
-/// `GET /trials/{id}`.
+/// Get a trial
 #[utoipa::path(
     get,
     path = "/trials/{id}",
     operation_id = "get_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "The trial", body = Trial), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Trial", body = Trial), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -124,14 +126,16 @@ pub(super) async fn get(
     Ok(Json(trials::get(&mut *app.read().await?, id).await?))
 }
 
-/// `POST /trials/{id}/cancel`.
+/// Cancel a trial
+///
+/// Its solve stops within one iteration.
 #[utoipa::path(
     post,
     path = "/trials/{id}/cancel",
     operation_id = "cancel_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Cancelled; its solve stops within one iteration", body = Trial)),
+    responses((status = 200, description = "Cancelled trial", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn cancel(
@@ -149,14 +153,16 @@ pub(super) async fn cancel(
     Ok(answer)
 }
 
-/// `POST /trials/{id}/retry`.
+/// Retry a trial
+///
+/// Queues a trial without a result again.
 #[utoipa::path(
     post,
     path = "/trials/{id}/retry",
     operation_id = "retry_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Queued once more", body = Trial)),
+    responses((status = 200, description = "Queued trial", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn retry(
@@ -172,14 +178,16 @@ pub(super) async fn retry(
     once.done(&app, writer, &trial).await
 }
 
-/// `GET /trials/{id}/iterations`: of the running solve, or as recorded.
+/// List iterations of a solve
+///
+/// Of the running solve, or as recorded.
 #[utoipa::path(
     get,
     path = "/trials/{id}/iterations",
     operation_id = "list_iterations",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Of the running solve, or as recorded", body = Page<schema::Iteration>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Iterations", body = Page<schema::Iteration>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn iterations(
@@ -197,14 +205,16 @@ pub(super) async fn iterations(
     Ok(Json(paging.cut_by_place(records)?))
 }
 
-/// `GET /trials/{id}/attempts`: what workers brought, also what came too late to count.
+/// List attempts at a trial
+///
+/// Results delivered by workers, including results that arrived too late to count.
 #[utoipa::path(
     get,
     path = "/trials/{id}/attempts",
     operation_id = "list_attempts",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "By attempt", body = Page<AttemptResult>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Attempts", body = Page<AttemptResult>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn attempts(

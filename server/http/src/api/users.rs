@@ -1,4 +1,4 @@
-//! Users and their one-time sign-in links.
+//! REST: users and one-time sign-in links.
 
 use crate::AppState;
 use crate::may::May;
@@ -18,24 +18,26 @@ use gaitwright_store::users::{self, User};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Who calls.
+/// Caller of the request.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Me {
     /// Name of the user or the token.
     name: String,
-    /// Role of the user; none for tokens.
+    /// Role of the user. Null for tokens.
     role: Option<Role>,
-    /// What the caller may do.
+    /// Rights of the caller.
     rights: Vec<Right>,
 }
 
-/// `GET /me`: who calls, and what the caller may do.
+/// Get the caller
+///
+/// Name, role and rights of the caller.
 #[utoipa::path(
     get,
     path = "/me",
     operation_id = "get_caller",
     tag = "access",
-    responses((status = 200, description = "The caller", body = Me)),
+    responses((status = 200, description = "Caller", body = Me)),
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> {
@@ -44,7 +46,9 @@ pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> 
     Ok(Json(Me { name: caller.name, role: caller.role, rights }))
 }
 
-/// `GET /users`: oldest first.
+/// List users
+///
+/// Oldest first.
 #[utoipa::path(
     get,
     path = "/users",
@@ -62,14 +66,14 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |one| one.id)?))
 }
 
-/// `GET /users/{id}`.
+/// Get a user
 #[utoipa::path(
     get,
     path = "/users/{id}",
     operation_id = "get_user",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
-    responses((status = 200, description = "The user", body = User)),
+    responses((status = 200, description = "User", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn get(
@@ -80,14 +84,14 @@ pub(super) async fn get(
     Ok(Json(users::get(&mut *app.read().await?, id).await?))
 }
 
-/// `POST /users`.
+/// Add a user
 #[utoipa::path(
     post,
     path = "/users",
     operation_id = "create_user",
     tag = "access",
     request_body = NewUser,
-    responses((status = 201, description = "Added", body = User)),
+    responses((status = 201, description = "User", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn create(
@@ -102,21 +106,23 @@ pub(super) async fn create(
     once.created(&app, writer, format!("/api/v1/users/{}", user.id), &user).await
 }
 
-/// A one-time sign-in link.
+/// One-time sign-in link.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Link {
-    /// Path of the link on this service; shown once, good for a day.
+    /// Path of the link, which is shown once and valid for a day.
     path: String,
 }
 
-/// `POST /users/{id}/link`: a one-time sign-in link for a user. Never repeated: an Idempotency-Key is refused.
+/// Create a sign-in link for a user
+///
+/// The link works once, within a day. Does not accept an Idempotency-Key.
 #[utoipa::path(
     post,
     path = "/users/{id}/link",
     operation_id = "create_sign_in_link",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
-    responses((status = 200, description = "Shown once", body = Link)),
+    responses((status = 200, description = "Link, shown once", body = Link)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -130,14 +136,16 @@ pub(super) async fn link(
     once.done(&app, writer, &Link { path: format!("/sign-in/{secret}") }).await
 }
 
-/// `POST /users/{id}/disable`: ends the sessions, links and tokens of a user and lets nobody in by that name.
+/// Disable a user
+///
+/// Ends the sessions, links and tokens of the user.
 #[utoipa::path(
     post,
     path = "/users/{id}/disable",
     operation_id = "disable_user",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
-    responses((status = 200, description = "Shut out", body = User)),
+    responses((status = 200, description = "Disabled user", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn disable(
@@ -148,14 +156,14 @@ pub(super) async fn disable(
     set_disabled(&app, id, &once, true).await
 }
 
-/// `POST /users/{id}/enable`.
+/// Enable a user
 #[utoipa::path(
     post,
     path = "/users/{id}/enable",
     operation_id = "enable_user",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
-    responses((status = 200, description = "Let in again", body = User)),
+    responses((status = 200, description = "Enabled user", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn enable(
@@ -166,16 +174,17 @@ pub(super) async fn enable(
     set_disabled(&app, id, &once, false).await
 }
 
-/// A role to give.
+/// New role of a user.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NewRole {
-    /// What the person is from now on.
+    /// Role.
     role: Role,
 }
 
-/// `PUT /users/{id}/role`: gives a user another role. Tokens that an administrator made end when this one is none any
-/// more.
+/// Change the role of a user
+///
+/// Tokens that a former administrator created are revoked.
 #[utoipa::path(
     put,
     path = "/users/{id}/role",
@@ -183,7 +192,7 @@ pub(super) struct NewRole {
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
     request_body = NewRole,
-    responses((status = 200, description = "With the role", body = User)),
+    responses((status = 200, description = "User with the new role", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn set_role(

@@ -126,7 +126,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         .collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
     let assigned = members::reaches_any(&mut reader, reach).await?;
-    let not_blind = blind::sees_gaits(&may.caller);
+    let not_blind = blind::sees_or_saw_gaits(&mut reader, &may.caller).await?;
     page(&RatePage { studies, assigned, nothing: before.nothing, saved, not_blind, no_password })
 }
 

@@ -13,6 +13,8 @@ use serde_json::Value;
 #[template(path = "api.html")]
 struct ReferencePage {
     groups: Vec<Group>,
+    /// The changes that refuse an Idempotency-Key.
+    without_key: Vec<String>,
 }
 
 /// The operations with one tag.
@@ -44,7 +46,20 @@ struct Parameter {
 /// `GET /api`.
 pub(super) async fn get() -> Page {
     let document = openapi::value().map_err(|e| Error::Internal(e.to_string()))?;
-    page(&ReferencePage { groups: groups(&document) })
+    let groups = groups(&document);
+    let operations = groups.iter().flat_map(|group| &group.operations);
+    let without_key = operations.filter(|operation| operation.changes_without_key()).map(Operation::name).collect();
+    page(&ReferencePage { groups, without_key })
+}
+
+impl Operation {
+    fn name(&self) -> String {
+        format!("{} {}", self.method, self.path)
+    }
+
+    fn changes_without_key(&self) -> bool {
+        self.method != "GET" && !self.parameters.iter().any(|parameter| parameter.name == "Idempotency-Key")
+    }
 }
 
 fn groups(document: &Value) -> Vec<Group> {

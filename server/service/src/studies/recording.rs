@@ -176,6 +176,7 @@ pub(super) fn check(definition: &Definition) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Invalid`] for a name that does not print, or what the database reports.
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(ReferenceGait, bool), Error> {
+    writer.room()?;
     check(definition)?;
     let (reference, added) = reference_gaits::ensure(writer, definition).await?;
     if added {

@@ -14,13 +14,15 @@ use gait_optimizer::{Gait, ReferenceGait, WarmStart};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::archive::Definition;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
+use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::quarantine::Quarantine;
 use gaitwright_store::row::{Cell, Row};
 use gaitwright_store::studies::{Chosen, FeedbackMode, Study, StudyPlan};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
-    Connection, Instant, StoreError, StudyId, TrialId, archive, assessments, devices, feedback, gaits, lab_sessions,
-    measurement_files, now, presentations, reference_gaits, results, safety_reviews, studies, subjects, trials,
+    Connection, FeedbackId, Instant, StoreError, StudyId, TrialId, archive, assessments, devices, feedback, gaits,
+    lab_sessions, measurement_files, now, presentations, reference_gaits, results, safety_reviews, studies, subjects,
+    trials,
 };
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -144,8 +146,9 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     if let Some(number) = at("jobs", archive::trial_unlike_its_job(db).await)? {
         return Err(refuse(format!("trial {number}: its state contradicts its job")));
     }
-    answers(db, &context.study, &trials).await?;
-    lab(db, pool, id).await?;
+    let by_id: HashMap<TrialId, &Trial> = trials.iter().map(|trial| (trial.id, trial)).collect();
+    let sessions = lab(db, pool, id, &by_id).await?;
+    answers(db, &context.study, &by_id, (subject.pseudonym.as_str(), &sessions[..])).await?;
     Ok(Checked { study: id, unchecked_rmse })
 }
 
@@ -273,33 +276,71 @@ async fn brought(db: &mut Connection, trial: &Trial) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks what the learner hears, and what people said beside it.
-async fn answers(db: &mut Connection, study: &Study, trials: &[Trial]) -> Result<(), Error> {
+/// Checks what the learner hears, and what people said beside it. The subject answers each lab session.
+async fn answers(
+    db: &mut Connection,
+    study: &Study,
+    trials: &HashMap<TrialId, &Trial>,
+    (subject, sessions): (&str, &[LabSession]),
+) -> Result<(), Error> {
     let id = study.id;
-    let by_id: HashMap<TrialId, &Trial> = trials.iter().map(|trial| (trial.id, trial)).collect();
     let rows = at("feedback", feedback::of_study(db, id, 0).await)?;
+    let noted = at("assessments", assessments::of_study(db, id).await)?;
+    // Whoever has answered may still report a gait as unsafe.
+    let of_reports: HashSet<FeedbackId> = noted.iter().filter_map(|assessment| assessment.feedback_id).collect();
     let mut labelled = 0;
+    let mut answered: HashMap<_, usize> = HashMap::new();
     for row in &rows {
-        at(format!("feedback {} ({})", row.seq, row.id), heard(row, study, &by_id))?;
+        let what = format!("feedback {} ({})", row.seq, row.id);
+        at(&what, heard(row, study, trials))?;
         labelled += usize::from(matches!(row.said, FeedbackContent::Label { .. }));
+        let Some(compared) = pair(&row.said).filter(|_| is_of_person(row) && !of_reports.contains(&row.id)) else {
+            continue;
+        };
+        let author = printable::person(&row.author);
+        let walked = sessions.iter().filter(|session| sorted(session.gait_one, session.gait_two) == compared).count();
+        let most = if author == printable::person(subject) { 1 + walked } else { 1 };
+        let count = answered.entry((compared, author)).or_default();
+        *count += 1;
+        if *count > most {
+            return Err(refuse(format!("{what}: {} has answered this comparison already", row.author)));
+        }
     }
-    let results = trials.iter().filter(|trial| trial.state.is_result()).count();
+    let results = trials.values().filter(|trial| trial.state.is_result()).count();
     if labelled != results {
         return Err(refuse(format!("{results} trials have a result, but {labelled} have a label")));
     }
     let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.said)?))).collect();
-    for assessment in at("assessments", assessments::of_study(db, id).await)? {
+    for assessment in &noted {
+        let what = format!("assessment {}", assessment.id);
+        at(&what, of_gaits(trials, [assessment.first, assessment.second]))?;
         let wanted = sorted(assessment.first, assessment.second);
         if assessment.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
-            return Err(refuse(format!(
-                "assessment {}: what the learner heard of it is of other trials",
-                assessment.id
-            )));
+            return Err(refuse(format!("{what}: what the learner heard of it is of other trials")));
         }
     }
-    at("presentations", presentations::of_study(db, id).await)?;
-    at("safety_reviews", safety_reviews::of_study(db, id).await)?;
+    for shown in at("presentations", presentations::of_study(db, id).await)? {
+        at(format!("presentation {}", shown.id), of_gaits(trials, [shown.one, shown.other]))?;
+    }
+    for review in at("safety_reviews", safety_reviews::of_study(db, id).await)? {
+        at(format!("safety review {}", review.id), of_gaits(trials, [review.trial_id]))?;
+    }
     Ok(())
+}
+
+/// A standing answer that a person gave once: raters are asked again.
+fn is_of_person(row: &FeedbackRow) -> bool {
+    matches!(row.source, Source::Subject | Source::Clinician | Source::Script)
+        && !row.by_rater
+        && row.retraction.is_none()
+}
+
+/// Checks that what people are asked about are gaits of the study.
+fn of_gaits<const N: usize>(trials: &HashMap<TrialId, &Trial>, asked: [TrialId; N]) -> Result<(), String> {
+    match asked.iter().find(|id| trials.get(*id).is_none_or(|trial| trial.state != TrialState::Converged)) {
+        Some(id) => Err(format!("trial {id} is no gait of this study")),
+        None => Ok(()),
+    }
 }
 
 fn sorted(a: TrialId, b: TrialId) -> (TrialId, TrialId) {
@@ -364,14 +405,21 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
     Ok(())
 }
 
-/// Checks what was measured in the lab.
-async fn lab(db: &mut Connection, pool: &Pool, study: StudyId) -> Result<(), Error> {
-    for session in at("lab_sessions", lab_sessions::of_study(db, study).await)? {
+/// Checks what was walked and measured in the lab.
+async fn lab(
+    db: &mut Connection,
+    pool: &Pool,
+    study: StudyId,
+    trials: &HashMap<TrialId, &Trial>,
+) -> Result<Vec<LabSession>, Error> {
+    let sessions = at("lab_sessions", lab_sessions::of_study(db, study).await)?;
+    for session in &sessions {
+        at(format!("lab session {}", session.id), of_gaits(trials, [session.gait_one, session.gait_two]))?;
         for found in at("lab_recordings", measurement_files::of_session(db, session.id).await)? {
             at(format!("recording {}", found.id), lab::check_kept(db, pool, &found).await)?;
         }
         let results = measurement_files::results::<EmgResult>(db, session.id).await;
         at(format!("EMG results of lab session {}", session.id), results)?;
     }
-    Ok(())
+    Ok(sessions)
 }

@@ -93,7 +93,7 @@ pub async fn import(store: &Store, actor: &Actor, archive: Archive) -> Result<St
         Err(StoreError::Missing { .. }) => {}
         Err(other) => return Err(other.into()),
     }
-    copy(&mut quarantine, study, &mut writer).await?;
+    copy(&mut quarantine, study, &mut writer, origin.trusted).await?;
     let present = studies::get(&mut writer, study).await?;
     imports::insert(&mut writer, study, actor, &origin).await?;
     let payload = json!({ "state": present.state, "reason": "imported" });
@@ -111,7 +111,7 @@ pub async fn import(store: &Store, actor: &Actor, archive: Archive) -> Result<St
 }
 
 /// Copies every row into a transaction.
-async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer) -> Result<(), Error> {
+async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer, trusted: bool) -> Result<(), Error> {
     let forked_from = quarantine.forked_from().map(str::to_owned);
     let (sender, mut rows) = mpsc::channel::<archive::Read>(ROWS_AHEAD);
     let reading = async {
@@ -124,6 +124,11 @@ async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer) 
         while let Some(archive::Read { table, mut row, .. }) = rows.recv().await {
             if table == "studies" {
                 row.set("forked_from", forked_from.clone().map_or(Cell::Null, Cell::Text));
+            }
+            if table == "imports" && !trusted {
+                // Nobody vouches for what the archive says of earlier signatures.
+                row.set("signed_by", Cell::Null);
+                row.set("trusted", Cell::Integer(0));
             }
             if matches!(table, "subjects" | "devices" | "reference_gaits")
                 && !is_new(writer, table, &row, &mut unpacking).await?

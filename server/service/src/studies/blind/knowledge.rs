@@ -3,21 +3,33 @@
 use crate::access::{Caller, Right};
 use crate::error::Error;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::{Connection, StudyId, allocations, presentations};
+use gaitwright_store::{Connection, StudyId, allocations, presentations, users};
 
 /// Whether a caller is never blind: whoever may read can open the trials; and who holds a token is not known, nor what they
 /// may read.
-pub fn sees_gaits(caller: &Caller) -> bool {
+fn sees_gaits(caller: &Caller) -> bool {
     Actor::is_token(caller.actor.as_str()) || caller.may(Right::Read)
 }
 
-/// Whether a caller could know which gait is which in a study: besides who [never is blind](sees_gaits), a rater may have
-/// been unblinded, and a controller file of a lab walk shows a gait.
+/// Whether a caller is not blind in any study: besides who sees gaits, a user whose former role allowed it.
+///
+/// # Errors
+/// What the database reports.
+pub async fn sees_or_saw_gaits(db: &mut Connection, caller: &Caller) -> Result<bool, Error> {
+    if sees_gaits(caller) {
+        return Ok(true);
+    }
+    let Some(user) = caller.user else { return Ok(false) };
+    Ok(users::former_roles(db, user).await?.iter().any(|role| role.rights().has(Right::Read)))
+}
+
+/// Whether a caller could know which gait is which in a study: besides who is [not blind in any](sees_or_saw_gaits), a
+/// rater may have been unblinded, and a controller file of a lab walk shows a gait.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn could_have_known(db: &mut Connection, caller: &Caller, study: StudyId) -> Result<bool, Error> {
-    Ok(sees_gaits(caller)
+    Ok(sees_or_saw_gaits(db, caller).await?
         || presentations::is_unblinded(db, study, &caller.name).await?
         || allocations::has_file(db, study, &caller.actor).await?)
 }

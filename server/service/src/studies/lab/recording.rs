@@ -281,6 +281,7 @@ pub async fn keep(
     id: LabSessionId,
     checked: &Checked,
 ) -> Result<MeasurementFile, Error> {
+    writer.room()?;
     let walk = checked.walk;
     if still_open(writer, id).await?.done(Act::Walk(walk)).is_none() {
         return Err(Error::conflict(format!("Walk {walk} is not recorded yet. Record it in the lab session first.")));

@@ -1,0 +1,93 @@
+//! Rules that a schema cannot state: what a field has to do with the record, with other fields, or with a file. They stand
+//! in `x-depends` of the field, and a value is refused for them alone if it fits its schema.
+
+use serde_json::{Map, Value, json};
+
+const GAIT: &str = "A trial of this study with a gait that people may walk with: converged, certified, without an open safety report. \
+                    The two trials of a comparison have different gaits.";
+const GAIT_OF_STUDY: &str = "A converged trial of this study. For `cannot_tell`, people may walk with its gait. The two trials have \
+                             different gaits.";
+const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more. The values of a dimension increase, each within the range of its bound; \
+                      its lengthscale lies between a hundredth of their smallest step and 10,000 times their range.";
+const EXISTS: &str = "It exists.";
+const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
+const EMG_FILE: &str = "A file of the given form with the columns of the muscles, sampled at 100 Hz or more, with one whole stride or more. \
+                        Columns and heel strikes that are named are in it.";
+const MOTION_FILE: &str = "A file of the given form with the angle of one joint or more over several strides, as optimizer/data/README.md \
+                           describes it.";
+const REFERENCE_FILE: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five joint angles over at \
+                              least one whole stride of a walking person. Heel strikes and columns that are named must be in it.";
+
+/// Component, field, and the rule.
+const RULES: [(&str, &str, &str); 26] = [
+    ("NewPreference", "trial_a", GAIT),
+    ("NewPreference", "trial_b", GAIT),
+    ("NewAssessment", "first", GAIT_OF_STUDY),
+    ("NewAssessment", "second", GAIT_OF_STUDY),
+    ("NewSession", "gait_one", GAIT),
+    ("NewSession", "gait_two", GAIT),
+    ("Suggestion", "over", "A converged trial of this study."),
+    (
+        "Suggestion",
+        "bounds",
+        "Dimensions of the study's search space with values of theirs, one of them not that of the trial.",
+    ),
+    ("NewStudy", "subject_id", EXISTS),
+    ("NewStudy", "device_id", EXISTS),
+    ("NewStudy", "reference_gait_id", EXISTS),
+    ("NewStudy", "base_bounds", BOUNDS),
+    ("NewStudy", "search_space", BOUNDS),
+    ("NewStudy", "gait_settings", LIMITS),
+    ("NewStudy", "learner", "One ordinal threshold fewer than there are categories; thresholds increase."),
+    (
+        "Extend",
+        "trial_budget",
+        "More than the study has begun; of a study that has ended, more than its present budget.",
+    ),
+    ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
+    ("Invitation", "name", "The name of a rater, or one that is not taken."),
+    ("Unblind", "rater", "A rater who was shown a pair of this study."),
+    (
+        "SafetyReviewToMake",
+        "said_until",
+        "Not before the newest safety report that the decision is about, and not after now.",
+    ),
+    ("NewEmg", "recording", EMG_FILE),
+    (
+        "NewEmg",
+        "reading",
+        "An OpenSim file has no `rate_hz`. Heel strikes are two or more times, or a column in their place.",
+    ),
+    ("NewMotion", "recording", MOTION_FILE),
+    ("NewMotion", "reading", "`cutoff_hz` is at most 0.45 of the sampling rate."),
+    ("NewReferenceGait", "recording", REFERENCE_FILE),
+    ("Processing", "settings", "`band_low_hz` is smaller than `band_high_hz`; all are below half the sampling rate."),
+];
+
+/// Says the rules of the fields.
+pub(super) fn state(schemas: &mut Map<String, Value>) {
+    for (component, field, rule) in RULES {
+        let property = schemas.get_mut(component).and_then(|schema| schema.get_mut("properties")?.get_mut(field));
+        if let Some(property) = property.and_then(Value::as_object_mut) {
+            property.insert("x-depends".to_owned(), json!(rule));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RULES;
+    use crate::openapi;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_rule_is_of_a_field_that_is_described() {
+        let document = openapi::value().unwrap();
+        let mut fields = BTreeSet::new();
+        for (component, field, rule) in RULES {
+            let place = format!("/components/schemas/{component}/properties/{field}/x-depends");
+            assert_eq!(document.pointer(&place).and_then(|said| said.as_str()), Some(rule), "{component}.{field}");
+            assert!(fields.insert((component, field)), "{component}.{field}");
+        }
+    }
+}
