@@ -457,7 +457,7 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
 fn is_about_the_request(line: &str) -> bool {
     // Each form has a key of its own. Rows of sessions tell when they were last used: these requests use them.
     let of_session =
-        line.contains("by password") || line.contains("by link") || line.contains("<tr><th scope=\"row\">20");
+        line.contains("with password") || line.contains("with link") || line.contains("<tr><th scope=\"row\">20");
     line.contains("name=\"key\"") || line.contains("request_id") || of_session
 }
 

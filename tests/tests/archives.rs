@@ -181,14 +181,18 @@ const FORGERIES: [Forgery; 57] = [
         },
         "its stated Gait RMSE is",
     ),
-    ("a gait that is not its hash", |r| r.first("gaits")["gait_sha256"] = "0".repeat(64).into(), "has changed"),
+    (
+        "a gait that is not its hash",
+        |r| r.first("gaits")["gait_sha256"] = "0".repeat(64).into(),
+        "does not match its hash",
+    ),
     (
         "another gait under the hash",
         |r| {
             let other = r.table("gaits")[1]["gait"].clone();
             r.first("gaits")["gait"] = other;
         },
-        "has changed",
+        "does not match its hash",
     ),
     (
         "the gait of another trial",
@@ -219,7 +223,7 @@ const FORGERIES: [Forgery; 57] = [
             start["mesh"] = serde_json::to_value(Mesh { ds2: 8, ds3: 8, ss2: 8, ss1: 8 }).unwrap();
             row["warm_start"] = blob(start.to_string().as_bytes());
         },
-        "warm start is of another problem",
+        "warm start belongs to another problem",
     ),
     ("iterations that are none", |r| r.first("gaits")["iterations"] = blob(b"[1]"), "invalid type"),
     ("a gait that is not compressed", |r| r.first("gaits")["iterations"] = json!({"hexadecimal": "00"}), "trial 1"),
@@ -230,12 +234,12 @@ const FORGERIES: [Forgery; 57] = [
         |r| within(r.first("devices"), "definition", |d| d["links"] = json!([])),
         "device",
     ),
-    ("another name beside a device", |r| r.first("devices")["name"] = "X".into(), "do not agree"),
-    ("another hash beside a device", |r| r.first("devices")["sha256"] = "0".repeat(64).into(), "do not agree"),
+    ("another name beside a device", |r| r.first("devices")["name"] = "X".into(), "do not match"),
+    ("another hash beside a device", |r| r.first("devices")["sha256"] = "0".repeat(64).into(), "do not match"),
     (
         "a nearer reference",
         |r| definition(r.first("reference_gaits"), |d| d["angles_rad"][7][1] = 0.9.into()),
-        "its Gait RMSE",
+        "its stated Gait RMSE",
     ),
     (
         "a reference of few rows",
@@ -245,7 +249,7 @@ const FORGERIES: [Forgery; 57] = [
     (
         "another hash beside a reference",
         |r| r.first("reference_gaits")["sha256"] = "0".repeat(64).into(),
-        "do not agree",
+        "do not match",
     ),
     ("a giant", |r| r.first("subjects")["height_m"] = 3.0.into(), "subjects_height"),
     ("a light subject", |r| r.first("subjects")["body_mass_kg"] = 30.0.into(), "body_mass_kg"),
@@ -268,7 +272,7 @@ const FORGERIES: [Forgery; 57] = [
                 definition(d, |d| d["name"] = "X".into());
             });
         },
-        "2 rows of devices",
+        "devices has 2 rows",
     ),
     ("another study", |r| r.copy("studies", |s| s["id"] = "01900000-0000-7000-8000-000000000001".into()), "2 studies"),
     ("an identifier that is none", |r| r.first("studies")["id"] = "x".into(), "not an identifier"),
@@ -327,7 +331,7 @@ const FORGERIES: [Forgery; 57] = [
             let place = r.0.iter().position(|(_, row)| row["kind"] == "label").unwrap();
             r.0.remove(place);
         },
-        "7 a label",
+        "7 have a label",
     ),
     (
         "a preference of Gait RMSE turned",

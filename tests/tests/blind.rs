@@ -229,7 +229,7 @@ async fn each_side_of_a_pair_is_the_motion_of_the_gait_that_was_drawn_for_it() {
         let of = |id| hip_m(trials.iter().find(|trial| trial.id == id).unwrap().gait_rmse_rad.unwrap());
         let (first, second) = *sides(&service.store, study).await.last().unwrap();
         for (side, trial) in [("first", first), ("second", second)] {
-            let motion = service.fetch(&format!("/api/v1/blind/{token}/{side}")).await.json();
+            let motion = service.fetch(&format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.json();
             let hip = motion[0][0][1].as_f64().unwrap();
             assert!((hip - of(trial)).abs() < 6e-4, "{side}: {hip} m, drawn: {} m", of(trial));
         }
@@ -285,16 +285,16 @@ async fn a_rater_who_was_a_clinician_before_is_recorded_as_not_blind() {
     for role in ["clinician", "rater"] {
         let path = format!("/api/v1/users/{}/role", id.as_str().unwrap());
         let body = json!({"role": role}).to_string();
-        let given = send(&service, &admin, &Method::POST, &path, "application/json", &body).await;
+        let given = send(&service, &admin, &Method::PUT, &path, "application/json", &body).await;
         assert_eq!(given.status, StatusCode::OK, "{}", given.text);
     }
-    let next = format!("/api/v1/studies/{study}/blind/next");
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
     for page in ["/rate".to_owned(), format!("/rate/pair/{}", pair["token"].as_str().unwrap())] {
         let page = send(&service, &rater, &Method::GET, &page, "", "").await;
         assert!(page.text.contains("recorded as not blind"), "{}", page.text);
     }
-    let path = format!("/api/v1/blind/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, "application/json", "{\"answer\": \"first\"}").await;
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
     service.stop().await;

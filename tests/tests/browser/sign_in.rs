@@ -133,7 +133,7 @@ async fn browser_sends_an_answer_after_the_session_has_ended() {
     page.wait_for("#password").await;
     assert!(page.text("main").await.contains("Your entry was not saved"));
     sign_in().await;
-    page.wait_until("document.querySelector('h1').textContent === 'Send it now'").await;
+    page.wait_until("document.querySelector('h1').textContent === 'Send your entry'").await;
     page.click("main form button").await;
     page.wait_for(".notice.good").await;
     let heard = site.service.feedback(study).await;
