@@ -253,7 +253,7 @@ async fn browser_rater_takes_the_newest_answer_back_also_later() {
     page.wait_for(".notice.good").await;
     // The page of the pair offers it, and so does the home page without a word in its address.
     page.goto(&pair).await;
-    assert!(page.text(".notice").await.contains("Your answer to this pair: second"));
+    assert!(page.text(".notice").await.contains("Your answer to this pair: the second gait is better"));
     assert_eq!(page.count("form[action$='/take-back']").await, 1);
     page.goto(&site.at("/rate")).await;
     page.click("form[action$='/take-back'] button").await;
