@@ -95,6 +95,40 @@ async fn a_certificate_that_is_cancelled_is_not_made() {
 }
 
 #[tokio::test]
+async fn a_certificate_that_was_requested_is_made_after_a_restart_unless_it_was_cancelled() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let certifier = |pause| Verdicts { pause, passes: |_: &Gait| true };
+    let solver = || Analytic::slow(Duration::from_millis(10));
+    let slow = certifier(Duration::from_mins(10));
+    let service = Service::start_looking_back(&database, solver(), slow, Clearance::default()).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits()))).await;
+    let mut converged = Vec::new();
+    while converged.len() < 2 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+        converged = service.trials(study).await;
+        converged.retain(|trial| trial.state == TrialState::Converged);
+    }
+    // A study that goes on would end and certify its best gaits by itself.
+    service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
+    let (kept, cancelled) = (converged[0].id, converged[1].id);
+    let mut jobs = Vec::new();
+    for trial in [kept, cancelled] {
+        jobs.push(address(&service.post(&format!("/api/v1/trials/{trial}/certificate"), &json!({})).await));
+    }
+    assert_eq!(service.post(&format!("{}/cancel", jobs[1]), &json!({})).await.status, StatusCode::OK);
+    service.stop().await;
+
+    let quick = certifier(Duration::ZERO);
+    let service = Service::start_looking_back(&database, solver(), quick, Clearance::default()).await;
+    wait_for(&service, &jobs[0], "done").await;
+    assert_eq!(service.fetch(&format!("/api/v1/trials/{kept}/certificate")).await.json()["passed"], true);
+    assert!(listed(&service, "certificate").await.is_empty());
+    assert_eq!(service.fetch(&jobs[1]).await.status, StatusCode::NOT_FOUND);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn an_explanation_is_a_job_that_stops_and_begins_again() {
     let (_folder, service, study, watched) = service().await;
     let trial = first(&service, study, TrialState::NotConverged).await;

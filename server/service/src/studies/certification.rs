@@ -51,7 +51,7 @@ pub async fn ask(writer: &mut Writer, actor: &Actor, trial: TrialId) -> Result<O
     match begin(writer, trial).await? {
         Certification::Made(certificate) => Ok(Some(*certificate)),
         Certification::Ahead(_) => {
-            audit::append(writer, actor, "trial.ask_certificate", &format!("trial {trial}"), &json!({})).await?;
+            audit::append(writer, actor, certificates::REQUESTED, &format!("trial {trial}"), &json!({})).await?;
             Ok(None)
         }
     }

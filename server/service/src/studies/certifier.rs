@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::workers::Certify;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::{Store, StoreResult, StudyId, TrialId, consents, events, studies};
+use gaitwright_store::{Store, StoreResult, StudyId, TrialId, certificates, consents, events, studies};
 use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -100,7 +100,10 @@ impl Certifier {
     /// Runs forever. `pulse` changes with every change of the record. Calls `changed` after it stored a certificate,
     /// and `through` when a study has no gait left to certify.
     pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn(), through: impl Fn(StudyId)) {
-        // Start with the studies that ended before this process started.
+        // Start with the gaits that were requested, and the studies that ended, before this process started.
+        if let Err(error) = self.hear_of_requested().await {
+            tracing::error!(%error, "cannot read which certificates were requested");
+        }
         let mut heard = 0;
         loop {
             if let Err(error) = self.hear_of_ended(&mut heard).await {
@@ -139,6 +142,13 @@ impl Certifier {
             self.state().waiting.remove(&study);
             through(study);
         }
+    }
+
+    /// Queues the gaits whose certificates were requested and not made.
+    async fn hear_of_requested(&self) -> StoreResult<()> {
+        let requested = certificates::requested(&mut *self.store.read().await?).await?;
+        self.state().asked.extend(requested);
+        Ok(())
     }
 
     /// Queues studies that have ended since the event `heard`.
