@@ -230,7 +230,7 @@ async fn each_side_of_a_pair_is_the_motion_of_the_gait_that_was_drawn_for_it() {
         let (first, second) = *sides(&service.store, study).await.last().unwrap();
         for (side, trial) in [("first", first), ("second", second)] {
             let motion = service.fetch(&format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.json();
-            let hip = motion[0][0][1].as_f64().unwrap();
+            let hip = motion["figures"][0][0][1].as_f64().unwrap();
             assert!((hip - of(trial)).abs() < 6e-4, "{side}: {hip} m, drawn: {} m", of(trial));
         }
         if (of(first) - of(second)).abs() > 2e-3 {

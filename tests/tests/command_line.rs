@@ -94,7 +94,10 @@ fn a_table_of_actions_is_checked_whole_before_anything_is_solved() {
     assert!(sweep("a1,a2,a3,a4,a5,a6,a7,a8\n").contains("has no rows"));
     let good = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0,0.5,50,40\n";
     assert!(sweep(&format!("{good}20,90,0.3,1.4,0,0.5,50\n")).contains("line"));
-    assert!(sweep(&format!("{good}20,90,0.3,1.4,0,0.5,fifty,40\n")).contains("line 3: a7: \"fifty\" is not a number"));
+    assert!(
+        sweep(&format!("{good}20,90,0.3,1.4,0,0.5,fifty,40\n"))
+            .contains("line 3: a7 is \"fifty\", which is not a number")
+    );
     assert!(sweep(&format!("{good}20,90,0.3,1.4,0,0.5,50,400\n")).contains("line 3: a8 = 400"));
 }
 

@@ -172,7 +172,8 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     for path in ["/".to_owned(), format!("/studies/{finished}")] {
         let page = service.fetch(&path).await;
         assert_eq!(page.status, StatusCode::OK);
-        assert!(page.text.contains("withdrew") && !page.text.contains(&format!("{best:.4}")), "{}", page.text);
+        let says = page.text.contains("consent withdrawn") || page.text.contains("withdrew");
+        assert!(says && !page.text.contains(&format!("{best:.4}")), "{}", page.text);
     }
     let compared = service.fetch(&format!("/api/v1/study-comparison?ids={finished},{running}")).await;
     assert_eq!(compared.status, StatusCode::CONFLICT);
