@@ -278,7 +278,7 @@ async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_ef
     assert_eq!(rows.len(), 3);
     for row in rows {
         assert_eq!(
-            (&row["kind"], &row["source"], &row["author"], &row["note"]),
+            (&row["said"]["kind"], &row["source"], &row["author"], &row["note"]),
             (&json!("preference"), &json!("clinician"), &json!("K"), &json!(""))
         );
     }

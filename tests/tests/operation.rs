@@ -207,7 +207,7 @@ async fn a_copy_is_restored_and_the_present_record_is_kept_beside_it() {
         .any(|file| file.file_name().to_string_lossy().contains("before-"));
     assert!(kept, "the record that was replaced is kept");
     let (done, text) = gaitwright(folder.path(), &["audit", "verify"]);
-    assert!(done && text.contains("whole"), "{text}");
+    assert!(done && text.contains("intact"), "{text}");
     let service = Service::start(&database, Analytic::default(), 1).await;
     assert_eq!(service.fetch(&format!("/api/v1/studies/{study}/trials")).await.text, before);
     assert_eq!(service.fetch(&format!("/api/v1/studies/{later}")).await.status, StatusCode::NOT_FOUND);

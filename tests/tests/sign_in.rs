@@ -306,7 +306,10 @@ async fn tokens_and_sessions_end_with_the_user_who_made_them() {
         assert_eq!([status(&service, &made[ended].1).await, status(&service, &made[ended].2).await], both, "{ended}");
     }
     // Who administers no more keeps the session, with less, and no token.
-    assert_eq!(post(&service, &root, &to(1, "role"), &json!({"role": "rater"})).await.0, StatusCode::OK);
+    assert_eq!(
+        send(&service, &root, &Method::PUT, &to(1, "role"), "application/json", "{\"role\": \"rater\"}").await.status,
+        StatusCode::OK
+    );
     assert_eq!(status(&service, &made[1].1).await, StatusCode::OK);
     assert_eq!(status(&service, &made[1].2).await, StatusCode::UNAUTHORIZED);
     // What has ended stays so.
@@ -491,7 +494,10 @@ async fn event_streams_end_with_what_allowed_them() {
     assert_eq!(post(&service, &root, &ended, &json!({})).await.0, StatusCode::OK);
     let user = |number: usize, what: &str| format!("/api/v1/users/{}/{what}", ids[number]);
     assert_eq!(post(&service, &root, &user(2, "disable"), &json!({})).await.0, StatusCode::OK);
-    assert_eq!(post(&service, &root, &user(3, "role"), &json!({"role": "rater"})).await.0, StatusCode::OK);
+    assert_eq!(
+        send(&service, &root, &Method::PUT, &user(3, "role"), "application/json", "{\"role\": \"rater\"}").await.status,
+        StatusCode::OK
+    );
     let tokens = send(&service, &root, &Method::GET, "/api/v1/tokens", "", "").await.items();
     let revoke = format!("/api/v1/tokens/{}/revoke", tokens[0]["id"].as_str().unwrap());
     assert_eq!(post(&service, &root, &revoke, &json!({})).await.0, StatusCode::OK);
