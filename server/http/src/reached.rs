@@ -50,9 +50,13 @@ of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult:
 of_study!(AssessmentId, "assessment", async |db: &mut Connection, id| StoreResult::Ok(
     assessments::get(db, id).await?.study_id
 ));
-of_study!(JobId, "job", async |db: &mut Connection, id: JobId| StoreResult::Ok(
-    trials::get(db, id.trial).await?.study_id
-));
+of_study!(JobId, "job", async |db: &mut Connection, id: JobId| {
+    // A job of a trial that is not there is not there either, and is refused in the same words.
+    trials::get(db, id.trial).await.map(|trial| trial.study_id).map_err(|error| match error {
+        StoreError::Missing { .. } => StoreError::Missing { what: "job", id: id.to_string() },
+        other => other,
+    })
+});
 of_study!(MemberId, "member", async |db: &mut Connection, id| StoreResult::Ok(members::get(db, id).await?.study_id));
 of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
     StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
