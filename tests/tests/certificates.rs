@@ -82,7 +82,7 @@ fn a_gait_is_solved_certified_and_converted() {
 fn what_is_no_gait_or_recording_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    refused(folder, &["certify", "nowhere.json"], "cannot read nowhere.json");
+    refused(folder, &["certify", "nowhere.json"], "Cannot read nowhere.json");
     std::fs::write(folder.join("list.json"), "[1, 2]").unwrap();
     refused(folder, &["certify", "list.json"], "list.json: not a gait");
     refused(folder, &["convert", "list.json", "--to", "csv"], "list.json: not a gait");

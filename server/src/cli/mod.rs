@@ -69,7 +69,7 @@ enum Command {
     Worker(worker::Worker),
     /// Run an unattended study, in which Gait RMSE answers the comparisons.
     Tune(tune::Tune),
-    /// Reproduce the paper's comparison of gaits with and without muscles, and write a report.
+    /// Reproduce the paper's comparison of gaits with and without muscles
     Reproduce(reproduce::Reproduce),
     /// Optimise one gait.
     Solve(solve::Solve),
