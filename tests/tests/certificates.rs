@@ -84,8 +84,8 @@ fn what_is_no_gait_or_recording_is_refused() {
     let folder = folder.path();
     refused(folder, &["certify", "nowhere.json"], "Cannot read nowhere.json");
     std::fs::write(folder.join("list.json"), "[1, 2]").unwrap();
-    refused(folder, &["certify", "list.json"], "list.json: not a gait");
-    refused(folder, &["convert", "list.json", "--to", "csv"], "list.json: not a gait");
+    refused(folder, &["certify", "list.json"], "list.json is not a gait file");
+    refused(folder, &["convert", "list.json", "--to", "csv"], "list.json is not a gait file");
     let times_s: Vec<String> = (0..30).map(|row| row.to_string()).collect();
     std::fs::write(folder.join("walk.mot"), format!("walk\nendheader\ntime\n{}\n", times_s.join("\n"))).unwrap();
     let reference = ["reference", "walk.mot", "--name", "x", "--out", "r.json"];
@@ -94,7 +94,7 @@ fn what_is_no_gait_or_recording_is_refused() {
         &reference,
         "walk.mot, line 2: the header has neither inDegrees=yes nor inDegrees=no; give the unit",
     );
-    refused(folder, &["solve", "--reference", "list.json"], "list.json: not a reference gait");
+    refused(folder, &["solve", "--reference", "list.json"], "list.json is not a reference gait");
 }
 
 #[tokio::test]
