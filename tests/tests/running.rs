@@ -185,7 +185,7 @@ async fn not_ready_while_the_record_takes_no_changes() {
     tokio::time::sleep(Duration::from_millis(1100)).await;
     let answer = service.fetch("/ready").await;
     assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE, "{}", answer.text);
-    assert!(answer.text.contains("the record takes no changes"), "{}", answer.text);
+    assert!(answer.text.contains("The record cannot be written"), "{}", answer.text);
     service.stop().await;
 }
 
