@@ -45,6 +45,7 @@ impl Scene {
             ("subjects", service.subject().await.to_string()),
             ("studies", study.to_string()),
             ("trials", one.to_string()),
+            ("jobs", format!("solve-{one}")),
             ("preferences", made(format!("{api}/preferences"), preference).await),
             ("assessments", made(format!("{api}/assessments"), assessment).await),
             ("lab-sessions", made(format!("{api}/lab-sessions"), json!({"gait_one": one, "gait_two": two})).await),
@@ -147,11 +148,10 @@ impl Scene {
     }
 }
 
-/// Refusals that need a state of the record which the scene does not have: a pair without an answer, a job that has not
-/// ended, a recorded walk, a trial that a script evaluates.
-const OF_OTHER_STATES: [&str; 4] = [
+/// Refusals that need a state of the record which the scene does not have: a pair without an answer, a recorded walk, a
+/// trial that a script evaluates.
+const OF_OTHER_STATES: [&str; 3] = [
     "post /api/v1/blind-pairs/{token}/answer 422",
-    "post /api/v1/jobs/{id}/cancel 400",
     "post /api/v1/lab-sessions/{id}/emg-results 422",
     "post /api/v1/trials/{id}/tell 422",
 ];
