@@ -33,7 +33,7 @@ async fn everybody(service: &Service) -> Vec<(As, Vec<Right>)> {
 }
 
 #[tokio::test]
-async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
+async fn every_role_and_scope_has_exactly_the_described_rights() {
     let (_folder, service) = service().await;
     let callers = everybody(&service).await;
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
@@ -205,7 +205,7 @@ fn form_of(fields: &[(String, String)]) -> String {
 }
 
 #[tokio::test]
-async fn what_is_sent_after_the_session_has_ended_is_not_stored_and_not_lost() {
+async fn answer_after_the_end_of_the_sign_in_session_is_neither_stored_nor_lost() {
     let (_folder, mut service) = service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 3)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;

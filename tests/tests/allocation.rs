@@ -102,7 +102,7 @@ fn session_of((study, one, two): (StudyId, TrialId, TrialId)) -> (StudyId, NewSe
 }
 
 #[tokio::test]
-async fn orders_of_10_000_lab_sessions_of_many_subjects_are_balanced() {
+async fn allocations_of_10_000_lab_sessions_are_balanced() {
     let (_folder, service) = one_service().await;
     let (study, _) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -180,7 +180,7 @@ async fn sides_of_10_000_pairs_are_balanced_and_follow_from_no_earlier_pair() {
 }
 
 #[tokio::test]
-async fn the_same_seed_gives_different_orders() {
+async fn allocations_do_not_follow_from_the_seed() {
     let (_folder, service) = one_service().await;
     let mut first_sessions = Vec::new();
     for _ in 0..24 {
@@ -265,7 +265,7 @@ fn guesses(seen: &Seen, table: &str) -> Vec<(String, Vec<bool>)> {
 }
 
 #[tokio::test]
-async fn a_program_that_reads_everything_but_allocations_guesses_1_000_orders_no_better_than_chance() {
+async fn program_that_reads_all_but_allocations_guesses_1_000_allocations_at_chance() {
     let (_folder, service) = one_service().await;
     let (study, _) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -340,7 +340,7 @@ fn by_hash(sha256: &str, session: &str, created_at: &str) -> Option<bool> {
 }
 
 #[tokio::test]
-async fn an_order_follows_from_no_order_that_was_unblinded_before_it_was_drawn() {
+async fn unblinded_allocations_do_not_predict_later_ones() {
     let (_folder, service) = one_service().await;
     let (study, _) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -493,7 +493,7 @@ fn without_request(text: &str) -> String {
 }
 
 #[tokio::test]
-async fn exchanging_every_order_changes_no_byte_that_is_served_before_unblinding() {
+async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() {
     let (folder, service) = callers::service().await;
     let (study, trials) = finished(&service).await;
     let human = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
@@ -559,7 +559,7 @@ async fn exchanging_every_order_changes_no_byte_that_is_served_before_unblinding
 }
 
 #[tokio::test]
-async fn an_archive_leaves_out_orders_that_are_blind_and_a_session_without_one_cannot_be_unblinded() {
+async fn archive_omits_blinded_allocations_and_a_session_without_one_cannot_be_unblinded() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let (study, trials) = finished(&service).await;
@@ -680,7 +680,7 @@ async fn file_that_a_token_fetched_leaves_nobody_blind_and_the_devices_own_leave
 }
 
 #[tokio::test]
-async fn whoever_took_a_controller_file_of_a_study_rates_it_no_longer_blindly() {
+async fn person_who_fetched_a_controller_file_rates_that_study_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -768,7 +768,7 @@ async fn no_motion_of_a_rater_has_the_bytes_of_an_earlier_one() {
 }
 
 #[tokio::test]
-async fn nobody_who_is_not_signed_in_learns_what_is_solved() {
+async fn anonymous_callers_cannot_see_what_is_solved() {
     let (_folder, service) = callers::service().await;
     let health = get(&service, &As::Nobody, "/health").await.json();
     let fields: Vec<_> = health.as_object().unwrap().keys().collect();

@@ -41,7 +41,7 @@ async fn shown(service: &Service, study: StudyId) -> Vec<Presentation> {
 }
 
 #[tokio::test]
-async fn nothing_that_a_rater_gets_says_which_gait_it_is() {
+async fn responses_to_raters_reveal_no_gait() {
     let (_folder, service, study) = waiting(4).await;
     let pair = next(&service, study).await;
     let token = pair["token"].as_str().unwrap();
@@ -122,7 +122,7 @@ async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &s
 }
 
 #[tokio::test]
-async fn every_answer_of_a_rater_is_heard_also_of_a_pair_that_is_asked_again() {
+async fn every_answer_of_a_rater_reaches_the_learner_repeats_included() {
     let (_folder, service) = callers::service().await;
     let (rater, admin) = (rater_of(&service, &[]).await, signed_in(&service, Role::Admin).await);
     // One pair in ten is a repeat, by chance: one study in sixty has none.
@@ -165,7 +165,7 @@ async fn every_answer_of_a_rater_is_heard_also_of_a_pair_that_is_asked_again() {
 }
 
 #[tokio::test]
-async fn an_answer_is_heard_of_the_gait_that_was_shown_on_that_side() {
+async fn rater_answer_counts_for_the_gait_shown_on_that_side() {
     let (_folder, service) = callers::service().await;
     let rater = signed_in(&service, Role::Rater).await;
     let mut swapped = std::collections::BTreeSet::new();

@@ -94,7 +94,7 @@ fn addresses() -> Vec<(Method, String)> {
 }
 
 #[tokio::test]
-async fn whatever_a_rater_asks_for_says_nothing_of_what_is_rated() {
+async fn no_address_reveals_rated_gaits_to_a_rater() {
     let (_folder, service) = service().await;
     let automatic = service.study(|new| (new.name, new.trial_budget) = (Some("stiff ankle".to_owned()), 12)).await;
     service.wait_for(automatic, &[StudyState::Finished]).await;

@@ -79,7 +79,7 @@ fn a_gait_is_solved_certified_and_converted() {
 }
 
 #[test]
-fn what_is_no_gait_or_recording_is_refused() {
+fn files_that_are_no_gaits_or_recordings_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     refused(folder, &["certify", "nowhere.json"], "Cannot read nowhere.json");
@@ -152,7 +152,7 @@ async fn a_trial_gets_its_certificate_once() {
 }
 
 #[tokio::test]
-async fn what_a_trial_solved_is_solved_again_at_the_command_line_bit_for_bit() {
+async fn command_line_repeats_the_solve_of_a_trial_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
     let study = service

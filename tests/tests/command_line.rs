@@ -145,7 +145,7 @@ fn refused_beside(files: &[&str], arguments: &[&str], expected: &str) {
 }
 
 #[test]
-fn what_is_no_database_is_refused_by_name_and_left_alone() {
+fn file_that_is_no_database_is_refused_by_name_and_unchanged() {
     for command in [&["tune"][..], &["serve", "--listen", "127.0.0.1:0"], &["audit", "verify"], &["backup", "copy.db"]]
     {
         let with = |file| [command, &["--database", file]].concat();

@@ -99,7 +99,7 @@ fn columns_and_filters_can_be_named_and_an_opensim_file_gives_the_same() {
 }
 
 #[test]
-fn what_cannot_be_processed_is_refused_and_nothing_is_written() {
+fn unprocessable_file_is_refused_and_writes_nothing() {
     let folder = recordings();
     let whole = electromyogram(1.0);
     std::fs::write(folder.path().join("half.csv"), &whole[..whole.find("\n1.5,").unwrap() + 9]).unwrap();

@@ -68,7 +68,7 @@ fn right_guesses(figures: &[Duration], truth: &[bool]) -> usize {
 }
 
 #[tokio::test]
-async fn event_streams_tell_no_order_by_what_comes_or_when() {
+async fn event_streams_reveal_no_allocation_by_content_or_timing() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;

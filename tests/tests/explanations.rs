@@ -61,7 +61,7 @@ async fn explained_in_order(service: &Service) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn when_a_study_has_ended_every_trial_without_a_gait_is_explained_in_order() {
+async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let explainer = Clearance::slow(Duration::from_millis(100));
     let service = Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), explainer).await;
@@ -135,7 +135,7 @@ async fn an_explanation_is_made_once_for_whoever_asks() {
 }
 
 #[tokio::test]
-async fn what_has_no_solve_without_a_gait_is_not_explained() {
+async fn study_without_failed_solves_is_not_explained() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_explaining(&database, Analytic::default(), Clearance::default()).await;
@@ -162,7 +162,7 @@ async fn what_has_no_solve_without_a_gait_is_not_explained() {
 }
 
 #[tokio::test]
-async fn what_was_asked_for_is_taken_up_by_the_next_process() {
+async fn requested_explanation_is_made_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let explainer = Clearance::slow(FOR_EVER);
@@ -192,7 +192,7 @@ async fn what_was_asked_for_is_taken_up_by_the_next_process() {
 }
 
 #[tokio::test]
-async fn who_withdraws_is_not_explained_any_more() {
+async fn withdrawal_stops_explanations() {
     let folder = tempfile::tempdir().unwrap();
     let explainer = Clearance::slow(FOR_EVER);
     let counts = explainer.counts.clone();
@@ -212,7 +212,7 @@ async fn who_withdraws_is_not_explained_any_more() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_explained_is_said_and_not_tried_again() {
+async fn refused_explanation_states_its_reason_and_is_not_retried() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let explainer = Clearance { panics: true, ..Clearance::default() };

@@ -194,7 +194,7 @@ async fn an_answer_is_taken_back_in_its_own_study_only() {
 }
 
 #[tokio::test]
-async fn a_form_that_is_sent_again_with_another_answer_says_which_one_counts() {
+async fn form_sent_twice_with_another_answer_shows_the_recorded_one() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let path = format!("/studies/{study}/compare");
@@ -252,7 +252,7 @@ async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retrac
 }
 
 #[tokio::test]
-async fn who_answers_what_another_has_answered_is_told_so() {
+async fn answers_of_others_are_shown_with_the_own_one() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let give = format!("/api/v1/studies/{study}/preferences");
@@ -403,7 +403,7 @@ async fn the_list_of_studies_goes_on_beyond_its_first_page() {
 }
 
 #[tokio::test]
-async fn a_refused_new_study_says_which_field_in_its_own_words_and_opens_it() {
+async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
     let form = |changed: &str| {
@@ -435,7 +435,7 @@ async fn a_refused_new_study_says_which_field_in_its_own_words_and_opens_it() {
 }
 
 #[tokio::test]
-async fn what_a_script_told_without_a_gait_offers_no_gait() {
+async fn script_trial_without_a_gait_offers_no_gait() {
     let (_folder, service) = service().await;
     let study = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 1)).await;
     let trial = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();

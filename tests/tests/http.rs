@@ -474,7 +474,7 @@ async fn events_are_replayed_after_the_last_one_that_was_seen() {
 }
 
 #[tokio::test]
-async fn whoever_listens_to_a_study_that_has_ended_is_told_so_and_hears_when_it_goes_on() {
+async fn event_stream_of_an_ended_study_says_so_and_resumes_with_it() {
     let (_folder, service) = service().await;
     let study = finished(&service, 2).await;
     let path = format!("/api/v1/studies/{study}");

@@ -53,7 +53,7 @@ fn id(session: &Value) -> &str {
 }
 
 #[tokio::test]
-async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
+async fn lab_session_is_walked_in_order_closed_and_unblinded() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
@@ -108,7 +108,7 @@ fn without_times(page: &str) -> String {
 }
 
 #[tokio::test]
-async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
+async fn lab_session_reveals_no_gait_before_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let mut bytes = String::new();
@@ -222,7 +222,7 @@ async fn heard(service: &Service, study: StudyId) -> Vec<FeedbackRow> {
 }
 
 #[tokio::test]
-async fn what_the_person_who_walked_says_is_heard_when_the_order_is_told() {
+async fn subject_preference_reaches_the_learner_after_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let (lab, session) = walked(&service, study, &trials).await;
     assert_eq!(service.fetch(&format!("{lab}/next-walk")).await.json()["asks"], 1);
@@ -261,7 +261,7 @@ async fn what_the_person_who_walked_says_is_heard_when_the_order_is_told() {
 }
 
 #[tokio::test]
-async fn a_walk_that_was_unsafe_closes_both_gaits_until_the_order_says_which() {
+async fn unsafe_walk_closes_both_gaits_until_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let (lab, session) = walked(&service, study, &trials).await;
     let said = json!({"number": 1, "answer": "unsafe_second", "note": "stumbled"});
@@ -476,7 +476,7 @@ async fn a_recording_is_given_out_as_it_was_brought() {
 }
 
 #[tokio::test]
-async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
+async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));

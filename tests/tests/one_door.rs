@@ -472,7 +472,7 @@ impl Rated {
 }
 
 #[tokio::test]
-async fn a_walkers_answer_about_a_gait_reported_unsafe_meanwhile_is_kept_and_not_heard() {
+async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned() {
     let scene = Scene::new().await;
     let session = scene.session(3).await;
     scene.violate(Rule::Safety).await;

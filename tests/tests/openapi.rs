@@ -34,7 +34,7 @@ fn the_committed_description_is_that_of_the_code() {
 }
 
 #[test]
-fn every_operation_says_what_it_needs_takes_and_answers() {
+fn every_operation_describes_rights_parameters_and_responses() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     assert!(document["openapi"].as_str().unwrap().starts_with("3.1"));
     let mut operations = 0;
@@ -305,7 +305,7 @@ impl Description {
 }
 
 #[tokio::test]
-async fn what_is_answered_has_the_properties_that_the_description_names() {
+async fn responses_have_the_described_properties() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;

@@ -49,7 +49,7 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_thinks_long_gets_the_same_trials_and_does_not_wait_for_them() {
+async fn prefetching_changes_no_trial_and_removes_the_wait() {
     let (at_once, _) = Box::pin(tuned(Duration::ZERO)).await;
     let (thoughtful, workers) = Box::pin(tuned(Duration::from_millis(1500))).await;
     assert_eq!(at_once.len(), 7);
@@ -60,7 +60,7 @@ async fn who_thinks_long_gets_the_same_trials_and_does_not_wait_for_them() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_nobody_asked_for_yet_gives_way_within_one_iteration() {
+async fn prefetched_solve_gives_way_within_one_iteration() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(Duration::from_millis(40));
     let made = Arc::clone(&solver.made);

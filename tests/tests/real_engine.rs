@@ -337,7 +337,7 @@ async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone
 
 /// A trial that the program failed at is no success of the command; what it found is printed all the same.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_failed_trial_is_told_by_the_exit_code() {
+async fn failed_trial_sets_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("gaitwright.db");
     let solver = Analytic { panics: vec![1], ..Analytic::slow(Duration::from_millis(300)) };

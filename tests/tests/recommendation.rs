@@ -69,7 +69,7 @@ async fn a_study_without_a_gait_has_no_best_trial() {
 }
 
 #[tokio::test]
-async fn nothing_is_recommended_silently_whose_certificate_failed() {
+async fn failed_certificate_is_stated_in_the_recommendation() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 6).await;
@@ -111,7 +111,7 @@ async fn nothing_is_recommended_silently_whose_certificate_failed() {
 }
 
 #[tokio::test]
-async fn a_gait_that_passed_is_said_to_have_passed() {
+async fn passed_certificate_is_reported_as_passed() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 3).await;
@@ -157,7 +157,7 @@ async fn certified_by_service(service: &Service) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn when_a_study_has_ended_its_ten_best_gaits_are_certified_in_order() {
+async fn ended_study_certifies_its_ten_best_gaits_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_certifying(&folder.path().join("a.db"), Analytic::default(), only(None)).await;
     let study = service.study(|new| new.trial_budget = 20).await;
@@ -176,7 +176,7 @@ async fn when_a_study_has_ended_its_ten_best_gaits_are_certified_in_order() {
 }
 
 #[tokio::test]
-async fn what_ended_before_the_process_began_is_certified_until_one_passes_and_that_one_is_kept() {
+async fn studies_that_ended_before_the_start_are_certified_until_one_gait_passes() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_without_certificates(&database, Analytic::default()).await;

@@ -64,7 +64,7 @@ async fn a_recording_becomes_the_reference_of_a_study() {
 }
 
 #[tokio::test]
-async fn what_is_not_whole_imports_nothing_and_says_where() {
+async fn incomplete_archive_imports_nothing_and_names_the_place() {
     let (_folder, service) = service().await;
     let before = service.fetch("/api/v1/reference-gaits").await.items();
     let text = recording();

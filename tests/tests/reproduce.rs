@@ -29,7 +29,7 @@ fn nonsense_is_refused_before_anything_is_solved() {
 }
 
 #[tokio::test]
-async fn trials_that_failed_are_told_and_end_with_a_code_of_their_own() {
+async fn failed_trials_are_reported_with_their_own_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     std::fs::create_dir(&out).unwrap();

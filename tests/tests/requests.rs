@@ -62,7 +62,7 @@ async fn a_change_is_made_from_one_of_the_revisions_that_it_names_or_not_at_all(
 }
 
 #[tokio::test]
-async fn who_saw_events_of_a_record_that_is_no_more_hears_of_the_next_one() {
+async fn event_listener_with_an_unknown_last_id_receives_new_events() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;

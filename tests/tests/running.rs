@@ -126,7 +126,7 @@ impl Drop for SmallDisk {
 }
 
 #[tokio::test]
-async fn disk_that_is_really_full_loses_nothing_acknowledged_and_says_so() {
+async fn full_file_system_loses_nothing_acknowledged_and_is_reported() {
     let Some(disk) = SmallDisk::mount() else {
         println!("skipped: a small disk cannot be mounted here");
         return;

@@ -40,7 +40,7 @@ async fn waits_at_home(service: &Service) -> bool {
 }
 
 #[tokio::test]
-async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record() {
+async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
     let (_folder, service, study) = started(FeedbackMode::Human, 4).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
@@ -143,7 +143,7 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
 }
 
 #[tokio::test]
-async fn what_was_lifted_in_the_lab_is_said_anew_when_the_order_is_told() {
+async fn lifted_safety_report_of_a_walk_opens_anew_at_unblinding() {
     let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
     let gaits = converged(&service, study).await;
     let sessions = format!("/api/v1/studies/{study}/lab-sessions");

@@ -99,7 +99,7 @@ fn one_time_links_do_not_appear_in_trace_logs() {
 }
 
 #[test]
-fn who_connects_and_says_nothing_whole_is_cut_off() {
+fn connections_without_a_complete_request_are_closed() {
     let folder = tempfile::tempdir().unwrap();
     let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
     let silent = |said: &'static str| {
@@ -128,7 +128,7 @@ fn logs_are_json_where_that_is_set() {
 
 #[cfg(unix)]
 #[test]
-fn a_term_signal_ends_it_in_order() {
+fn term_signal_shuts_the_service_down_cleanly() {
     let folder = tempfile::tempdir().unwrap();
     let mut process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
     assert_eq!(get(process.address(), "/api/v1/studies").unwrap().status, 200);
@@ -140,7 +140,7 @@ fn a_term_signal_ends_it_in_order() {
 }
 
 #[test]
-fn it_speaks_https_with_a_certificate_from_files() {
+fn https_is_served_with_a_certificate_from_files() {
     let folder = tempfile::tempdir().unwrap();
     let made = Command::new("openssl")
         .args(["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2"])

@@ -66,7 +66,7 @@ async fn the_learner_hears_a_suggestion_until_it_is_taken_back() {
 }
 
 #[tokio::test]
-async fn what_waits_and_who_solves_is_listed() {
+async fn queued_jobs_and_workers_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(Duration::from_millis(50));
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;

@@ -51,7 +51,7 @@ async fn undisturbed(seed: u64, trials: u32) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
+async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let learner =
@@ -137,7 +137,7 @@ async fn a_study_stopped_in_the_middle_of_solves_goes_on_to_the_same_trials() {
 }
 
 #[tokio::test]
-async fn a_panic_is_tried_again_and_then_failed_and_never_heard_by_the_learner() {
+async fn panicking_solve_is_retried_then_fails_and_never_reaches_the_learner() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic { panics: vec![2], panics_once: vec![1], ..Analytic::default() };
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
@@ -230,7 +230,7 @@ async fn higher_priorities_go_first_and_equal_ones_share() {
 }
 
 #[tokio::test]
-async fn what_no_worker_began_is_taken_back_while_a_study_is_paused() {
+async fn pausing_withdraws_jobs_that_no_worker_began() {
     let folder = tempfile::tempdir().unwrap();
     let engine = Away { size: 2, ..Away::default() };
     let service = Service::start_with(&folder.path().join("a.db"), Arc::new(engine.clone())).await;
@@ -268,7 +268,7 @@ async fn a_cancelled_solve_stops_within_one_iteration() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_trial_whose_workers_are_never_heard_of_again_is_lost_and_can_be_tried_once_more() {
+async fn trial_whose_workers_vanish_is_lost_and_can_be_retried() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic { hangs: 3, ..Analytic::default() };
     let engine = InProcess::new(1, Arc::new(solver)).with_lease(Duration::from_millis(600));
@@ -290,7 +290,7 @@ async fn a_trial_whose_workers_are_never_heard_of_again_is_lost_and_can_be_tried
 }
 
 #[tokio::test]
-async fn nobody_is_asked_to_compare_a_gait_with_itself() {
+async fn equal_gaits_are_never_offered_for_comparison() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service

@@ -100,7 +100,7 @@ async fn every_row_of_each_kept_record_survives_the_upgrade() {
 }
 
 #[tokio::test]
-async fn orders_that_the_baseline_drew_are_those_of_the_upgraded_record() {
+async fn upgrade_keeps_the_allocations_of_the_baseline() {
     let (_folder, database) = unpacked(V1);
     Store::open(&database).await.unwrap().close().await;
     let pool = open(&database).await;

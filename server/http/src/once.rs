@@ -46,7 +46,7 @@ impl<P: Permission> Once<P> {
         match idempotency::find(&mut writer, &self.actor, key).await? {
             None => Ok(Ok(writer)),
             Some(kept) if kept.request == self.request => {
-                // What may no longer be shown is not shown once more either.
+                // A stored response can hold figures of a subject who has withdrawn consent since.
                 if let Some(study) = self.study {
                     consents::may_be_shown(&mut writer, study).await?;
                 }
@@ -77,7 +77,7 @@ impl<P: Permission> Once<P> {
         Ok(app.write().await?)
     }
 
-    /// Answers 201 with something that was made and its address.
+    /// Responds 201 with a new object and its address.
     pub(crate) async fn created<T: Serialize>(
         &self,
         app: &AppState,
@@ -88,7 +88,7 @@ impl<P: Permission> Once<P> {
         self.finish(app, writer, StatusCode::CREATED, Some(location), body).await
     }
 
-    /// Answers 200: something that was there already is changed.
+    /// Responds 200 with a changed object.
     pub(crate) async fn done<T: Serialize>(
         &self,
         app: &AppState,
@@ -98,7 +98,7 @@ impl<P: Permission> Once<P> {
         self.finish(app, writer, StatusCode::OK, None, body).await
     }
 
-    /// Answers 202 with the job that does the work and its address.
+    /// Responds 202 with a job and its address.
     pub(crate) async fn accepted<T: Serialize>(
         &self,
         app: &AppState,
@@ -109,7 +109,7 @@ impl<P: Permission> Once<P> {
         self.finish(app, writer, StatusCode::ACCEPTED, Some(location), body).await
     }
 
-    /// Keeps the answer, makes the effect durable and tells the scheduler.
+    /// Stores the response, commits the change and notifies the scheduler.
     async fn finish<T: Serialize>(
         &self,
         app: &AppState,

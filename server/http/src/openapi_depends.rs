@@ -1,15 +1,15 @@
-//! Rules that a schema cannot state: what a field has to do with the record, with other fields, or with a file. They stand
-//! in `x-depends` of the field, and a value is refused for them alone if it fits its schema.
+//! Rules that a schema cannot state, because they relate a field to the record, to other fields or to a file. The
+//! description has them in `x-depends` of the field.
 
 use serde_json::{Map, Value, json};
 
-const GAIT: &str = "A trial of this study with a gait that people may walk with: converged, certified, without an open safety report. \
-                    The two trials of a comparison have different gaits.";
-const GAIT_OF_STUDY: &str = "A converged trial of this study. For `cannot_tell`, people may walk with its gait. The two trials have \
-                             different gaits.";
+const GAIT: &str = "A trial of this study with a walkable gait: converged, certified, without an open safety report. The two trials of \
+                    a comparison have different gaits.";
+const GAIT_OF_STUDY: &str =
+    "A converged trial of this study. For `cannot_tell`, its gait is walkable. The two trials have different gaits.";
 const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more. The values of a dimension increase, each within the range of its bound; \
                       its lengthscale lies between a hundredth of their smallest step and 10,000 times their range.";
-const EXISTS: &str = "It exists.";
+const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
 const EMG_FILE: &str = "A file of the given form with the columns of the muscles, sampled at 100 Hz or more, with one whole stride or more. \
                         Columns and heel strikes that are named are in it.";
@@ -64,7 +64,7 @@ const RULES: [(&str, &str, &str); 26] = [
     ("Processing", "settings", "`band_low_hz` is smaller than `band_high_hz`; all are below half the sampling rate."),
 ];
 
-/// Says the rules of the fields.
+/// Adds the rules to the fields.
 pub(super) fn state(schemas: &mut Map<String, Value>) {
     for (component, field, rule) in RULES {
         let property = schemas.get_mut(component).and_then(|schema| schema.get_mut("properties")?.get_mut(field));

@@ -108,7 +108,7 @@ impl IntoResponse for Problem {
     }
 }
 
-/// An error of the service as the answer to a request.
+/// An error of the service as a response.
 #[derive(Debug)]
 pub(super) struct Refusal(pub(super) Error);
 

@@ -72,7 +72,7 @@ async fn browser_gait_is_shown_whole_and_colours_muscles() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_says_why_there_is_no_gait() {
+async fn browser_explains_a_trial_without_a_gait() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.trial_budget = 40).await;

@@ -280,7 +280,7 @@ async fn browser_opens_ten_thousand_trials_within_a_second() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_says_the_values_of_a_point_beside_the_pointer() {
+async fn browser_shows_the_values_of_a_point_at_the_pointer() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.trial_budget = 6).await;
@@ -302,7 +302,7 @@ async fn browser_says_the_values_of_a_point_beside_the_pointer() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_says_that_the_service_is_gone_and_that_it_is_back() {
+async fn browser_reports_lost_and_restored_connection() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
     let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;

@@ -101,11 +101,14 @@ impl Certifier {
     /// and `through` when a study has no gait left to certify.
     pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn(), through: impl Fn(StudyId)) {
         // Start with the gaits that were requested, and the studies that ended, before this process started.
-        if let Err(error) = self.hear_of_requested().await {
-            tracing::error!(%error, "cannot read which certificates were requested");
-        }
-        let mut heard = 0;
+        let (mut requested, mut heard) = (false, 0);
         loop {
+            if !requested {
+                match self.hear_of_requested().await {
+                    Ok(()) => requested = true,
+                    Err(error) => tracing::error!(%error, "cannot read which certificates were requested"),
+                }
+            }
             if let Err(error) = self.hear_of_ended(&mut heard).await {
                 tracing::error!(%error, "cannot read which studies have ended");
             }

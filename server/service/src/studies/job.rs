@@ -1,4 +1,4 @@
-//! What jobs are called and where they can stand.
+//! Identifiers, kinds and states of jobs.
 
 use gaitwright_store::TrialId;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use std::fmt;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// What a job makes.
+/// Kind of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobKind {
@@ -21,7 +21,7 @@ pub enum JobKind {
 impl JobKind {
     const ALL: [Self; 3] = [Self::Certificate, Self::Explanation, Self::Solve];
 
-    /// As shown.
+    /// Name in identifiers and addresses.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Certificate => "certificate",
@@ -31,13 +31,13 @@ impl JobKind {
     }
 }
 
-/// The identifier of a job: what it makes, and of which trial.
+/// Identifier of a job, such as `solve-` and the identifier of its trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct JobId {
-    /// What it makes.
+    /// Kind of the job.
     pub kind: JobKind,
-    /// Of which trial.
+    /// Trial of the job.
     pub trial: TrialId,
 }
 
@@ -71,18 +71,18 @@ impl From<JobId> for String {
     }
 }
 
-/// Where a job stands.
+/// State of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
-    /// Others come first.
+    /// Waits for other jobs.
     Queued,
-    /// It is under way.
+    /// In progress.
     Running,
-    /// Its result is there.
+    /// Ended with a result.
     Done,
-    /// It gives no result.
+    /// Ended without a result.
     Failed,
-    /// Somebody cancelled it.
+    /// Cancelled by a user or a program.
     Cancelled,
 }

@@ -1,6 +1,6 @@
-//! Jobs: what the service makes of a trial in the background, to be followed and cancelled.
+//! Status and cancellation of jobs: solves, certificates and explanations of trials.
 //!
-//! A job has no row of its own: the record and the running process know where it stands.
+//! A job has no row of its own. Its state follows from the record and the running process.
 
 use super::command;
 use super::explanation::{self, Effort, ExplanationState};
@@ -14,25 +14,25 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, StudyId, TrialId, Writer, certificates, explanations, members, trials};
 use serde_json::json;
 
-/// Where a job stands.
+/// Status of a job.
 #[derive(Debug, Clone)]
 pub struct JobStatus {
-    /// Its identifier.
+    /// Identifier.
     pub id: JobId,
     /// The study of its trial.
     pub study: StudyId,
-    /// Where it stands.
+    /// State.
     pub state: JobState,
-    /// Why it failed.
+    /// Reason if it failed.
     pub reason: Option<String>,
     /// Attempts and worker of a solve that has not ended.
     pub solve: Option<OpenSolve>,
 }
 
-/// A job, also one that has ended.
+/// The status of a job, which may have ended.
 ///
 /// # Errors
-/// [`Error::NotFound`] when nobody asked for it, or what the database reports.
+/// [`Error::NotFound`] if it was never requested; errors of the database.
 pub async fn find(db: &mut Connection, scheduler: &Scheduler, id: JobId) -> Result<JobStatus, Error> {
     let trial = trials::get(db, id.trial).await?;
     let found = match id.kind {
@@ -45,7 +45,7 @@ pub async fn find(db: &mut Connection, scheduler: &Scheduler, id: JobId) -> Resu
     Ok(JobStatus { id, study: trial.study_id, state, reason, solve })
 }
 
-/// What there is of a job: its state, and why it failed.
+/// State of a job, and the reason if it failed.
 type Found = Option<(JobState, Option<String>)>;
 
 fn solve(trial: &Trial) -> Found {
