@@ -156,7 +156,7 @@ pub(super) async fn of_reference(
 
 /// Responds with a figure in the format of the file name.
 async fn answer(app: &mut AppState, figures: Vec<Figure>, file: String) -> Result<Response, Refusal> {
-    let missing = || Error::NotFound { what: "the figure".to_owned(), id: file.clone() };
+    let missing = || Error::NotFound { what: "figure".to_owned(), id: file.clone() };
     let (name, form) = file.rsplit_once('.').ok_or_else(missing)?;
     let figure = figures.into_iter().find(|figure| figure.name == name).ok_or_else(missing)?;
     let (kind, form) = match form {
