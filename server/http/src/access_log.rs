@@ -183,7 +183,7 @@ async fn write_what_waits(app: AppState, task: Task) -> Result<(), Error> {
             // The record takes no changes, as `/ready` says: nothing is lost, and the log says so once.
             Err(error) if error.is_of_machine() => {
                 if !std::mem::replace(&mut failing, true) {
-                    tracing::error!(%error, "the access log cannot be written; its rows wait");
+                    tracing::error!(%error, "cannot write the access log; keeping its rows");
                 }
             }
             Err(error) => return Err(error),

@@ -18,8 +18,8 @@ use utoipa_axum::router::OpenApiRouter;
     info(
         title = "Gaitwright",
         description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
-                       not a medical device.\n\nLengths are metres, masses kilograms, angles radians unless a name says \
-                       otherwise, times RFC 3339 in UTC. Whole numbers have no fraction.\n\nA list is answered by pages: `items`, and in `next` the \
+                       not a medical device.\n\nLengths are in metres, masses in kilograms and angles in radians, unless \
+                       a name says otherwise. Times are RFC 3339 in UTC. Whole numbers have no fraction.\n\nA list is answered by pages: `items`, and in `next` the \
                        `cursor` of the next page.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
@@ -100,7 +100,7 @@ fn name_pages(value: Value) -> Value {
     }
 }
 
-/// Adds what every operation may answer and take.
+/// Adds the common responses and parameters of an operation.
 fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
     let shown_once = operation.get(SHOWN_ONCE).is_some();
     let is_page = operation
@@ -124,12 +124,12 @@ fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
         parameters.push(json!({
             "name": "Idempotency-Key", "in": "header", "required": false,
             "schema": { "type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[!-~]([ -~]*[!-~])?$" },
-            "description": "Sent twice with the same key, a request has one effect and the same answer"
+            "description": "A request that is repeated with the same key has one effect and the same response"
         }));
     }
     let body = operation.pointer("/requestBody/content/application~1json/schema");
     let (has_body, has_rules) = (body.is_some(), body.is_some_and(|schema| openapi_rules::has_rules(schema, schemas)));
-    let mut problems = vec![("500", "The program failed; nothing was changed"), ("503", "Too slow or shutting down")];
+    let mut problems = vec![("500", "Internal error"), ("503", "Timed out or not ready")];
     if !parameters.is_empty() || changes {
         problems.push(("400", "The request cannot be read"));
     }
@@ -143,18 +143,18 @@ fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
         problems.push(("404", "Not found"));
     }
     if changes {
-        problems.push(("409", "Not possible in the present state"));
+        problems.push(("409", "Conflict with the current state"));
         problems.push(("507", "The disk is full"));
     }
     if if_match {
-        problems.push(("412", "It was changed since it was read"));
+        problems.push(("412", "Changed by someone else"));
     }
     if has_body {
         problems.push(("413", "The body is too large"));
         problems.push(("415", "Unsupported media type"));
     }
     if is_page || has_rules {
-        problems.push(("422", "A field is not acceptable"));
+        problems.push(("422", "Invalid field"));
     }
     if !parameters.is_empty() {
         operation["parameters"] = Value::Array(parameters);

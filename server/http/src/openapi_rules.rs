@@ -40,7 +40,7 @@ const NAMES: [(&str, &str, u32); 11] = [
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
 
-/// Adds the rules to a description.
+/// Adds the rules to the description.
 pub(super) fn state(document: &mut Value) {
     let optional = format!("^[^{UNPRINTABLE}]*$");
     let needed = format!(r"^[^{UNPRINTABLE}]*[^\s{UNPRINTABLE}][^{UNPRINTABLE}]*$");

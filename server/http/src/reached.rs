@@ -100,7 +100,7 @@ async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OfStudy(pub(super) Option<StudyId>);
 
-/// The identifier in the path, `{id}`, of something with which the caller may do `P`.
+/// The identifier `{id}` in the path, of an object for which the caller has the right `P`.
 #[derive(Debug)]
 pub(crate) struct Id<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 

@@ -58,8 +58,8 @@ pub(super) struct Solve {
     /// Number of initial guesses to try in any case; --out keeps a gait of every basin that they reach.
     #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
     initial_guesses: Option<usize>,
-    /// Take the gait nearest to the reference among those whose objective is within so many per cent of the lowest; default:
-    /// the lowest.
+    /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest [default:
+    /// the lowest objective].
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     nearest_within: Option<f64>,
     /// Output file (JSON) for figures, gait, multipliers, gaits of other basins and lineage.

@@ -14,7 +14,7 @@ pub struct Device {
     pub id: DeviceId,
     /// Name shown to people.
     pub name: String,
-    /// The device itself.
+    /// Definition of the device.
     #[schema(value_type = schema::DeviceDefinition)]
     pub definition: Definition,
     /// Time of creation.

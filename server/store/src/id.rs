@@ -81,6 +81,6 @@ identifier!(PresentationId, "presentation");
 identifier!(AssessmentId, "assessment");
 identifier!(SafetyReviewId, "safety review");
 identifier!(LabSessionId, "lab session");
-identifier!(MeasurementFileId, "recording of a lab session");
+identifier!(MeasurementFileId, "measurement file of a lab session");
 identifier!(LabDeviceFileId, "controller file of a lab session");
 identifier!(EmgResultId, "result of EMG processing");

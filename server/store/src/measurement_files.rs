@@ -16,14 +16,14 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeasurementKind {
-    /// Muscle activity.
+    /// EMG recording.
     Electromyogram,
     /// Joint angles.
     Motion,
 }
 
 impl MeasurementKind {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Electromyogram => "electromyogram",
@@ -71,10 +71,10 @@ pub struct PackedFile {
 }
 
 impl PackedFile {
-    /// Compresses a file; `reading` says how it is to be read.
+    /// Compresses a file; `reading` describes how to read it.
     ///
     /// # Errors
-    /// When serialising fails.
+    /// If serialisation fails.
     pub fn new<T: Serialize>(pool: &OnPool, kind: MeasurementKind, reading: &T, file: &str) -> StoreResult<Self> {
         Ok(Self {
             kind,
@@ -84,7 +84,7 @@ impl PackedFile {
         })
     }
 
-    /// Whether it is the file of a recording of the same kind.
+    /// Whether it is identical to a stored file of the same kind.
     pub fn is_file_of(&self, recording: &MeasurementFile) -> bool {
         (self.kind, &self.raw_sha256) == (recording.kind, &recording.raw_sha256)
     }
@@ -151,7 +151,7 @@ pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResu
 }
 
 fn missing(id: MeasurementFileId) -> StoreError {
-    StoreError::Missing { what: "recording", id: id.to_string() }
+    StoreError::Missing { what: "measurement file", id: id.to_string() }
 }
 
 /// The content of a file, and how to read it.

@@ -111,7 +111,7 @@ impl Judgement {
         matches!(self, Self::UnsafeFirst | Self::UnsafeSecond | Self::UnsafeBoth)
     }
 
-    /// Whether a person says so, and not which gait is better.
+    /// Whether it is an assessment: a judgement by a person that states no preference.
     pub fn is_assessment(self) -> bool {
         self == Self::CannotTell || self.is_about_safety()
     }

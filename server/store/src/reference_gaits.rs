@@ -14,7 +14,7 @@ pub struct ReferenceGait {
     pub id: ReferenceGaitId,
     /// Name shown to people.
     pub name: String,
-    /// The reference gait itself.
+    /// Definition of the reference gait.
     #[schema(value_type = schema::ReferenceGaitDocument)]
     pub definition: Definition,
     /// Time of creation.

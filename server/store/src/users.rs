@@ -109,7 +109,7 @@ pub async fn former_roles(db: &mut Connection, id: UserId) -> StoreResult<Vec<Ro
     words.iter().map(|word| word.parse()).collect()
 }
 
-/// Shuts a user out, or lets the user in again.
+/// Disables or enables a user.
 ///
 /// # Errors
 /// Errors of the database.

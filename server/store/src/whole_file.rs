@@ -83,12 +83,12 @@ pub(crate) fn private() -> OpenOptions {
     options
 }
 
-/// Makes the names in the folder of a file durable.
+/// Syncs the folder of a file, so that its name is durable.
 ///
 /// # Errors
 /// What the file system reports.
 pub fn sync_folder(of: &Path) -> io::Result<()> {
-    // Elsewhere a folder cannot be opened, and names are durable with their files.
+    // On other systems folders cannot be opened, and names are durable with their files.
     if cfg!(unix) { File::open(folder_of(of))?.sync_all() } else { Ok(()) }
 }
 

@@ -104,7 +104,7 @@ pub async fn retract(
     }
     consents::may_be_shown(writer, assessment.study_id).await?;
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", reason, ": why it is taken back")?;
+    let reason = printable::reason("reason", reason, " that say why the assessment is retracted")?;
     if !assessments::retract(writer, id, author, reason).await? {
         return Err(Error::conflict("this assessment was taken back already"));
     }

@@ -57,7 +57,7 @@ pub async fn ask(writer: &mut Writer, actor: &Actor, trial: TrialId) -> Result<O
     }
 }
 
-/// The certificate; a new one takes some seconds of processor time, outside any transaction.
+/// The certificate. A new one takes seconds of CPU time, outside any transaction.
 ///
 /// # Errors
 /// When the gait is malformed.

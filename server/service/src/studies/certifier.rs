@@ -40,7 +40,7 @@ struct State {
     asked: BTreeSet<TrialId>,
     /// What of these is being certified, and what gives it up.
     running: Option<(TrialId, CancellationToken)>,
-    /// Studies with gaits to look at.
+    /// Studies that may have gaits to certify.
     waiting: BTreeSet<StudyId>,
     /// Gaits whose certificates could not be stored.
     refused: BTreeSet<TrialId>,
@@ -91,7 +91,7 @@ impl Certifier {
         }
     }
 
-    /// Whether a gait of a study is being certified, or waits for that.
+    /// Whether a gait of a study is being certified or is queued.
     pub(super) fn is_at(&self, study: StudyId, gait: TrialId) -> bool {
         let state = self.state();
         state.waiting.contains(&study) && !state.refused.contains(&gait)

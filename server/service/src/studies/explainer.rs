@@ -33,7 +33,7 @@ struct State {
     running: Option<(TrialId, CancellationToken)>,
     /// What somebody cancelled, until somebody asks for it again.
     cancelled: BTreeSet<TrialId>,
-    /// What cannot be explained, and why.
+    /// Trials that cannot be explained, with the reason.
     refused: BTreeMap<TrialId, String>,
 }
 
@@ -87,7 +87,7 @@ impl Explainer {
         }
     }
 
-    /// Works for ever. `pulse` changes whenever something was recorded; `changed` tells that something was.
+    /// Runs forever. `pulse` changes with every change of the record. Calls `changed` after it stored an explanation.
     pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn()) {
         loop {
             pulse.mark_unchanged();

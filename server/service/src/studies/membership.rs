@@ -21,7 +21,7 @@ pub struct NewMember {
     pub name: String,
 }
 
-/// Who reaches a study.
+/// Who can access a study.
 #[derive(Debug, Clone)]
 pub struct StudyAccess {
     /// Whether only members and administrators reach it.

@@ -101,7 +101,7 @@ async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId
 pub enum StandingAnswer {
     /// A preference or a tie.
     Preference(FeedbackId),
-    /// That the person cannot tell.
+    /// The assessment that the person cannot tell.
     Note(gaitwright_store::AssessmentId),
 }
 

@@ -73,7 +73,7 @@ pub async fn ended(
         commit(writer).await?;
         return Ok(true);
     }
-    // Its worker is free again; the trial is solved anew at most twice, and says why.
+    // The worker is free already, so the trial is solved again, at most twice.
     broke(store, lease, "answers arrived faster than the result could be compared with them").await
 }
 

@@ -174,7 +174,7 @@ pub(super) fn check(definition: &Definition) -> Result<(), Error> {
 /// Adds a reference gait, or returns the identical one that is already on record.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a name that does not print, or what the database reports.
+/// [`Error::Invalid`] for a name that does not print; errors of the database.
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(ReferenceGait, bool), Error> {
     writer.room()?;
     check(definition)?;

@@ -96,7 +96,7 @@ async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<
     match said {
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
-        // It reaches the learner at unblinding.
+        // The learner receives it only at unblinding.
         SafetyReportSource::Subject => Ok(None),
     }
 }

@@ -188,7 +188,7 @@ impl Scheduler {
         }
     }
 
-    /// Whether a gait of a study is being certified, or waits for that.
+    /// Whether a gait of a study is being certified or is queued.
     pub fn is_certifying(&self, study: StudyId, gait: TrialId) -> bool {
         self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.is_at(study, gait))
     }

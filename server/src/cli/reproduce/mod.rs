@@ -173,7 +173,7 @@ impl Reproduce {
             ..NewStudy::of(person.id)
         };
         let wanted = plan::checked(&mut writer, new.clone()).await?;
-        // A folder holds at most two subjects, two variants and a hundred seeds of one number of trials.
+        // A folder has at most two subjects, two variants and a hundred seeds.
         let known = studies::page(&mut writer, Reach::Every, Chosen::newest(1000)).await?;
         commit(writer).await?;
         let same = known

@@ -44,7 +44,7 @@ impl Lot {
         self.number & 1 == 1
     }
 
-    /// Written beside what was drawn: without it the hash of the row would tell one order from the other.
+    /// The nonce of the row. Without it, the hash of the row would reveal the allocation.
     pub(crate) fn nonce(self) -> String {
         hex::encode(self.nonce)
     }

@@ -102,7 +102,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     }
     let db = quarantine.db();
     let found = at("studies", studies::page(db, Reach::Every, Chosen::newest(2)).await)?;
-    let [study] = &found[..] else { return Err(refuse(format!("it holds {} studies, expected one", found.len()))) };
+    let [study] = &found[..] else { return Err(refuse(format!("it has {} studies instead of one", found.len()))) };
     let study = study.clone();
     at(format!("study {}", study.id), plan::check_plan(&study.plan))?;
 
@@ -276,7 +276,7 @@ async fn brought(db: &mut Connection, trial: &Trial) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks what the learner hears, and what people said beside it. The subject answers each lab session.
+/// Checks the feedback log, assessments, presentations and safety reviews. The subject answers each lab session.
 async fn answers(
     db: &mut Connection,
     study: &Study,

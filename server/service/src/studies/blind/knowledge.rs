@@ -5,8 +5,7 @@ use crate::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Connection, StudyId, allocations, presentations, users};
 
-/// Whether a caller is never blind: whoever may read can open the trials; and who holds a token is not known, nor what they
-/// may read.
+/// Whether a caller is never blind: users who may read can open the trials, and the holder of a token is unknown.
 fn sees_gaits(caller: &Caller) -> bool {
     Actor::is_token(caller.actor.as_str()) || caller.may(Right::Read)
 }

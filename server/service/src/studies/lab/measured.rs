@@ -37,14 +37,14 @@ pub struct WalkActivity {
 /// Processed EMG recordings of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EmgResult {
-    /// How they were filtered.
+    /// Settings of the filters.
     #[schema(value_type = schema::EmgSettings)]
     pub settings: EmgSettings,
     /// Walks with an EMG recording.
     pub walks: Vec<WalkActivity>,
 }
 
-/// The newest recording of each walk.
+/// The newest measurement file of each walk.
 fn newest(recordings: &[MeasurementFile], kind: MeasurementKind) -> Vec<&MeasurementFile> {
     let of_walk = |walk| recordings.iter().rfind(|recording| recording.kind == kind && recording.walk == walk);
     (1..=super::WALKS).filter_map(of_walk).collect()
@@ -177,11 +177,11 @@ pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Resu
 pub struct LimitCycles {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
-    /// What they were made of.
+    /// Measurement file of the walk.
     pub recording_id: MeasurementFileId,
-    /// Edge of the zero-phase low-pass before velocities were taken by central differences, Hz.
+    /// Cut-off frequency of the zero-phase low-pass filter before central differences, Hz.
     pub cutoff_hz: f64,
-    /// Angle (rad) and velocity (rad/s) of each joint that was recorded, sample after sample.
+    /// Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
     #[schema(value_type = Vec<schema::PhasePortrait>)]
     pub joints: Vec<PhasePortrait>,
 }

@@ -258,9 +258,9 @@ pub struct Brought {
 /// Reads a measurement file as uploaded.
 ///
 /// # Errors
-/// [`Error::NotFound`], or that the file is not what its hash says.
+/// [`Error::NotFound`], or an error if the file does not match its hash.
 pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Brought, Error> {
-    /// What both kinds of recordings say of their reading.
+    /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
     struct Reading {
         form: FileForm,
