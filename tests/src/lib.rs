@@ -13,6 +13,7 @@ pub mod cli;
 pub mod client;
 pub mod compatibility;
 pub mod consistent;
+pub mod drawn;
 pub mod every_table;
 pub mod explained;
 pub mod large;
