@@ -198,6 +198,53 @@ fn silent_connections_above_the_descriptor_limit_leave_health_answering() {
     }
 }
 
+/// Sends a byte of a header every 50 ms from an address, on one connection after another.
+#[cfg(target_os = "linux")]
+async fn drip(from: std::net::SocketAddr, to: std::net::SocketAddr) {
+    use tokio::io::AsyncWriteExt;
+    loop {
+        let socket = tokio::net::TcpSocket::new_v4().unwrap();
+        socket.bind(from).unwrap();
+        if let Ok(mut stream) = socket.connect(to).await {
+            let mut sent = stream.write_all(b"GET / HTTP/1.1\r\nA: ").await;
+            while sent.is_ok() {
+                tokio::time::sleep(Duration::from_millis(50)).await;
+                sent = stream.write_all(b"a").await;
+            }
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread")]
+async fn busy_connections_of_nine_addresses_leave_another_address_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gaitwright-cli"));
+    command.args(["serve", "--no-sign-in", "--workers", "1", "--listen", "127.0.0.1:0"]).current_dir(folder.path());
+    command.env("GAITWRIGHT_CONNECTIONS", "90").env("GAITWRIGHT_CONNECTIONS_PER_ADDRESS", "10");
+    let process = Process::watch(command, "listening on ");
+    let to = process.address().parse().unwrap();
+    let mut busy = tokio::task::JoinSet::new();
+    for address in 2..=10 {
+        for _ in 0..20 {
+            busy.spawn(drip(([127, 0, 0, address], 0).into(), to));
+        }
+    }
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let address = process.address().to_owned();
+    let times = tokio::task::spawn_blocking(move || {
+        let time = |_| {
+            let begun = std::time::Instant::now();
+            assert_eq!(get(&address, "/health").unwrap().status, 200);
+            begun.elapsed()
+        };
+        (0..8).map(time).collect::<Vec<_>>()
+    });
+    let times = times.await.unwrap();
+    assert!(times.iter().all(|time| *time < Duration::from_secs(2)), "{times:?}");
+}
+
 /// A record whose administrators are all disabled, as older versions let it become.
 async fn nobody_administers(folder: &Path) {
     let store = Store::open(&folder.join("gaitwright.db")).await.unwrap();

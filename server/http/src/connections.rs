@@ -1,10 +1,12 @@
 //! Limits open connections, in total and per address, so that file descriptors remain for the record and for other
-//! clients. Above a limit, a new connection replaces the one that has been idle longest.
+//! clients. Above a limit, a new connection replaces the one that has been idle longest. Where none is idle, it replaces
+//! one of the network that holds most, so that no number of busy clients of a few networks keeps the others out.
 
 use super::client_address::ClientAddress;
 use super::forwarded::Proxies;
 use axum::extract::connect_info::Connected;
 use axum_server::{AddrListener, Address};
+use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::io;
 use std::net::SocketAddr;
@@ -173,7 +175,7 @@ impl Connections {
         if !self.make_room_for(network.as_deref()) {
             return None;
         }
-        let permit = self.permit().await?;
+        let permit = self.permit(network.as_deref()).await?;
         let connection = Arc::new(Connection {
             network,
             active_at: self.milliseconds().into(),
@@ -193,40 +195,47 @@ impl Connections {
         if table.by_network.get(network).copied().unwrap_or(0) < self.limits.per_address {
             return true;
         }
-        let made = self.close_quietest(&mut table, |connection| connection.network.as_deref() == Some(network));
+        let made = self.close_quietest(&mut table, QUIET, |connection| connection.network.as_deref() == Some(network));
         table.untold.1 += u64::from(!made);
         self.tell(&mut table);
         made
     }
 
-    /// Waits for a permit.
-    async fn permit(&self) -> Option<OwnedSemaphorePermit> {
+    /// Waits for a permit for a connection of a network.
+    async fn permit(&self, network: Option<&str>) -> Option<OwnedSemaphorePermit> {
         loop {
             if let Ok(permit) = Arc::clone(&self.room).try_acquire_owned() {
                 return Some(permit);
             }
-            self.close_any();
+            self.close_one_for(network);
             if let Ok(permit) = tokio::time::timeout(LOOK, Arc::clone(&self.room).acquire_owned()).await {
                 return permit.ok();
             }
         }
     }
 
-    fn close_any(&self) {
+    /// Closes an idle connection, or else one of the network that holds most, if it holds more than the network of the
+    /// new connection will.
+    fn close_one_for(&self, network: Option<&str>) {
         let mut table = self.table();
-        self.close_quietest(&mut table, |_| true);
+        if !self.close_quietest(&mut table, QUIET, |_| true)
+            && let Some(largest) = table.largest_beyond(network)
+        {
+            self.close_quietest(&mut table, Duration::ZERO, |connection| connection.network.as_ref() == Some(&largest));
+        }
         self.tell(&mut table);
     }
 
-    /// Closes the longest idle connection among some. Connections that never sent a byte come first.
-    fn close_quietest(&self, table: &mut Table, among: impl Fn(&Connection) -> bool) -> bool {
+    /// Closes the longest idle connection among some that have been idle for a time. Connections that never sent a byte
+    /// come first.
+    fn close_quietest(&self, table: &mut Table, idle: Duration, among: impl Fn(&Connection) -> bool) -> bool {
         let now = self.milliseconds();
         let quiet_since = |connection: &Connection| connection.active_at.load(Ordering::Relaxed);
         let quietest = table
             .by_number
             .values()
             .filter(|connection| !connection.closing.is_cancelled() && among(connection))
-            .filter(|connection| u128::from(now.saturating_sub(quiet_since(connection))) >= QUIET.as_millis())
+            .filter(|connection| u128::from(now.saturating_sub(quiet_since(connection))) >= idle.as_millis())
             .min_by_key(|connection| (connection.heard.load(Ordering::Relaxed), quiet_since(connection)))
             .cloned();
         let Some(quietest) = quietest else { return false };
@@ -257,6 +266,13 @@ impl Table {
             *self.by_network.entry(network.clone()).or_default() += 1;
         }
         number
+    }
+
+    /// The network with the most connections, if it has more than the given network will have with one more.
+    fn largest_beyond(&self, network: Option<&str>) -> Option<String> {
+        let present = network.and_then(|network| self.by_network.get(network)).copied().unwrap_or(0);
+        let (largest, count) = self.by_network.iter().max_by_key(|(network, count)| (**count, Reverse(*network)))?;
+        (*count > present + 1).then(|| largest.clone())
     }
 
     fn leave(&mut self, network: Option<&str>) {
