@@ -5,9 +5,9 @@
 //! withdraws consent.
 
 use super::AppState;
+use super::authorization::Refused;
 use super::identify::Credential;
-use super::may::Refused;
-use super::shown::Shown;
+use super::visible::Visible;
 use crate::problem::Refusal;
 use axum::extract::{FromRequestParts, State};
 use axum::http::request::Parts;
@@ -31,7 +31,7 @@ const AHEAD: usize = 16;
 /// Interval of keep-alive comments, because proxies close silent connections.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
-/// A listener to a study with the right `P`. Handlers of streams take it instead of [`Shown`].
+/// A listener to a study with the right `P`. Handlers of streams take it instead of [`Visible`].
 pub(crate) struct Listening<P> {
     app: AppState,
     credential: Credential,
@@ -43,8 +43,8 @@ impl<P: Permission> FromRequestParts<AppState> for Listening<P> {
     type Rejection = Response;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Response> {
-        let Shown(study, _) =
-            Shown::<StudyId, P>::from_request_parts(parts, app).await.map_err(Refused::into_response)?;
+        let Visible(study, _) =
+            Visible::<StudyId, P>::from_request_parts(parts, app).await.map_err(Refused::into_response)?;
         let credential = Credential::of(&parts.headers).map_err(|error| Refusal(error).into_response())?;
         let State(app) = State::<AppState>::from_request_parts(parts, app).await.map_err(|never| match never {})?;
         Ok(Self { app, credential, study, right: PhantomData })

@@ -4,8 +4,10 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod access_log;
+mod accessible;
 mod answers;
 pub mod api;
+mod authorization;
 mod blind_motion;
 mod client_address;
 pub mod connections;
@@ -14,10 +16,9 @@ mod event_stream;
 mod extract;
 mod forwarded;
 mod host;
+mod idempotent;
 mod identify;
-mod may;
 pub mod metrics;
-mod once;
 pub mod openapi;
 mod openapi_depends;
 mod openapi_rules;
@@ -25,13 +26,12 @@ pub mod pages;
 mod paging;
 mod problem;
 mod problem_kinds;
-mod reached;
 mod revision;
 mod router;
 mod same_origin;
-mod shown;
 mod state;
 mod static_files;
+mod visible;
 
 pub use client_address::ClientAddress;
 pub use forwarded::{NETWORKS, Network, Proxies, ProxyHeaders};

@@ -1,7 +1,7 @@
 //! Prometheus metrics: totals of the record, and counts and durations of requests.
 
 use super::AppState;
-use super::may::May;
+use super::authorization::Authorized;
 use crate::problem::Refusal;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{Method, StatusCode, header};
@@ -62,7 +62,7 @@ fn named(method: &Method) -> &str {
 }
 
 /// `GET /metrics`.
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>) -> Result<Response, Refusal> {
+pub(super) async fn get(_: Authorized<Read>, State(app): State<AppState>) -> Result<Response, Refusal> {
     let totals = totals::read(&mut *app.read().await?).await?;
     let mut text = String::new();
     for (name, label, meaning, rows) in [

@@ -38,7 +38,7 @@ where
 mod tests {
     use super::*;
     use gaitwright_service::studies::lab::FileForm;
-    use gaitwright_service::studies::recording::{Form, Strikes, Unit};
+    use gaitwright_service::studies::reference_import::{Form, Strikes, Unit};
 
     fn all_are_known<T: DeserializeOwned>(choices: &[Choice]) {
         for (name, _) in choices {

@@ -1,11 +1,14 @@
 //! The command line: parses arguments, runs a command, sets the exit code. Data goes to stdout, messages and logs to
 //! stderr.
 
+mod audit;
+mod backup;
 mod body;
 mod certify;
 mod choices;
 mod config;
 mod convert;
+mod database_file;
 mod emg;
 mod gait_file;
 mod lineage;
@@ -14,7 +17,6 @@ mod numbers;
 mod out_file;
 mod output;
 mod problem;
-mod record;
 mod reference;
 mod reproduce;
 mod scheduled_backups;
@@ -84,15 +86,15 @@ enum Command {
     /// Process an EMG recording: envelopes, mean cycles, EMG RMSE, average activation.
     Emg(emg::Emg),
     /// Verify the integrity of a database.
-    Audit(record::Audit),
+    Audit(audit::Audit),
     /// Show the settings of the service.
     Config(config::Config),
     /// Print the description of the REST interface (OpenAPI 3.1).
     Openapi,
     /// Back up a database, also while the service is running.
-    Backup(record::Backup),
+    Backup(backup::Backup),
     /// Replace a database with a backup.
-    Restore(record::Restore),
+    Restore(backup::Restore),
     /// Export a study to an archive.
     Export(study::Export),
     /// Import a study from an archive.

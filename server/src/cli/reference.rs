@@ -6,7 +6,7 @@ use super::output::{data, tell};
 use super::problem::read;
 use clap::Args;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::recording::{Form, NewReferenceGait, Strikes, Unit};
+use gaitwright_service::studies::reference_import::{Form, NewReferenceGait, Strikes, Unit};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

@@ -1,9 +1,9 @@
 //! `gaitwright export`, `gaitwright import`, `gaitwright signing-key` and `gaitwright prune`.
 
+use super::database_file::{exists, note_export};
 use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem::read;
-use super::record::{exists, note_export};
 use clap::Args;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;

@@ -14,7 +14,7 @@ use gaitwright_service::studies::choice::best_trial;
 use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_service::studies::recommended::CertificateState;
 use gaitwright_service::studies::summary::{self, Summary};
-use gaitwright_service::studies::{catalogue, device, recording};
+use gaitwright_service::studies::{catalogue, device, reference_import};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, commit};
 use std::path::PathBuf;
@@ -58,7 +58,7 @@ impl Tune {
         catalogue::ensure(&mut writer).await?;
         let subject = catalogue::subject_with(&mut writer, subject).await?;
         let (device, _) = device::add(&mut writer, &Actor::terminal(), &device).await?;
-        let (reference, _) = recording::add(&mut writer, &Actor::terminal(), &reference).await?;
+        let (reference, _) = reference_import::add(&mut writer, &Actor::terminal(), &reference).await?;
         commit(writer).await?;
         let new = NewStudy {
             device_id: Some(device.id),

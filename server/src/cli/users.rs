@@ -1,7 +1,7 @@
 //! `gaitwright users`: lists users, and creates sign-in links for them.
 
+use super::database_file::exists;
 use super::output::{data, tell};
-use super::record::exists;
 use clap::{Args, Subcommand};
 use gaitwright_service::access::people;
 use gaitwright_service::error::Error;

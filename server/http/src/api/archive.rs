@@ -1,11 +1,12 @@
 //! REST: exports a study as an archive, and lists its imports.
 
 use crate::AppState;
-use crate::may::May;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::openapi::Binary;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
@@ -34,11 +35,11 @@ const CHUNK_BYTES: usize = 1 << 16;
     operation_id = "get_study_archive",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Unsigned archive for `gaitwright import`", body = Vec<u8>, content_type = "application/octet-stream"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Unsigned archive for `gaitwright import`", body = Binary, content_type = "application/octet-stream"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn of_study(
-    may: May<Administer>,
+    authorized: Authorized<Administer>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Administer>,
 ) -> Result<Response, Refusal> {
@@ -47,7 +48,7 @@ pub(super) async fn of_study(
     let study = studies::get(&mut writer, id).await?;
     consents::may_be_shown(&mut writer, id).await?;
     let detail = json!({ "name": study.plan.name });
-    audit::append(&mut writer, &may.caller.actor, "study.export", &format!("study {id}"), &detail).await?;
+    audit::append(&mut writer, &authorized.caller.actor, "study.export", &format!("study {id}"), &detail).await?;
     commit(writer).await?;
 
     let (sender, mut chunks) = mpsc::channel(4);
@@ -112,9 +113,9 @@ impl Write for Chunks {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn imports_of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<Import>>, Refusal> {
     let mut reader = app.read().await?;

@@ -2,12 +2,12 @@
 
 use super::preferences::Retract;
 use crate::AppState;
-use crate::may::May;
-use crate::once::OnceWith;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -29,9 +29,9 @@ use gaitwright_store::{AssessmentId, StudyId, studies};
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<AssessmentId>,
 ) -> Result<Json<Page<Assessment>>, Refusal> {
     let mut reader = app.read().await?;
@@ -56,15 +56,15 @@ pub(super) async fn of_study(
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, access::Answer>,
-    OnceWith(once, new): OnceWith<access::Answer, NewAssessment>,
+    IdempotentWith(request, new): IdempotentWith<access::Answer, NewAssessment>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let made = assessment::give(&mut writer, &once.caller, id, &new).await?;
+    let made = assessment::give(&mut writer, &request.caller, id, &new).await?;
     let row = assessments::get(&mut writer, made).await?;
-    once.created(&app, writer, format!("/api/v1/assessments/{made}"), &row).await
+    request.created(&app, writer, format!("/api/v1/assessments/{made}"), &row).await
 }
 
 /// Get an assessment
@@ -78,9 +78,9 @@ pub(super) async fn create(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<AssessmentId, Read>,
+    Visible(id, _): Visible<AssessmentId, Read>,
 ) -> Result<Json<Assessment>, Refusal> {
     Ok(Json(assessments::get(&mut *app.read().await?, id).await?))
 }
@@ -101,12 +101,12 @@ pub(super) async fn get(
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id, _): Id<AssessmentId, access::Answer>,
-    OnceWith(once, why): OnceWith<access::Answer, Retract>,
+    IdempotentWith(request, why): IdempotentWith<access::Answer, Retract>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = assessment::retract(&mut writer, &once.caller, None, id, (why.author.as_deref(), &why.reason)).await?;
-    once.done(&app, writer, &row).await
+    let row = assessment::retract(&mut writer, &request.caller, None, id, (why.author.as_deref(), &why.reason)).await?;
+    request.done(&app, writer, &row).await
 }

@@ -1,7 +1,7 @@
 //! REST: lists the audit trail.
 
 use crate::AppState;
-use crate::may::May;
+use crate::authorization::Authorized;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use axum::Json;
@@ -31,7 +31,7 @@ pub(super) struct Filter {
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn list(
-    _: May<Administer>,
+    _: Authorized<Administer>,
     State(app): State<AppState>,
     paging: Paging<i64, Filter>,
 ) -> Result<Json<Page<AuditRow>>, Refusal> {

@@ -1,7 +1,7 @@
 //! REST: backups of the record.
 
 use crate::AppState;
-use crate::once::Once;
+use crate::idempotent::Idempotent;
 use crate::problem::Refusal;
 use axum::extract::State;
 use axum::response::Response;
@@ -80,19 +80,19 @@ async fn to_its_end<T: Send + 'static>(
     responses((status = 200, description = "Checked backup", body = Copy)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
-pub(super) async fn create(State(app): State<AppState>, once: Once<Administer>) -> Result<Response, Refusal> {
+pub(super) async fn create(State(app): State<AppState>, request: Idempotent<Administer>) -> Result<Response, Refusal> {
     to_its_end(async move {
-        if let Some(before) = once.answered_before(&app).await? {
+        if let Some(before) = request.answered_before(&app).await? {
             return Ok(before);
         }
         let copy = Copy::make(&app).await?;
         let recorded = async {
-            let mut writer = match once.begin(&app).await? {
+            let mut writer = match request.begin(&app).await? {
                 Ok(writer) => writer,
                 Err(before) => return Ok(before),
             };
-            copy.record(&mut writer, &once.actor).await?;
-            once.done(&app, writer, &copy).await
+            copy.record(&mut writer, &request.actor).await?;
+            request.done(&app, writer, &copy).await
         };
         let recorded = recorded.await;
         copy.unless_refused(&app, recorded)

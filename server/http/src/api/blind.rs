@@ -1,13 +1,13 @@
 //! REST: blind comparisons for raters, reliability of raters, and unblinding.
 
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::blind_motion::{Figure, blind_motion, phase};
-use crate::may::May;
-use crate::once::{Once, OnceWith};
+use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::{Path, State};
 use axum::response::Response;
@@ -53,20 +53,20 @@ pub(super) struct NextPair {
 pub(super) async fn next(
     State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Rate>,
-    once: Once<Rate>,
+    request: Idempotent<Rate>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = once.answered_before(&app).await? {
+    if let Some(before) = request.answered_before(&app).await? {
         return Ok(before);
     }
     let answering = app.clone();
-    let (writer, shown) = blind::next(app.store_mut(), &once.caller, id).await?;
+    let (writer, shown) = blind::next(app.store_mut(), &request.caller, id).await?;
     let pair = shown.map(|shown| Pair {
         first: format!("/api/v1/blind-pairs/{}/motions/first", shown.presentation.token),
         second: format!("/api/v1/blind-pairs/{}/motions/second", shown.presentation.token),
         token: shown.presentation.token,
         number: shown.presentation.number,
     });
-    once.done(&answering, writer, &NextPair { pair }).await
+    request.done(&answering, writer, &NextPair { pair }).await
 }
 
 /// Motion to compare.
@@ -102,12 +102,12 @@ pub(super) enum Side {
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn motion(
-    may: May<Rate>,
+    authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
     Path((token, side)): Path<(String, Side)>,
 ) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
-    let shown = blind::own(&mut reader, &may.caller, &token).await?;
+    let shown = blind::own(&mut reader, &authorized.caller, &token).await?;
     let (first, second) = shown.shown();
     let trial = match side {
         Side::First => first,
@@ -142,14 +142,14 @@ pub(super) async fn motion(
 pub(super) async fn answer(
     State(app): State<AppState>,
     Path(token): Path<String>,
-    OnceWith(once, given): OnceWith<Rate, RaterAnswer>,
+    IdempotentWith(request, given): IdempotentWith<Rate, RaterAnswer>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let (_, answered) = blind::answer(&mut writer, &once.caller, &token, &given).await?;
-    once.done(&app, writer, &answered).await
+    let (_, answered) = blind::answer(&mut writer, &request.caller, &token, &given).await?;
+    request.done(&app, writer, &answered).await
 }
 
 /// Get the reliability of raters
@@ -165,9 +165,9 @@ pub(super) async fn answer(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn raters(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<RaterFigures>>, Refusal> {
     let mut reader = app.read().await?;
@@ -212,12 +212,12 @@ pub(super) struct UnblindedRater {
 pub(super) async fn unblind(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Administer>,
-    OnceWith(once, whose): OnceWith<Administer, Unblind>,
+    IdempotentWith(request, whose): IdempotentWith<Administer, Unblind>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let pairs = blind::unblind(&mut writer, &once.caller, id, &whose.rater, &whose.reason).await?;
-    once.done(&app, writer, &UnblindedRater { pairs }).await
+    let pairs = blind::unblind(&mut writer, &request.caller, id, &whose.rater, &whose.reason).await?;
+    request.done(&app, writer, &UnblindedRater { pairs }).await
 }

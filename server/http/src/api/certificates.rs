@@ -2,11 +2,11 @@
 
 use super::jobs::Job;
 use crate::AppState;
-use crate::may::May;
-use crate::once::Once;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::Idempotent;
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -31,9 +31,9 @@ use gaitwright_store::{TrialId, certificates, schema};
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<Certificate>, Refusal> {
     let missing = || Error::NotFound { what: "certificate of trial".to_owned(), id: id.to_string() };
     certificates::find(&mut *app.read().await?, id).await?.map(Json).ok_or_else(missing).map_err(Refusal)
@@ -57,19 +57,19 @@ pub(super) async fn get(
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    once: Once<Run>,
+    request: Idempotent<Run>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    if let Some(certificate) = certification::ask(&mut writer, &once.actor, id).await? {
-        return once.done(&app, writer, &certificate).await;
+    if let Some(certificate) = certification::ask(&mut writer, &request.actor, id).await? {
+        return request.done(&app, writer, &certificate).await;
     }
     if !app.scheduler.certify(id) {
         return Err(Error::NotReady("this service certifies no gaits".to_owned()).into());
     }
     let id = JobId { kind: JobKind::Certificate, trial: id };
     let job = Job::from(job_status::find(&mut writer, &app.scheduler, id).await?);
-    once.accepted(&app, writer, Job::address(id), &job).await
+    request.accepted(&app, writer, Job::address(id), &job).await
 }

@@ -1,10 +1,10 @@
 //! REST: comparison of several studies.
 
 use crate::AppState;
-use crate::may::May;
+use crate::accessible::Named;
+use crate::authorization::Authorized;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Named;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
@@ -65,7 +65,7 @@ pub(super) struct Compared {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     paging: Paging<usize, Which>,
 ) -> Result<Json<Page<Compared>>, Refusal> {
@@ -79,7 +79,7 @@ pub(super) async fn get(
     let mut rows = Vec::with_capacity(named.len());
     for id in named {
         let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
-        let id = id.reached(&mut *app.read().await?, may.caller.reach()).await?;
+        let id = id.accessible(&mut *app.read().await?, authorized.caller.reach()).await?;
         rows.push(row(&mut app, id).await?);
     }
     Ok(Json(paging.cut_by_place(rows)?))

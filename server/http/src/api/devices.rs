@@ -1,11 +1,11 @@
 //! REST: devices.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::OnceWith;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -28,7 +28,7 @@ use std::cmp::Reverse;
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     paging: Paging<Reverse<DeviceId>>,
 ) -> Result<Json<Page<Device>>, Refusal> {
@@ -53,18 +53,18 @@ pub(super) async fn list(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    OnceWith(once, definition): OnceWith<Run, Definition>,
+    IdempotentWith(request, definition): IdempotentWith<Run, Definition>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let (device, added) = device::add(&mut writer, &once.actor, &definition).await?;
+    let (device, added) = device::add(&mut writer, &request.actor, &definition).await?;
     if !added {
-        return once.done(&app, writer, &device).await;
+        return request.done(&app, writer, &device).await;
     }
     let location = format!("/api/v1/devices/{}", device.id);
-    once.created(&app, writer, location, &device).await
+    request.created(&app, writer, location, &device).await
 }
 
 /// Get a device
@@ -78,7 +78,7 @@ pub(super) async fn create(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<DeviceId, Read>,
 ) -> Result<Json<Device>, Refusal> {

@@ -2,11 +2,11 @@
 
 use super::jobs::Job;
 use crate::AppState;
-use crate::may::May;
-use crate::once::Once;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::Idempotent;
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -92,9 +92,9 @@ impl TrialExplanation {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<TrialExplanation>, Refusal> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
@@ -125,18 +125,18 @@ pub(super) async fn get(
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    once: Once<Run>,
+    request: Idempotent<Run>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let asked = explanation::ask(&mut writer, &once.actor, id, app.scheduler.explaining(id)).await?;
+    let asked = explanation::ask(&mut writer, &request.actor, id, app.scheduler.explaining(id)).await?;
     if let Some(made) = asked {
-        return once.done(&app, writer, &TrialExplanation::new(id, made)).await;
+        return request.done(&app, writer, &TrialExplanation::new(id, made)).await;
     }
     app.scheduler.explain_again(id);
     let id = JobId { kind: JobKind::Explanation, trial: id };
     let job = Job::from(job_status::find(&mut writer, &app.scheduler, id).await?);
-    once.accepted(&app, writer, Job::address(id), &job).await
+    request.accepted(&app, writer, Job::address(id), &job).await
 }

@@ -1,11 +1,11 @@
 //! REST: downloads of a trial: problem file, OpenSim motion, controller file.
 
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -44,9 +44,9 @@ pub(super) fn two_hundred() -> f64 {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn problem(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
     let number = trials::get(&mut reader, id).await?.number;
@@ -67,7 +67,7 @@ pub(super) async fn problem(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn motion_file(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Read>,
     Params(sampling): Params<Sampling>,
@@ -95,7 +95,7 @@ pub(super) async fn motion_file(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn controller(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Read>,
     Params(sampling): Params<Sampling>,

@@ -1,12 +1,13 @@
 //! REST: downloads of figures as SVG, PNG and CSV.
 
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
+use crate::openapi::Binary;
 use crate::pages::{belief, figures};
 use crate::problem::Refusal;
-use crate::reached::{Id, Named, reached};
-use crate::shown::Shown;
+use crate::accessible::{Id, Named, accessible};
+use crate::visible::Visible;
 use axum::extract::{Path, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -34,17 +35,17 @@ pub(super) struct Beside<T> {
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
         ("other" = Option<StudyId>, Query, description = "Study for comparison")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(Beside { other }): Params<Beside<StudyId>>,
 ) -> Result<Response, Refusal> {
-    let other = reached(&mut *app.read().await?, may.caller.reach(), other).await?;
+    let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = figures::of_study(&mut app, id, other).await?.into_figures();
     answer(&mut app, figures, file).await
 }
@@ -62,17 +63,17 @@ pub(super) async fn of_study(
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
         ("other" = Option<TrialId>, Query, description = "Converged trial of the same study for comparison")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_trial(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(Beside { other }): Params<Beside<TrialId>>,
 ) -> Result<Response, Refusal> {
-    let other = reached(&mut *app.read().await?, may.caller.reach(), other).await?;
+    let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = match other {
         None => figures::of_trial(&mut app, id).await?,
         Some(other) => figures::of_pair(&mut app, id, other).await?,
@@ -92,13 +93,13 @@ pub(super) async fn of_trial(
         ("id" = LabSessionId, Path, description = "The session"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_session(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Read>,
+    Visible(id, _): Visible<LabSessionId, Read>,
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let figures = figures::of_session(&mut app, id).await?;
@@ -117,13 +118,13 @@ pub(super) async fn of_session(
         ("right" = Option<String>, Query, description = "Bound on the horizontal axis of maps. The first one by default"),
         ("down" = Option<String>, Query, description = "Bound on the vertical axis of maps. The second one by default")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_belief(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(choice): Params<belief::Choice>,
 ) -> Result<Response, Refusal> {
@@ -141,11 +142,11 @@ pub(super) async fn of_belief(
         ("id" = ReferenceGaitId, Path, description = "The reference gait"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv")))),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_reference(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
     Id(id, _): Id<ReferenceGaitId, Read>,
     Path((_, file)): Path<(String, String)>,

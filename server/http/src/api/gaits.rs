@@ -1,10 +1,10 @@
 //! REST: gaits of trials.
 
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::csv_answer::csv_file;
-use crate::may::May;
 use crate::problem::Refusal;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -26,9 +26,9 @@ use gaitwright_store::{StoreError, TrialId, gaits, schema, trials};
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Response, Refusal> {
     let gait = gaits::get(&mut *app.read().await?, id).await?;
     let text = app.compute(move |pool| gait.text(pool)).await??;
@@ -46,9 +46,9 @@ pub(super) async fn get(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get_csv(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
     let number = trials::get(&mut reader, id).await?.number;

@@ -1,11 +1,11 @@
 //! REST: the history of the recommendation.
 
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::csv_answer::csv_answer;
-use crate::may::May;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -32,9 +32,9 @@ use std::sync::Arc;
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<Milestone>>, Refusal> {
     Ok(Json(paging.cut_by_place(read(&mut app, id).await?)?))
@@ -53,9 +53,9 @@ pub(super) async fn of_study(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     table(&mut app, id).await
 }

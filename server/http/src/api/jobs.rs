@@ -1,11 +1,11 @@
 //! REST: jobs and workers.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::Once;
+use crate::authorization::Authorized;
+use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -83,12 +83,12 @@ pub(super) struct Filter {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(app): State<AppState>,
     paging: Paging<JobId, Filter>,
 ) -> Result<Json<Page<Job>>, Refusal> {
     let Filter { kind, study_id } = paging.filter;
-    let mut all = job_status::open(&mut *app.read().await?, &app.scheduler, may.caller.reach()).await?;
+    let mut all = job_status::open(&mut *app.read().await?, &app.scheduler, authorized.caller.reach()).await?;
     all.retain(|job| kind.is_none_or(|kind| kind == job.id.kind) && study_id.is_none_or(|study| study == job.study));
     Ok(Json(paging.cut(all, |job| job.id)?.map(Job::from)))
 }
@@ -106,9 +106,9 @@ pub(super) async fn list(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<JobId, Read>,
+    Visible(id, _): Visible<JobId, Read>,
 ) -> Result<Json<Job>, Refusal> {
     Ok(Json(job_status::find(&mut *app.read().await?, &app.scheduler, id).await?.into()))
 }
@@ -127,17 +127,17 @@ pub(super) async fn get(
 )]
 pub(super) async fn cancel(
     State(app): State<AppState>,
-    Shown(id, _): Shown<JobId, Run>,
-    once: Once<Run>,
+    Visible(id, _): Visible<JobId, Run>,
+    request: Idempotent<Run>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
     let job = job_status::find(&mut writer, &app.scheduler, id).await?;
-    job_status::cancel(&mut writer, &once.actor, &app.scheduler, id).await?;
+    job_status::cancel(&mut writer, &request.actor, &app.scheduler, id).await?;
     let cancelled = Job::from(JobStatus { state: JobState::Cancelled, solve: None, ..job });
-    let answer = once.done(&app, writer, &cancelled).await?;
+    let answer = request.done(&app, writer, &cancelled).await?;
     app.scheduler.cancel_job(id).await;
     Ok(answer)
 }
@@ -170,6 +170,6 @@ impl Workers {
     responses((status = 200, description = "Workers", body = Workers)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn workers(_: May<Read>, State(app): State<AppState>) -> Result<Json<Workers>, Refusal> {
+pub(super) async fn workers(_: Authorized<Read>, State(app): State<AppState>) -> Result<Json<Workers>, Refusal> {
     Ok(Json(Workers::read(&app).await?))
 }

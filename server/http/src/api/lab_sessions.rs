@@ -2,13 +2,13 @@
 
 use super::exports;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
-use crate::once::{Once, OnceWith};
+use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -33,9 +33,9 @@ use utoipa::ToSchema;
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<u32>,
 ) -> Result<Json<Page<SessionView>>, Refusal> {
     let mut reader = app.read().await?;
@@ -60,15 +60,15 @@ pub(super) async fn of_study(
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    OnceWith(once, new): OnceWith<Run, NewSession>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewSession>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let session = lab::plan(&mut writer, &once.actor, id, &new).await?;
+    let session = lab::plan(&mut writer, &request.actor, id, &new).await?;
     let location = format!("/api/v1/lab-sessions/{}", session.id);
-    once.created(&app, writer, location, &SessionView::from(&session)).await
+    request.created(&app, writer, location, &SessionView::from(&session)).await
 }
 
 /// Get a lab session
@@ -84,9 +84,9 @@ pub(super) async fn create(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Read>,
+    Visible(id, _): Visible<LabSessionId, Read>,
 ) -> Result<Json<SessionView>, Refusal> {
     Ok(Json(SessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
 }
@@ -118,9 +118,9 @@ pub(super) struct OfWalk {
     security(("token" = ["device"]), ("session" = ["device"])),
 )]
 pub(super) async fn controller(
-    may: May<Device>,
+    authorized: Authorized<Device>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Device>,
+    Visible(id, _): Visible<LabSessionId, Device>,
     Params(of): Params<OfWalk>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
@@ -137,7 +137,7 @@ pub(super) async fn controller(
     };
     let (one, two) = app.compute(write).await??;
     let mut writer = app.write().await?;
-    let gait = lab::for_device(&mut writer, &may.caller, id, of.walk).await?;
+    let gait = lab::for_device(&mut writer, &authorized.caller, id, of.walk).await?;
     commit(writer).await?;
     let text = match gait {
         GaitOfWalk::One => one,
@@ -172,14 +172,14 @@ pub(super) struct Closing {
 pub(super) async fn close(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    OnceWith(once, closing): OnceWith<Run, Closing>,
+    IdempotentWith(request, closing): IdempotentWith<Run, Closing>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let session = lab::close(&mut writer, &once.actor, id, &closing.note).await?;
-    once.done(&app, writer, &SessionView::from(&session)).await
+    let session = lab::close(&mut writer, &request.actor, id, &closing.note).await?;
+    request.done(&app, writer, &SessionView::from(&session)).await
 }
 
 /// Unblinding of a session.
@@ -208,14 +208,14 @@ pub(super) struct Told {
 pub(super) async fn unblind(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Administer>,
-    OnceWith(once, told): OnceWith<Administer, Told>,
+    IdempotentWith(request, told): IdempotentWith<Administer, Told>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let session = lab::unblind(&mut writer, &once.actor, id, &told.reason).await?;
-    once.done(&app, writer, &SessionView::from(&session)).await
+    let session = lab::unblind(&mut writer, &request.actor, id, &told.reason).await?;
+    request.done(&app, writer, &SessionView::from(&session)).await
 }
 
 /// Get the next walk of a lab session
@@ -231,7 +231,7 @@ pub(super) async fn unblind(
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn in_the_lab(
-    _: May<Rate>,
+    _: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
 ) -> Result<Json<InTheLab>, Refusal> {
@@ -252,14 +252,14 @@ pub(super) async fn in_the_lab(
 pub(super) async fn walk(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
-    OnceWith(once, walked): OnceWith<Rate, RecordedWalk>,
+    IdempotentWith(request, walked): IdempotentWith<Rate, RecordedWalk>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let next = lab::record_walk(&mut writer, &once.actor, id, &walked).await?;
-    once.done(&app, writer, &next).await
+    let next = lab::record_walk(&mut writer, &request.actor, id, &walked).await?;
+    request.done(&app, writer, &next).await
 }
 
 /// Record the answer of the subject
@@ -278,14 +278,14 @@ pub(super) async fn walk(
 pub(super) async fn answer(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
-    OnceWith(once, new): OnceWith<Rate, NewAnswer>,
+    IdempotentWith(request, new): IdempotentWith<Rate, NewAnswer>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let seen = lab::answer(&mut writer, &once.caller, id, &new).await?;
-    once.done(&app, writer, &seen).await
+    let seen = lab::answer(&mut writer, &request.caller, id, &new).await?;
+    request.done(&app, writer, &seen).await
 }
 
 /// Retract the answer of the subject
@@ -301,12 +301,12 @@ pub(super) async fn answer(
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
-    once: Once<Rate>,
+    request: Idempotent<Rate>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let seen = lab::take_back(&mut writer, &once.caller, id).await?;
-    once.done(&app, writer, &seen).await
+    let seen = lab::take_back(&mut writer, &request.caller, id).await?;
+    request.done(&app, writer, &seen).await
 }

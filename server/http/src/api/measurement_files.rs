@@ -2,12 +2,12 @@
 
 use super::exports;
 use crate::AppState;
-use crate::may::May;
-use crate::once::{Once, OnceWith};
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderValue, header};
@@ -34,9 +34,9 @@ use utoipa::ToSchema;
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Read>,
+    Visible(id, _): Visible<LabSessionId, Read>,
     paging: Paging<MeasurementFileId>,
 ) -> Result<Json<Page<MeasurementFile>>, Refusal> {
     let all = measurement_files::of_session(&mut *app.read().await?, id).await?;
@@ -54,9 +54,9 @@ pub(super) async fn list(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<MeasurementFileId, Read>,
+    Visible(id, _): Visible<MeasurementFileId, Read>,
 ) -> Result<Json<MeasurementFile>, Refusal> {
     Ok(Json(measurement_files::get(&mut *app.read().await?, id).await?))
 }
@@ -74,9 +74,9 @@ pub(super) async fn get(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn content(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<MeasurementFileId, Read>,
+    Visible(id, _): Visible<MeasurementFileId, Read>,
 ) -> Result<Response, Refusal> {
     let Brought { recording, form, file } = lab::brought(&mut *app.read().await?, id).await?;
     let text = app.compute(move |pool| file.text(pool)).await??;
@@ -107,13 +107,13 @@ pub(super) async fn content(
 pub(super) async fn emg(
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    OnceWith(once, new): OnceWith<Run, NewEmg>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewEmg>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = once.answered_before(&app).await? {
+    if let Some(before) = request.answered_before(&app).await? {
         return Ok(before);
     }
     let checked = new.checked(app.store_mut()).await?;
-    keep(&app, id, &once, &checked).await
+    keep(&app, id, &request, &checked).await
 }
 
 /// Upload joint angles of a walk
@@ -132,22 +132,27 @@ pub(super) async fn emg(
 pub(super) async fn motion(
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    OnceWith(once, new): OnceWith<Run, NewMotion>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewMotion>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = once.answered_before(&app).await? {
+    if let Some(before) = request.answered_before(&app).await? {
         return Ok(before);
     }
     let checked = new.checked(app.store_mut()).await?;
-    keep(&app, id, &once, &checked).await
+    keep(&app, id, &request, &checked).await
 }
 
-async fn keep(app: &AppState, id: LabSessionId, once: &Once<Run>, checked: &Checked) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(app).await? {
+async fn keep(
+    app: &AppState,
+    id: LabSessionId,
+    request: &Idempotent<Run>,
+    checked: &Checked,
+) -> Result<Response, Refusal> {
+    let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let kept = lab::keep(&mut writer, &once.actor, id, checked).await?;
-    once.created(app, writer, format!("/api/v1/measurement-files/{}", kept.id), &kept).await
+    let kept = lab::keep(&mut writer, &request.actor, id, checked).await?;
+    request.created(app, writer, format!("/api/v1/measurement-files/{}", kept.id), &kept).await
 }
 
 /// Settings of EMG processing.
@@ -175,19 +180,19 @@ pub(super) struct Processing {
 pub(super) async fn process(
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    OnceWith(once, processing): OnceWith<Run, Processing>,
+    IdempotentWith(request, processing): IdempotentWith<Run, Processing>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = once.answered_before(&app).await? {
+    if let Some(before) = request.answered_before(&app).await? {
         return Ok(before);
     }
     let result = lab::compute(app.store_mut(), id, processing.settings).await?;
     let view = lab::beside_model(app.store_mut(), id, result).await?;
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    lab::keep_result(&mut writer, &once.actor, id, &view.result).await?;
-    once.done(&app, writer, &view).await
+    lab::keep_result(&mut writer, &request.actor, id, &view.result).await?;
+    request.done(&app, writer, &view).await
 }
 
 /// Get the processed EMG
@@ -203,9 +208,9 @@ pub(super) async fn process(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn result(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Read>,
+    Visible(id, _): Visible<LabSessionId, Read>,
 ) -> Result<Json<Option<EmgView>>, Refusal> {
     Ok(Json(lab::emg(app.store_mut(), id).await?))
 }
@@ -223,9 +228,9 @@ pub(super) async fn result(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn limit_cycles(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Read>,
+    Visible(id, _): Visible<LabSessionId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<LimitCycles>>, Refusal> {
     Ok(Json(paging.cut_by_place(lab::limit_cycles(app.store_mut(), id).await?)?))

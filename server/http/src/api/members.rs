@@ -1,11 +1,11 @@
 //! REST: members of studies, restriction of access, and invitations of raters.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::{Once, OnceWith};
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -30,7 +30,7 @@ use utoipa::ToSchema;
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
     paging: Paging<MemberId>,
@@ -50,7 +50,7 @@ pub(super) async fn of_study(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn access(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
 ) -> Result<Json<StudyAccess>, Refusal> {
@@ -74,14 +74,14 @@ pub(super) async fn access(
 pub(super) async fn add(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    OnceWith(once, new): OnceWith<Run, NewMember>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewMember>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let member = membership::add(&mut writer, &once.actor, id, &new).await?;
-    once.created(&app, writer, address(member.id), &member).await
+    let member = membership::add(&mut writer, &request.actor, id, &new).await?;
+    request.created(&app, writer, address(member.id), &member).await
 }
 
 /// The address of a membership.
@@ -102,7 +102,7 @@ fn address(id: MemberId) -> String {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<MemberId, Read>,
 ) -> Result<Json<Member>, Refusal> {
@@ -122,14 +122,14 @@ pub(super) async fn get(
 pub(super) async fn end(
     State(app): State<AppState>,
     Id(id, _): Id<MemberId, Run>,
-    once: Once<Run>,
+    request: Idempotent<Run>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let member = membership::end(&mut writer, &once.actor, id).await?;
-    once.done(&app, writer, &member).await
+    let member = membership::end(&mut writer, &request.actor, id).await?;
+    request.done(&app, writer, &member).await
 }
 
 /// Access to a study.
@@ -157,14 +157,14 @@ pub(super) struct StudyAccess {
 pub(super) async fn restrict(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    OnceWith(once, wanted): OnceWith<Run, StudyAccess>,
+    IdempotentWith(request, wanted): IdempotentWith<Run, StudyAccess>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    membership::restrict(&mut writer, &once.caller, id, wanted.restricted).await?;
-    once.done(&app, writer, &wanted).await
+    membership::restrict(&mut writer, &request.caller, id, wanted.restricted).await?;
+    request.done(&app, writer, &wanted).await
 }
 
 /// Rater to invite.
@@ -202,10 +202,10 @@ pub(super) struct Invited {
 pub(super) async fn invite(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Administer>,
-    OnceWith(once, whom): OnceWith<Administer, Invitation>,
+    IdempotentWith(request, whom): IdempotentWith<Administer, Invitation>,
 ) -> Result<Response, Refusal> {
-    let mut writer = once.begin_secret(&app).await?;
-    let (_, member, secret) = membership::invite(&mut writer, &once.actor, id, &whom.name).await?;
+    let mut writer = request.begin_secret(&app).await?;
+    let (_, member, secret) = membership::invite(&mut writer, &request.actor, id, &whom.name).await?;
     let invited = Invited { member, path: format!("/sign-in/{secret}") };
-    once.created(&app, writer, address(invited.member.id), &invited).await
+    request.created(&app, writer, address(invited.member.id), &invited).await
 }

@@ -1,9 +1,9 @@
 //! REST: the motion of a gait, for animations.
 
 use crate::AppState;
-use crate::may::May;
+use crate::authorization::Authorized;
 use crate::problem::Refusal;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::Gait;
@@ -57,9 +57,9 @@ struct Frame {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<Motion>, Refusal> {
     let gait = gaits::get(&mut *app.read().await?, id).await?;
     Ok(Json(app.compute(move |pool| motion(&gait.unpack(pool)?)).await??))

@@ -1,13 +1,13 @@
 //! REST: preferences.
 
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::csv_answer::csv_answer;
-use crate::may::May;
-use crate::once::OnceWith;
+use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -32,9 +32,9 @@ use utoipa::ToSchema;
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<i64>,
 ) -> Result<Json<Page<FeedbackRow>>, Refusal> {
     let mut reader = app.read().await?;
@@ -56,9 +56,9 @@ pub(super) async fn of_study(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
@@ -116,9 +116,9 @@ fn table(rows: &[FeedbackRow]) -> CsvTable {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<FeedbackId, Read>,
+    Visible(id, _): Visible<FeedbackId, Read>,
 ) -> Result<Json<FeedbackRow>, Refusal> {
     Ok(Json(feedback::get(&mut *app.read().await?, id).await?))
 }
@@ -146,17 +146,17 @@ pub(super) struct Recorded {
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, access::Answer>,
-    OnceWith(once, answer): OnceWith<access::Answer, Answer>,
+    IdempotentWith(request, answer): IdempotentWith<access::Answer, Answer>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let given = answer::give(&mut writer, &once.caller, id, &answer).await?;
+    let given = answer::give(&mut writer, &request.caller, id, &answer).await?;
     let row = feedback::get(&mut writer, given).await?;
     let other_answers = answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
-    once.created(&app, writer, location, &Recorded { row, other_answers }).await
+    request.created(&app, writer, location, &Recorded { row, other_answers }).await
 }
 
 /// Retraction of a preference or an assessment.
@@ -186,12 +186,12 @@ pub(super) struct Retract {
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id, _): Id<FeedbackId, access::Answer>,
-    OnceWith(once, why): OnceWith<access::Answer, Retract>,
+    IdempotentWith(request, why): IdempotentWith<access::Answer, Retract>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = answer::retract(&mut writer, &once.caller, None, id, why.author.as_deref(), &why.reason).await?;
-    once.done(&app, writer, &row).await
+    let row = answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
+    request.done(&app, writer, &row).await
 }

@@ -1,10 +1,10 @@
 //! REST: the recommendation of a study.
 
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::csv_answer::csv_answer;
-use crate::may::May;
 use crate::problem::Refusal;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -85,9 +85,9 @@ impl Recommended {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
 ) -> Result<Json<Recommendation>, Refusal> {
     Ok(Json(read(&mut app, id).await?))
 }
@@ -108,9 +108,9 @@ pub(super) async fn of_study(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     let Recommendation { best, certificate, .. } = read(&mut app, id).await?;
     let name = format!("bounds-trial-{}.csv", best.number);

@@ -1,16 +1,17 @@
 //! REST: reference gaits.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::OnceWith;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
-use gaitwright_service::studies::recording::{self, Match, NewReferenceGait};
+use gaitwright_service::studies::nearest_reference::{self, Match};
+use gaitwright_service::studies::reference_import::{self, NewReferenceGait};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::{ReferenceGaitId, SubjectId, subjects};
 use std::cmp::Reverse;
@@ -27,7 +28,7 @@ use std::cmp::Reverse;
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     paging: Paging<Reverse<ReferenceGaitId>>,
 ) -> Result<Json<Page<ReferenceGait>>, Refusal> {
@@ -53,22 +54,22 @@ pub(super) async fn list(
 )]
 pub(super) async fn create(
     State(mut app): State<AppState>,
-    OnceWith(once, new): OnceWith<Run, NewReferenceGait>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewReferenceGait>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = once.answered_before(&app).await? {
+    if let Some(before) = request.answered_before(&app).await? {
         return Ok(before);
     }
     let definition = new.definition_aside(app.store_mut()).await?;
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let (gait, added) = recording::add(&mut writer, &once.actor, &definition).await?;
+    let (gait, added) = reference_import::add(&mut writer, &request.actor, &definition).await?;
     if !added {
-        return once.done(&app, writer, &gait).await;
+        return request.done(&app, writer, &gait).await;
     }
     let location = format!("/api/v1/reference-gaits/{}", gait.id);
-    once.created(&app, writer, location, &gait).await
+    request.created(&app, writer, location, &gait).await
 }
 
 /// Get a reference gait
@@ -82,7 +83,7 @@ pub(super) async fn create(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<ReferenceGaitId, Read>,
 ) -> Result<Json<ReferenceGait>, Refusal> {
@@ -102,12 +103,12 @@ pub(super) async fn get(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_subject(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<Match>>, Refusal> {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(recording::matches(&mut reader, &subject.body()).await?)?))
+    Ok(Json(paging.cut_by_place(nearest_reference::matches(&mut reader, &subject.body()).await?)?))
 }

@@ -1,12 +1,12 @@
 //! REST: safety reports and their reviews.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::OnceWith;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -55,9 +55,9 @@ impl From<Closed> for SafetyReport {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<(Instant, TrialId, String)>,
 ) -> Result<Json<Page<SafetyReport>>, Refusal> {
     let mut reader = app.read().await?;
@@ -86,12 +86,12 @@ pub(super) async fn of_study(
 pub(super) async fn review(
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, access::Answer>,
-    OnceWith(once, decision): OnceWith<access::Answer, Decision>,
+    IdempotentWith(request, decision): IdempotentWith<access::Answer, Decision>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = safety_review::give(&mut writer, &once.caller, id, &decision).await?;
-    once.done(&app, writer, &row).await
+    let row = safety_review::give(&mut writer, &request.caller, id, &decision).await?;
+    request.done(&app, writer, &row).await
 }

@@ -1,9 +1,9 @@
 //! REST: ask and tell, for lab scripts that evaluate trials.
 
 use crate::AppState;
-use crate::once::OnceWith;
+use crate::accessible::Id;
+use crate::idempotent::IdempotentWith;
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::Run;
@@ -32,18 +32,18 @@ const TRIES: usize = 20;
 pub(super) async fn ask(
     State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    OnceWith(once, ask): OnceWith<Run, Ask>,
+    IdempotentWith(request, ask): IdempotentWith<Run, Ask>,
 ) -> Result<Response, Refusal> {
-    let worker = ask.worker.as_deref().unwrap_or(&once.caller.name).trim();
+    let worker = ask.worker.as_deref().unwrap_or(&request.caller.name).trim();
     for _ in 0..TRIES {
         let beliefs = Arc::clone(&app.beliefs);
         let suggestion = script::suggest(app.store_mut(), id, worker, &beliefs).await;
-        let mut writer = match once.begin(&app).await? {
+        let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return Ok(before),
         };
-        if let Some(trial) = script::give_out(&mut writer, &once.caller, worker, &suggestion?).await? {
-            return once.done(&app, writer, &trial).await;
+        if let Some(trial) = script::give_out(&mut writer, &request.caller, worker, &suggestion?).await? {
+            return request.done(&app, writer, &trial).await;
         }
     }
     Err(Error::conflict("The study is changing too fast. Try again.").into())
@@ -65,16 +65,16 @@ pub(super) async fn ask(
 pub(super) async fn tell(
     State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    OnceWith(once, tell): OnceWith<Run, Tell>,
+    IdempotentWith(request, tell): IdempotentWith<Run, Tell>,
 ) -> Result<Response, Refusal> {
     for _ in 0..TRIES {
         let heard = script::hear(app.store_mut(), id, &tell).await;
-        let mut writer = match once.begin(&app).await? {
+        let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return Ok(before),
         };
-        if let Some(trial) = script::record(&mut writer, &once.caller, id, &heard?).await? {
-            return once.done(&app, writer, &trial).await;
+        if let Some(trial) = script::record(&mut writer, &request.caller, id, &heard?).await? {
+            return request.done(&app, writer, &trial).await;
         }
     }
     Err(Error::conflict("The study is changing too fast. Try again.").into())

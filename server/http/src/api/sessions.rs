@@ -1,11 +1,11 @@
 //! REST: sessions of users.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::Once;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -27,15 +27,15 @@ use std::cmp::Reverse;
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn list(
-    may: May<Anything>,
+    authorized: Authorized<Anything>,
     State(app): State<AppState>,
     paging: Paging<(Reverse<Instant>, SessionId)>,
 ) -> Result<Json<Page<Session>>, Refusal> {
     let at = |session: &Session| (Reverse(session.created_at), session.id);
     let mut reader = app.read().await?;
     let now = app.access.clock.now(&mut reader).await?;
-    let of = match may.caller.user {
-        _ if may.caller.may(Right::Administer) => None,
+    let of = match authorized.caller.user {
+        _ if authorized.caller.may(Right::Administer) => None,
         // A token has no sessions.
         None => return Ok(Json(paging.page(Vec::new(), at)?)),
         own => own,
@@ -58,16 +58,16 @@ pub(super) async fn list(
 pub(super) async fn end(
     State(app): State<AppState>,
     Id(id, _): Id<SessionId, Anything>,
-    once: Once<Anything>,
+    request: Idempotent<Anything>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
     let session = sessions::get(&mut writer, id)
         .await?
-        .filter(|session| once.caller.may(Right::Administer) || once.caller.user == Some(session.user_id));
+        .filter(|session| request.caller.may(Right::Administer) || request.caller.user == Some(session.user_id));
     let session = session.ok_or_else(|| Error::NotFound { what: "session".to_owned(), id: id.to_string() })?;
-    sign_in::end(&mut writer, &once.actor, &session).await?;
-    once.done(&app, writer, &session).await
+    sign_in::end(&mut writer, &request.actor, &session).await?;
+    request.done(&app, writer, &session).await
 }

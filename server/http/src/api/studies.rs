@@ -1,11 +1,11 @@
 //! REST: studies.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::{Once, OnceWith};
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use crate::revision::{IfMatch, tagged};
 use axum::Json;
 use axum::extract::State;
@@ -63,14 +63,14 @@ pub(super) struct Filter {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(app): State<AppState>,
     paging: Paging<StudyId, Filter>,
 ) -> Result<Json<Page<StudyView>>, Refusal> {
     let mut reader = app.read().await?;
     let Filter { subject_id, state } = paging.filter;
     let chosen = Chosen { subject: subject_id, state, before: paging.after, limit: paging.to_read() };
-    let found = studies::page(&mut reader, may.caller.reach(), chosen).await?;
+    let found = studies::page(&mut reader, authorized.caller.reach(), chosen).await?;
     let (found, next) = paging.page(found, |study| study.id)?.into_parts();
     let mut views = Vec::with_capacity(found.len());
     for study in found {
@@ -97,7 +97,7 @@ pub(super) async fn list(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
 ) -> Result<Response, Refusal> {
@@ -121,14 +121,14 @@ pub(super) async fn get(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    OnceWith(once, new): OnceWith<Run, NewStudy>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewStudy>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = plan::create_by(&mut writer, &once.caller, new).await?;
-    made(&app, &once, writer, study).await
+    let study = plan::create_by(&mut writer, &request.caller, new).await?;
+    made(&app, &request, writer, study).await
 }
 
 /// Reason for a command.
@@ -156,9 +156,9 @@ pub(super) async fn start(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    OnceWith(once, why): OnceWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, Why>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &once, Act::Start, &why).await
+    act(&app, id, expected, &request, Act::Start, &why).await
 }
 
 /// Pause a study
@@ -178,9 +178,9 @@ pub(super) async fn pause(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    OnceWith(once, why): OnceWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, Why>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &once, Act::Pause, &why).await
+    act(&app, id, expected, &request, Act::Pause, &why).await
 }
 
 /// Resume a study
@@ -198,9 +198,9 @@ pub(super) async fn resume(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    OnceWith(once, why): OnceWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, Why>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &once, Act::Resume, &why).await
+    act(&app, id, expected, &request, Act::Resume, &why).await
 }
 
 /// Stop a study
@@ -220,28 +220,28 @@ pub(super) async fn stop(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    OnceWith(once, why): OnceWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, Why>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &once, Act::Stop, &why).await
+    act(&app, id, expected, &request, Act::Stop, &why).await
 }
 
 async fn act(
     app: &AppState,
     id: StudyId,
     expected: IfMatch,
-    once: &Once<Run>,
+    request: &Idempotent<Run>,
     act: Act,
     why: &Why,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(app).await? {
+    let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let done = command::act(&mut writer, &once.actor, id, act, &why.reason).await?;
+    let done = command::act(&mut writer, &request.actor, id, act, &why.reason).await?;
     let revision = done.study.revision;
     let view = StudyView::of(&mut writer, done.study).await?;
-    let answer = once.done(app, writer, &view).await?;
+    let answer = request.done(app, writer, &view).await?;
     for trial in done.cancelled {
         app.scheduler.cancel_solve(trial).await;
     }
@@ -265,17 +265,17 @@ pub(super) async fn patch(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    OnceWith(once, new): OnceWith<Run, Change>,
+    IdempotentWith(request, new): IdempotentWith<Run, Change>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let study = change::change(&mut writer, &once.actor, id, &new).await?;
+    let study = change::change(&mut writer, &request.actor, id, &new).await?;
     let revision = study.revision;
     let view = StudyView::of(&mut writer, study).await?;
-    Ok(tagged(once.done(&app, writer, &view).await?, revision))
+    Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
 /// Raise the trial budget of a study
@@ -295,17 +295,17 @@ pub(super) async fn extend(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    OnceWith(once, more): OnceWith<Run, Extend>,
+    IdempotentWith(request, more): IdempotentWith<Run, Extend>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let study = change::extend(&mut writer, &once.actor, id, &more).await?;
+    let study = change::extend(&mut writer, &request.actor, id, &more).await?;
     let revision = study.revision;
     let view = StudyView::of(&mut writer, study).await?;
-    Ok(tagged(once.done(&app, writer, &view).await?, revision))
+    Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
 /// Fork a study
@@ -324,18 +324,23 @@ pub(super) async fn extend(
 pub(super) async fn fork(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    OnceWith(once, differs): OnceWith<Run, Fork>,
+    IdempotentWith(request, differs): IdempotentWith<Run, Fork>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = change::fork(&mut writer, &once.actor, id, &differs).await?;
-    made(&app, &once, writer, study).await
+    let study = change::fork(&mut writer, &request.actor, id, &differs).await?;
+    made(&app, &request, writer, study).await
 }
 
-async fn made(app: &AppState, once: &Once<Run>, mut writer: LentWriter<'_>, study: Study) -> Result<Response, Refusal> {
+async fn made(
+    app: &AppState,
+    request: &Idempotent<Run>,
+    mut writer: LentWriter<'_>,
+    study: Study,
+) -> Result<Response, Refusal> {
     let (location, revision) = (format!("/api/v1/studies/{}", study.id), study.revision);
     let view = StudyView::of(&mut writer, study).await?;
-    Ok(tagged(once.created(app, writer, location, &view).await?, revision))
+    Ok(tagged(request.created(app, writer, location, &view).await?, revision))
 }

@@ -1,18 +1,18 @@
 //! REST: subjects, with consents, corrections and muscle measurements.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::OnceWith;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::muscle::MuscleParameters;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
-use gaitwright_service::studies::person::{self, NewCorrection, NewSubject};
+use gaitwright_service::studies::subject::{self, NewCorrection, NewSubject};
 use gaitwright_store::consents::{self, Consent};
 use gaitwright_store::subjects::{self, Correction, Subject};
 use gaitwright_store::{SubjectId, schema};
@@ -29,7 +29,7 @@ use gaitwright_store::{SubjectId, schema};
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     paging: Paging<SubjectId>,
 ) -> Result<Json<Page<Subject>>, Refusal> {
@@ -48,7 +48,7 @@ pub(super) async fn list(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
 ) -> Result<Json<Subject>, Refusal> {
@@ -67,15 +67,15 @@ pub(super) async fn get(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    OnceWith(once, new): OnceWith<Run, NewSubject>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewSubject>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let subject = person::add(&mut writer, &once.actor, &new).await?;
+    let subject = subject::add(&mut writer, &request.actor, &new).await?;
     let location = format!("/api/v1/subjects/{}", subject.id);
-    once.created(&app, writer, location, &subject).await
+    request.created(&app, writer, location, &subject).await
 }
 
 /// List consents of a subject
@@ -91,7 +91,7 @@ pub(super) async fn create(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn consents(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
     paging: Paging<i64>,
@@ -115,14 +115,14 @@ pub(super) async fn consents(
 pub(super) async fn consent(
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
-    OnceWith(once, new): OnceWith<Run, NewConsent>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewConsent>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = consent::give(&mut writer, &once.actor, id, &new).await?;
-    once.done(&app, writer, &row).await
+    let row = consent::give(&mut writer, &request.actor, id, &new).await?;
+    request.done(&app, writer, &row).await
 }
 
 /// Withdraw consent
@@ -141,14 +141,14 @@ pub(super) async fn consent(
 pub(super) async fn withdraw(
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
-    OnceWith(once, why): OnceWith<Run, Withdrawal>,
+    IdempotentWith(request, why): IdempotentWith<Run, Withdrawal>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let (row, cancelled) = consent::withdraw(&mut writer, &once.actor, id, &why).await?;
-    let answer = once.done(&app, writer, &row).await?;
+    let (row, cancelled) = consent::withdraw(&mut writer, &request.actor, id, &why).await?;
+    let answer = request.done(&app, writer, &row).await?;
     for trial in cancelled {
         app.scheduler.cancel_solve(trial).await;
     }
@@ -168,7 +168,7 @@ pub(super) async fn withdraw(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn corrections(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
     paging: Paging<i64>,
@@ -194,14 +194,14 @@ pub(super) async fn corrections(
 pub(super) async fn correct(
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
-    OnceWith(once, new): OnceWith<Run, NewCorrection>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewCorrection>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = person::correct(&mut writer, &once.actor, id, &new).await?;
-    once.done(&app, writer, &row).await
+    let row = subject::correct(&mut writer, &request.actor, id, &new).await?;
+    request.done(&app, writer, &row).await
 }
 
 /// Get measured muscle values of a subject
@@ -217,7 +217,7 @@ pub(super) async fn correct(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn muscles(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
 ) -> Result<Json<MuscleParameters>, Refusal> {
@@ -242,12 +242,12 @@ pub(super) async fn muscles(
 pub(super) async fn set_muscles(
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
-    OnceWith(once, muscles): OnceWith<Run, MuscleParameters>,
+    IdempotentWith(request, muscles): IdempotentWith<Run, MuscleParameters>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    person::set_muscles(&mut writer, &once.actor, id, &muscles).await?;
-    once.done(&app, writer, &muscles).await
+    subject::set_muscles(&mut writer, &request.actor, id, &muscles).await?;
+    request.done(&app, writer, &muscles).await
 }

@@ -1,12 +1,12 @@
 //! REST: suggestions.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::OnceWith;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -28,9 +28,9 @@ use gaitwright_store::{StudyId, studies};
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<i64>,
 ) -> Result<Json<Page<FeedbackRow>>, Refusal> {
     let mut reader = app.read().await?;
@@ -55,14 +55,14 @@ pub(super) async fn of_study(
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, access::Answer>,
-    OnceWith(once, new): OnceWith<access::Answer, Suggestion>,
+    IdempotentWith(request, new): IdempotentWith<access::Answer, Suggestion>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let given = suggestion::give(&mut writer, &once.caller, id, &new).await?;
+    let given = suggestion::give(&mut writer, &request.caller, id, &new).await?;
     let row = feedback::get(&mut writer, given).await?;
     let location = format!("/api/v1/preferences/{given}");
-    once.created(&app, writer, location, &row).await
+    request.created(&app, writer, location, &row).await
 }

@@ -1,11 +1,11 @@
 //! REST: tokens of programs.
 
 use crate::AppState;
-use crate::may::May;
-use crate::once::{Once, OnceWith};
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -22,7 +22,7 @@ pub(super) struct MadeToken {
     /// The token.
     #[serde(flatten)]
     token: Token,
-    /// Secret, shown once. Send it as `Authorization: Bearer SECRET`.
+    /// Secret, shown request. Send it as `Authorization: Bearer SECRET`.
     secret: String,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct MadeToken {
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn list(
-    _: May<Administer>,
+    _: Authorized<Administer>,
     State(app): State<AppState>,
     paging: Paging<TokenId>,
 ) -> Result<Json<Page<Token>>, Refusal> {
@@ -57,7 +57,7 @@ pub(super) async fn list(
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn get(
-    _: May<Administer>,
+    _: Authorized<Administer>,
     State(app): State<AppState>,
     Id(id, _): Id<TokenId, Administer>,
 ) -> Result<Json<Token>, Refusal> {
@@ -79,12 +79,12 @@ pub(super) async fn get(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    OnceWith(once, new): OnceWith<Administer, NewToken>,
+    IdempotentWith(request, new): IdempotentWith<Administer, NewToken>,
 ) -> Result<Response, Refusal> {
-    let mut writer = once.begin_secret(&app).await?;
-    let (token, secret) = making::make(&mut writer, &once.actor, &new).await?;
+    let mut writer = request.begin_secret(&app).await?;
+    let (token, secret) = making::make(&mut writer, &request.actor, &new).await?;
     let location = format!("/api/v1/tokens/{}", token.id);
-    once.created(&app, writer, location, &MadeToken { token, secret }).await
+    request.created(&app, writer, location, &MadeToken { token, secret }).await
 }
 
 /// Revoke a token
@@ -100,12 +100,12 @@ pub(super) async fn create(
 pub(super) async fn revoke(
     State(app): State<AppState>,
     Id(id, _): Id<TokenId, Administer>,
-    once: Once<Administer>,
+    request: Idempotent<Administer>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let token = making::revoke(&mut writer, &once.actor, id).await?;
-    once.done(&app, writer, &token).await
+    let token = making::revoke(&mut writer, &request.actor, id).await?;
+    request.done(&app, writer, &token).await
 }

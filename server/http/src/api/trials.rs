@@ -1,13 +1,13 @@
 //! REST: trials.
 
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::csv_answer::csv_answer;
-use crate::may::May;
-use crate::once::Once;
+use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -58,9 +58,9 @@ fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<u32, Filter>,
 ) -> Result<Json<Page<Trial>>, Refusal> {
     let (sort, descending) = order(paging.filter.sort.as_deref().unwrap_or("number"))?;
@@ -101,9 +101,9 @@ pub(super) async fn of_study(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     table(&mut app, id).await
 }
@@ -119,9 +119,9 @@ pub(super) async fn of_study_csv(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<Trial>, Refusal> {
     Ok(Json(trials::get(&mut *app.read().await?, id).await?))
 }
@@ -141,14 +141,14 @@ pub(super) async fn get(
 pub(super) async fn cancel(
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    once: Once<Run>,
+    request: Idempotent<Run>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let trial = command::cancel(&mut writer, &once.actor, id, "cancelled on request").await?;
-    let answer = once.done(&app, writer, &trial).await?;
+    let trial = command::cancel(&mut writer, &request.actor, id, "cancelled on request").await?;
+    let answer = request.done(&app, writer, &trial).await?;
     app.scheduler.cancel_solve(id).await;
     Ok(answer)
 }
@@ -168,14 +168,14 @@ pub(super) async fn cancel(
 pub(super) async fn retry(
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    once: Once<Run>,
+    request: Idempotent<Run>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let trial = command::retry(&mut writer, &once.actor, id).await?;
-    once.done(&app, writer, &trial).await
+    let trial = command::retry(&mut writer, &request.actor, id).await?;
+    request.done(&app, writer, &trial).await
 }
 
 /// List iterations of a solve
@@ -191,9 +191,9 @@ pub(super) async fn retry(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn iterations(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<IterationRecord>>, Refusal> {
     let records = if let Some(track) = app.scheduler.board().track(id) {
@@ -218,9 +218,9 @@ pub(super) async fn iterations(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn attempts(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
     paging: Paging<u32>,
 ) -> Result<Json<Page<AttemptResult>>, Refusal> {
     let attempts = results::of_trial(&mut *app.read().await?, id).await?;

@@ -1,12 +1,12 @@
 //! REST: users and one-time sign-in links.
 
 use crate::AppState;
-use crate::may::May;
-use crate::may::SignedIn;
-use crate::once::{Once, OnceWith};
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::authorization::SignedIn;
+use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
-use crate::reached::Id;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -58,7 +58,7 @@ pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> 
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn list(
-    _: May<Administer>,
+    _: Authorized<Administer>,
     State(app): State<AppState>,
     paging: Paging<UserId>,
 ) -> Result<Json<Page<User>>, Refusal> {
@@ -77,7 +77,7 @@ pub(super) async fn list(
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn get(
-    _: May<Administer>,
+    _: Authorized<Administer>,
     State(app): State<AppState>,
     Id(id, _): Id<UserId, Administer>,
 ) -> Result<Json<User>, Refusal> {
@@ -96,14 +96,14 @@ pub(super) async fn get(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    OnceWith(once, new): OnceWith<Administer, NewUser>,
+    IdempotentWith(request, new): IdempotentWith<Administer, NewUser>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let user = people::add(&mut writer, &once.actor, &new).await?;
-    once.created(&app, writer, format!("/api/v1/users/{}", user.id), &user).await
+    let user = people::add(&mut writer, &request.actor, &new).await?;
+    request.created(&app, writer, format!("/api/v1/users/{}", user.id), &user).await
 }
 
 /// One-time sign-in link.
@@ -129,11 +129,11 @@ pub(super) struct Link {
 pub(super) async fn link(
     State(app): State<AppState>,
     Id(id, _): Id<UserId, Administer>,
-    once: Once<Administer>,
+    request: Idempotent<Administer>,
 ) -> Result<Response, Refusal> {
-    let mut writer = once.begin_secret(&app).await?;
-    let secret = people::link(&mut writer, &once.actor, id).await?;
-    once.done(&app, writer, &Link { path: format!("/sign-in/{secret}") }).await
+    let mut writer = request.begin_secret(&app).await?;
+    let secret = people::link(&mut writer, &request.actor, id).await?;
+    request.done(&app, writer, &Link { path: format!("/sign-in/{secret}") }).await
 }
 
 /// Disable a user
@@ -151,9 +151,9 @@ pub(super) async fn link(
 pub(super) async fn disable(
     State(app): State<AppState>,
     Id(id, _): Id<UserId, Administer>,
-    once: Once<Administer>,
+    request: Idempotent<Administer>,
 ) -> Result<Response, Refusal> {
-    set_disabled(&app, id, &once, true).await
+    set_disabled(&app, id, &request, true).await
 }
 
 /// Enable a user
@@ -169,9 +169,9 @@ pub(super) async fn disable(
 pub(super) async fn enable(
     State(app): State<AppState>,
     Id(id, _): Id<UserId, Administer>,
-    once: Once<Administer>,
+    request: Idempotent<Administer>,
 ) -> Result<Response, Refusal> {
-    set_disabled(&app, id, &once, false).await
+    set_disabled(&app, id, &request, false).await
 }
 
 /// New role of a user.
@@ -198,26 +198,26 @@ pub(super) struct NewRole {
 pub(super) async fn set_role(
     State(app): State<AppState>,
     Id(id, _): Id<UserId, Administer>,
-    OnceWith(once, new): OnceWith<Administer, NewRole>,
+    IdempotentWith(request, new): IdempotentWith<Administer, NewRole>,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(&app).await? {
+    let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let user = people::set_role(&mut writer, &once.actor, id, new.role).await?;
-    once.done(&app, writer, &user).await
+    let user = people::set_role(&mut writer, &request.actor, id, new.role).await?;
+    request.done(&app, writer, &user).await
 }
 
 async fn set_disabled(
     app: &AppState,
     id: UserId,
-    once: &Once<Administer>,
+    request: &Idempotent<Administer>,
     disabled: bool,
 ) -> Result<Response, Refusal> {
-    let mut writer = match once.begin(app).await? {
+    let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let user = people::set_disabled(&mut writer, &once.actor, id, disabled).await?;
-    once.done(app, writer, &user).await
+    let user = people::set_disabled(&mut writer, &request.actor, id, disabled).await?;
+    request.done(app, writer, &user).await
 }

@@ -2,8 +2,8 @@
 
 use super::error::{Page, page};
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
@@ -46,7 +46,11 @@ impl AccessLogPage {
 }
 
 /// `GET /access-log`.
-pub(super) async fn get(_: May<Administer>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+pub(super) async fn get(
+    _: Authorized<Administer>,
+    State(app): State<AppState>,
+    Params(choice): Params<Choice>,
+) -> Page {
     app.access.log.write(app.store(), true).await?;
     let mut reader = app.read().await?;
     let subject = match choice.subject {

@@ -3,8 +3,8 @@
 use super::error::{Page, page};
 use super::format::words;
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
@@ -70,7 +70,11 @@ impl AuditPage {
 }
 
 /// `GET /audit`.
-pub(super) async fn get(_: May<Administer>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+pub(super) async fn get(
+    _: Authorized<Administer>,
+    State(app): State<AppState>,
+    Params(choice): Params<Choice>,
+) -> Page {
     let mut reader = app.read().await?;
     let mut rows = audit::page(&mut reader, choice.contains.trim(), choice.before, PAGE + 1).await?;
     let more = rows.len() > PAGE as usize;

@@ -5,9 +5,9 @@ use super::error::{Page, page};
 use super::format::{self, meaning, percent, signed};
 use super::study::answer_in_words;
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use gait_learner::{Agreement, Dimension, LearnerError, Marginal, SearchSpace};
@@ -89,9 +89,9 @@ struct AnswerRow {
 
 /// `GET /studies/{id}/belief`.
 pub(super) async fn get(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
     let study = studies::get(&mut *app.read().await?, id).await?;

@@ -3,8 +3,8 @@
 use super::error::PageError;
 use super::format;
 use crate::AppState;
-use crate::may::May;
-use crate::reached::Id;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};
@@ -80,7 +80,7 @@ impl CheckInWords {
 
 /// `POST /trials/{id}/certify`.
 pub(super) async fn post(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
@@ -88,7 +88,7 @@ pub(super) async fn post(
         certification::begin(&mut *app.read().await.map_err(gaitwright_service::error::Error::from)?, id).await?;
     let certificate = certification::certificate(app.store_mut(), begun).await?;
     let mut writer = app.write().await?;
-    certification::record(&mut writer, &may.caller.actor, id, &certificate).await?;
+    certification::record(&mut writer, &authorized.caller.actor, id, &certificate).await?;
     commit(writer).await?;
     Ok(Redirect::to(&format!("/trials/{id}#certificate")))
 }

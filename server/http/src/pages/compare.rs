@@ -6,11 +6,11 @@ use super::figures;
 use super::refusal;
 use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
-use crate::may::May;
 use crate::problem::Problem;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -138,15 +138,15 @@ const CERTIFIED_AT_ONCE: usize = 10;
 
 /// `GET /studies/{id}/compare`.
 pub(super) async fn get(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
     // The default author is the signed-in user, and the default source is a clinician.
     let mut typed = Submitted::default();
-    if may.caller.user.is_some() {
-        (typed.author, typed.source) = (may.caller.name, Source::Clinician.as_str().to_owned());
+    if authorized.caller.user.is_some() {
+        (typed.author, typed.source) = (authorized.caller.name, Source::Clinician.as_str().to_owned());
     }
     if choice.a.is_some() && choice.a == choice.b {
         let refused = "Gait A and gait B are the same. Choose two different gaits.".to_owned();
@@ -369,12 +369,12 @@ const LABELS: [(&str, &str); 6] = [
 
 /// `POST /studies/{id}/compare`.
 pub(super) async fn post(
-    may: May<access::Answer>,
+    authorized: Authorized<access::Answer>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, access::Answer>,
+    Visible(id, _): Visible<StudyId, access::Answer>,
     Form(form): Form<Submitted>,
 ) -> Result<Response, PageError> {
-    let (saved, status, why) = match give(&app, &may.caller, id, &form).await {
+    let (saved, status, why) = match give(&app, &authorized.caller, id, &form).await {
         Ok(Given::Saved(saved)) => {
             return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")).into_response());
         }
@@ -401,7 +401,7 @@ pub(super) async fn post(
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
     let (said, key) = form.read()?;
     let mut writer = app.write().await?;
-    // The key of the form makes a repeated form (double click, reload, two tabs) count once.
+    // The key of the form makes a repeated form (double click, reload, two tabs) count request.
     let key = format!("form {key}");
     let request = form.fingerprint(id);
     if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
@@ -446,7 +446,7 @@ pub(super) struct Retract {
 
 /// `POST /studies/{id}/retract`.
 pub(super) async fn retract(
-    may: May<access::Answer>,
+    authorized: Authorized<access::Answer>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, access::Answer>,
     Form(form): Form<Retract>,
@@ -455,10 +455,10 @@ pub(super) async fn retract(
     let author = Some(form.author.as_str());
     match form.saved {
         Recorded::Preference(given) => {
-            answer::retract(&mut writer, &may.caller, Some(id), given, author, &form.reason).await?;
+            answer::retract(&mut writer, &authorized.caller, Some(id), given, author, &form.reason).await?;
         }
         Recorded::Assessment(made) => {
-            assessment::retract(&mut writer, &may.caller, Some(id), made, (author, &form.reason)).await?;
+            assessment::retract(&mut writer, &authorized.caller, Some(id), made, (author, &form.reason)).await?;
         }
     }
     commit(writer).await?;

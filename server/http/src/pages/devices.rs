@@ -3,9 +3,9 @@
 use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Form;
-use crate::may::May;
-use crate::reached::Id;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -26,7 +26,7 @@ struct DevicesPage {
 }
 
 /// `GET /devices`.
-pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Page {
+pub(super) async fn list(_: Authorized<Read>, State(app): State<AppState>) -> Page {
     page(&DevicesPage { devices: devices::all(&mut *app.read().await?).await? })
 }
 
@@ -81,14 +81,18 @@ impl DevicePage {
 }
 
 /// `GET /devices/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<DeviceId, Read>) -> Page {
+pub(super) async fn get(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<DeviceId, Read>,
+) -> Page {
     let device = devices::get(&mut *app.read().await?, id).await?;
-    page(&DevicePage::of(device, may.caller.may(Run::NEEDED)))
+    page(&DevicePage::of(device, authorized.caller.may(Run::NEEDED)))
 }
 
 /// `POST /devices/{id}`: another device, made of this one.
 pub(super) async fn post(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<DeviceId, Run>,
     Form(typed): Form<Typed>,
@@ -96,7 +100,7 @@ pub(super) async fn post(
     let before = devices::get(&mut *app.read().await?, id).await?;
     let mut writer = app.write().await?;
     let added = match changed(&before.definition, &typed) {
-        Ok(definition) => device::add(&mut writer, &may.caller.actor, &definition).await,
+        Ok(definition) => device::add(&mut writer, &authorized.caller.actor, &definition).await,
         Err(error) => Err(error),
     };
     match added {

@@ -3,8 +3,8 @@
 use super::error::PageError;
 use super::format;
 use crate::AppState;
-use crate::may::May;
-use crate::reached::Id;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::Violation;
@@ -45,12 +45,12 @@ impl NoGait {
 
 /// `POST /trials/{id}/explain`.
 pub(super) async fn post(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    explanation::ask(&mut writer, &may.caller.actor, id, app.scheduler.explaining(id)).await?;
+    explanation::ask(&mut writer, &authorized.caller.actor, id, app.scheduler.explaining(id)).await?;
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}#explanation")))

@@ -5,10 +5,10 @@ use super::error::{Page, page};
 use super::side_by_side::Side;
 use super::{lab_charts, study};
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
-use crate::reached::{Named, reached};
-use crate::shown::Shown;
+use crate::accessible::{Named, accessible};
+use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
@@ -274,9 +274,9 @@ pub(super) struct Beside {
 
 /// `GET /studies/{id}/figures`.
 pub(super) async fn get(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     Params(beside): Params<Beside>,
 ) -> Page {
     let other = match beside.other.as_deref() {
@@ -285,8 +285,8 @@ pub(super) async fn get(
             Some(text.parse::<Named<StudyId>>().map_err(|_| Error::invalid("other", text, "a study from the list"))?)
         }
     };
-    let reach = may.caller.reach();
-    let other = reached(&mut *app.read().await?, reach, other).await?;
+    let reach = authorized.caller.reach();
+    let other = accessible(&mut *app.read().await?, reach, other).await?;
     let StudyFigures { study, best, without_gait, sections, .. } = of_study(&mut app, id, other).await?;
     let mut reader = app.read().await?;
     let mut offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;

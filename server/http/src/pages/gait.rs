@@ -7,8 +7,8 @@ use super::error::{Page, page};
 use super::explanation::NoGait;
 use super::format::{self, words};
 use crate::AppState;
-use crate::may::May;
-use crate::shown::Shown;
+use crate::authorization::Authorized;
+use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
@@ -66,7 +66,11 @@ impl GaitPage {
 }
 
 /// `GET /trials/{id}`.
-pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(id, _): Shown<TrialId, Read>) -> Page {
+pub(super) async fn get(
+    authorized: Authorized<Read>,
+    State(mut app): State<AppState>,
+    Visible(id, _): Visible<TrialId, Read>,
+) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;
@@ -86,10 +90,10 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(i
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     let last_event = events::last(&mut reader, study.id).await?;
     let explained = explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await?;
-    let may_run = may.caller.may(Run::NEEDED);
-    let reviews = may.caller.may(Answer::NEEDED);
+    let may_run = authorized.caller.may(Run::NEEDED);
+    let reviews = authorized.caller.may(Answer::NEEDED);
     // Without sign-in the name is unknown.
-    let reviewer = reviews.then(|| may.caller.user.map_or_else(String::new, |_| may.caller.name));
+    let reviewer = reviews.then(|| authorized.caller.user.map_or_else(String::new, |_| authorized.caller.name));
     drop(reader);
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();

@@ -3,9 +3,9 @@
 use super::error::{Page, page};
 use super::format::{variant, words};
 use crate::AppState;
+use crate::authorization::SignedIn;
+use crate::authorization::{Authorized, Refused};
 use crate::extract::Params;
-use crate::may::SignedIn;
-use crate::may::{May, Refused};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -63,19 +63,19 @@ struct Waiting {
 /// `GET /`: the studies; for whoever may compare gaits and nothing else, that.
 pub(super) async fn get(
     SignedIn(caller): SignedIn,
-    may: Result<May<Read>, Refused>,
+    authorized: Result<Authorized<Read>, Refused>,
     State(app): State<AppState>,
     Params(Before { before }): Params<Before>,
 ) -> Result<Response, Refused> {
-    match may {
-        Ok(may) => Ok(show(&app, &may, before).await.into_response()),
+    match authorized {
+        Ok(authorized) => Ok(show(&app, &authorized, before).await.into_response()),
         Err(_) if caller.is_some_and(|caller| caller.may(Rate::NEEDED)) => Ok(Redirect::to("/rate").into_response()),
         Err(refused) => Err(refused),
     }
 }
 
-async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page {
-    let reach = may.caller.reach();
+async fn show(app: &AppState, authorized: &Authorized<Read>, before: Option<StudyId>) -> Page {
+    let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
     let mut found = studies::page(&mut reader, reach, Chosen { before, ..Chosen::newest(PAGE + 1) }).await?;
     let more = found.len() > PAGE as usize;
@@ -88,7 +88,7 @@ async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page 
     let unsafe_gaits = safety_reports::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
     let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
     let waiting = unsafe_gaits.chain(held).collect();
-    let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
+    let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
     page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
 }
 

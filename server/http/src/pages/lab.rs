@@ -8,11 +8,11 @@ use super::lab_charts;
 use super::measurement_files::{Forms, Settings};
 use super::refusal;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Form;
-use crate::may::May;
 use crate::problem::Problem;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -73,8 +73,12 @@ impl Fields {
 }
 
 /// `GET /studies/{id}/lab`.
-pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Shown(id, _): Shown<StudyId, Read>) -> Page {
-    show_list(&app, id, may.caller.may(Run::NEEDED), Fields::default(), None).await
+pub(super) async fn list(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    Visible(id, _): Visible<StudyId, Read>,
+) -> Page {
+    show_list(&app, id, authorized.caller.may(Run::NEEDED), Fields::default(), None).await
 }
 
 async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, refused: Option<String>) -> Page {
@@ -113,7 +117,7 @@ const LABELS: [(&str, &str); 3] = [("gait_one", "Gait one"), ("gait_two", "Gait 
 
 /// `POST /studies/{id}/lab`.
 pub(super) async fn plan(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     Form(fields): Form<Fields>,
@@ -121,7 +125,7 @@ pub(super) async fn plan(
     let planned = async {
         let new = fields.read()?;
         let mut writer = app.write().await?;
-        let session = lab::plan(&mut writer, &may.caller.actor, id, &new).await?;
+        let session = lab::plan(&mut writer, &authorized.caller.actor, id, &new).await?;
         commit(writer).await?;
         Ok(session.id)
     };
@@ -237,11 +241,11 @@ struct WalkRow {
 
 /// `GET /lab-sessions/{id}`.
 pub(super) async fn get(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Read>,
+    Visible(id, _): Visible<LabSessionId, Read>,
 ) -> Page {
-    show(&mut app, id, &may.caller, Forms::default(), None).await
+    show(&mut app, id, &authorized.caller, Forms::default(), None).await
 }
 
 /// The charts of a session.
@@ -319,36 +323,36 @@ pub(super) struct Note {
 
 /// `POST /lab-sessions/{id}/close`.
 pub(super) async fn close(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(Note { note }): Form<Note>,
 ) -> Result<Response, PageError> {
     let done = async {
         let mut writer = app.write().await?;
-        lab::close(&mut writer, &may.caller.actor, id, &note).await?;
+        lab::close(&mut writer, &authorized.caller.actor, id, &note).await?;
         Ok(commit(writer).await?)
     };
     let done = done.await;
-    answer(&mut app, id, &may.caller, done, Forms::default()).await
+    answer(&mut app, id, &authorized.caller, done, Forms::default()).await
 }
 
 /// `POST /lab-sessions/{id}/unblind`.
 pub(super) async fn unblind(
-    may: May<Administer>,
+    authorized: Authorized<Administer>,
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Administer>,
     Form(Note { note }): Form<Note>,
 ) -> Result<Response, PageError> {
     let done = async {
         let mut writer = app.write().await?;
-        lab::unblind(&mut writer, &may.caller.actor, id, &note).await?;
+        lab::unblind(&mut writer, &authorized.caller.actor, id, &note).await?;
         Ok(commit(writer).await?)
     };
     let done = done.await;
     // The learner may have a new preference.
     app.scheduler.changed();
-    answer(&mut app, id, &may.caller, done, Forms::default()).await
+    answer(&mut app, id, &authorized.caller, done, Forms::default()).await
 }
 
 /// Shows the session again after a change, with the reason if it was refused.

@@ -3,10 +3,10 @@
 use super::error::{Page, PageError, page};
 use super::format::walks_in_words;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Form;
-use crate::may::May;
 use crate::problem::Problem;
-use crate::reached::Id;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -40,10 +40,10 @@ struct WalkPage {
 }
 
 /// `GET /lab`.
-pub(super) async fn list(may: May<Rate>, State(app): State<AppState>) -> Page {
+pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppState>) -> Page {
     let mut reader = app.read().await?;
     let mut sessions = Vec::new();
-    for session in lab_sessions::open(&mut reader, may.caller.reach(), LISTED).await? {
+    for session in lab_sessions::open(&mut reader, authorized.caller.reach(), LISTED).await? {
         let seen = lab::in_the_lab(&mut reader, session.id).await?;
         let next = match (seen.walk, seen.asks) {
             (Some(walk), _) => format!("walk {walk} is next"),
@@ -52,12 +52,12 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>) -> Page {
         };
         sessions.push((session.id, session.created_at, next));
     }
-    let assigned = members::reaches_any(&mut reader, may.caller.reach()).await?;
+    let assigned = members::reaches_any(&mut reader, authorized.caller.reach()).await?;
     page(&LabPage { sessions, assigned })
 }
 
 /// `GET /lab/{id}`.
-pub(super) async fn get(_: May<Rate>, State(app): State<AppState>, Id(id, _): Id<LabSessionId, Rate>) -> Page {
+pub(super) async fn get(_: Authorized<Rate>, State(app): State<AppState>, Id(id, _): Id<LabSessionId, Rate>) -> Page {
     show(&app, id, None, String::new()).await
 }
 
@@ -69,7 +69,7 @@ async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: 
 
 /// `POST /lab/{id}`.
 pub(super) async fn record(
-    may: May<Rate>,
+    authorized: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
     Form(walked): Form<RecordedWalk>,
@@ -77,7 +77,7 @@ pub(super) async fn record(
     let recorded = async {
         let mut writer = app.write().await?;
         if !lab::was_recorded(&mut writer, id, &walked).await? {
-            lab::record_walk(&mut writer, &may.caller.actor, id, &walked).await?;
+            lab::record_walk(&mut writer, &authorized.caller.actor, id, &walked).await?;
             commit(writer).await?;
         }
         Ok(())
@@ -87,14 +87,14 @@ pub(super) async fn record(
 
 /// `POST /lab/{id}/answer`.
 pub(super) async fn answer(
-    may: May<Rate>,
+    authorized: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
     Form(new): Form<NewAnswer>,
 ) -> Result<Response, PageError> {
     let answered = async {
         let mut writer = app.write().await?;
-        lab::answer(&mut writer, &may.caller, id, &new).await?;
+        lab::answer(&mut writer, &authorized.caller, id, &new).await?;
         commit(writer).await?;
         app.scheduler.changed();
         Ok(())
@@ -104,13 +104,13 @@ pub(super) async fn answer(
 
 /// `POST /lab/{id}/take-back`.
 pub(super) async fn take_back(
-    may: May<Rate>,
+    authorized: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
 ) -> Result<Response, PageError> {
     let taken_back = async {
         let mut writer = app.write().await?;
-        lab::take_back(&mut writer, &may.caller, id).await?;
+        lab::take_back(&mut writer, &authorized.caller, id).await?;
         Ok(commit(writer).await?)
     };
     read_back(&app, id, taken_back.await, String::new()).await

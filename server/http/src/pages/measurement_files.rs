@@ -3,9 +3,9 @@
 use super::error::PageError;
 use super::lab;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Form;
-use crate::may::May;
-use crate::reached::Id;
 use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::emg::EmgSettings;
@@ -14,7 +14,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
     self as session, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion,
 };
-use gaitwright_service::studies::recording::Unit;
+use gaitwright_service::studies::reference_import::Unit;
 use gaitwright_store::{LabSessionId, commit};
 use serde::Deserialize;
 use std::str::FromStr;
@@ -126,37 +126,38 @@ impl MotionFields {
 
 /// `POST /lab-sessions/{id}/electromyograms`.
 pub(super) async fn electromyogram(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<EmgFields>,
 ) -> Result<Response, PageError> {
     let kept = async {
         let checked = fields.read()?.checked(app.store_mut()).await?;
-        keep(&app, &may, id, checked).await
+        keep(&app, &authorized, id, checked).await
     };
     let kept = kept.await;
-    lab::answer(&mut app, id, &may.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() }).await
+    lab::answer(&mut app, id, &authorized.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() }).await
 }
 
 /// `POST /lab-sessions/{id}/motions`.
 pub(super) async fn motion(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<MotionFields>,
 ) -> Result<Response, PageError> {
     let kept = async {
         let checked = fields.read()?.checked(app.store_mut()).await?;
-        keep(&app, &may, id, checked).await
+        keep(&app, &authorized, id, checked).await
     };
     let kept = kept.await;
-    lab::answer(&mut app, id, &may.caller, kept, Forms { motion: fields, open: "motion", ..Forms::default() }).await
+    lab::answer(&mut app, id, &authorized.caller, kept, Forms { motion: fields, open: "motion", ..Forms::default() })
+        .await
 }
 
-async fn keep(app: &AppState, may: &May<Run>, id: LabSessionId, checked: Checked) -> Result<(), Error> {
+async fn keep(app: &AppState, authorized: &Authorized<Run>, id: LabSessionId, checked: Checked) -> Result<(), Error> {
     let mut writer = app.write().await?;
-    session::keep(&mut writer, &may.caller.actor, id, &checked).await?;
+    session::keep(&mut writer, &authorized.caller.actor, id, &checked).await?;
     Ok(commit(writer).await?)
 }
 
@@ -194,7 +195,7 @@ pub(super) struct Forms {
 
 /// `POST /lab-sessions/{id}/process`.
 pub(super) async fn process(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(typed): Form<Settings>,
@@ -208,10 +209,10 @@ pub(super) async fn process(
         };
         let result = session::compute(app.store_mut(), id, settings).await?;
         let mut writer = app.write().await?;
-        session::keep_result(&mut writer, &may.caller.actor, id, &result).await?;
+        session::keep_result(&mut writer, &authorized.caller.actor, id, &result).await?;
         Ok(commit(writer).await?)
     };
     let processed = processed.await;
     let forms = Forms { filters: Some(typed), open: "filters", ..Forms::default() };
-    lab::answer(&mut app, id, &may.caller, processed, forms).await
+    lab::answer(&mut app, id, &authorized.caller, processed, forms).await
 }

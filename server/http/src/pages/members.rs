@@ -4,11 +4,11 @@ use super::error::{Page, PageError, page};
 use super::format;
 use super::users::origin;
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extract::Form;
-use crate::may::May;
 use crate::problem::Problem;
-use crate::reached::{Id, Named};
+use crate::accessible::{Id, Named};
 use askama::Template;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -44,19 +44,23 @@ impl MembersPage {
 }
 
 /// `GET /studies/{id}/members`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<StudyId, Read>) -> Page {
-    show(&app, &may.caller, id, Shown::default()).await
+pub(super) async fn get(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Read>,
+) -> Page {
+    show(&app, &authorized.caller, id, Visible::default()).await
 }
 
 /// The parts of the page that depend on the last action.
 #[derive(Default)]
-struct Shown {
+struct Visible {
     link: Option<(String, String)>,
     refused: Option<String>,
     typed: String,
 }
 
-async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Shown) -> Page {
+async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Visible) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let access = membership::access(&mut reader, id).await?;
@@ -96,7 +100,7 @@ pub(super) struct Asked {
 /// `POST /studies/{id}/members`. Answers with the page instead of a redirect, because a link is not stored and can be shown
 /// only here.
 pub(super) async fn post(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     secure: Secure,
@@ -104,7 +108,7 @@ pub(super) async fn post(
     Form(asked): Form<Asked>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
-    match act(&mut writer, &may.caller, id, &asked).await {
+    match act(&mut writer, &authorized.caller, id, &asked).await {
         Ok(invited) => {
             commit(writer).await?;
             app.scheduler.changed();
@@ -113,12 +117,12 @@ pub(super) async fn post(
                 return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());
             };
             let link = Some((name, format!("{}/sign-in/{secret}", origin(secure, &headers))));
-            Ok(show(&app, &may.caller, id, Shown { link, ..Shown::default() }).await?.into_response())
+            Ok(show(&app, &authorized.caller, id, Visible { link, ..Visible::default() }).await?.into_response())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
             drop(writer);
-            let shown = Shown { refused: Some(error.to_string()), typed: asked.name, link: None };
-            Ok((Problem::from(&error).status(), show(&app, &may.caller, id, shown).await?).into_response())
+            let shown = Visible { refused: Some(error.to_string()), typed: asked.name, link: None };
+            Ok((Problem::from(&error).status(), show(&app, &authorized.caller, id, shown).await?).into_response())
         }
         Err(error) => Err(error.into()),
     }
@@ -146,7 +150,7 @@ async fn act(
         "remove" => {
             let unknown = |_| Error::invalid("member", asked.member.as_str(), "a member of this page");
             let member: Named<MemberId> = asked.member.parse().map_err(unknown)?;
-            let member = member.reached(writer, caller.reach()).await?;
+            let member = member.accessible(writer, caller.reach()).await?;
             membership::end(writer, &caller.actor, member).await?;
             Ok(None)
         }

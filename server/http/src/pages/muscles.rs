@@ -3,17 +3,17 @@
 use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Form;
-use crate::may::May;
 use crate::problem::Problem;
-use crate::reached::Id;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::muscle::{MuscleField, MuscleOverride, MuscleParameters};
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::error::{Error, FieldError};
-use gaitwright_service::studies::person;
+use gaitwright_service::studies::subject;
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::{SubjectId, commit};
 use serde_json::{Map, Value, json};
@@ -97,17 +97,21 @@ fn is_of(refused: &str, field: &str) -> bool {
 }
 
 /// `GET /subjects/{id}/muscles`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<SubjectId, Read>) -> Page {
+pub(super) async fn get(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Page {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let muscles = subjects::muscles(&mut reader, id).await?;
     drop(reader);
-    page(&shown(subject, &muscles, may.caller.may(Run::NEEDED), None))
+    page(&shown(subject, &muscles, authorized.caller.may(Run::NEEDED), None))
 }
 
 /// `POST /subjects/{id}/muscles`.
 pub(super) async fn post(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
     Form(typed): Form<Typed>,
@@ -116,7 +120,7 @@ pub(super) async fn post(
     let subject = subjects::get(&mut writer, id).await?;
     let before = subjects::muscles(&mut writer, id).await?;
     let set = match read(&typed) {
-        Ok(muscles) => person::set_muscles(&mut writer, &may.caller.actor, id, &muscles).await,
+        Ok(muscles) => subject::set_muscles(&mut writer, &authorized.caller.actor, id, &muscles).await,
         Err(error) => Err(error),
     };
     match set {

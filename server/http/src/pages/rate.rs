@@ -3,11 +3,11 @@
 use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extract::{Form, Params};
-use crate::may::May;
 use crate::problem::Problem;
-use crate::reached::Id;
 use askama::Template;
 use axum::extract::{Path, State};
 use axum::response::{IntoResponse, Redirect, Response};
@@ -108,25 +108,29 @@ pub(super) struct Before {
 }
 
 /// `GET /rate`: the studies that may ask for a comparison.
-pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(before): Params<Before>) -> Page {
+pub(super) async fn list(
+    authorized: Authorized<Rate>,
+    State(app): State<AppState>,
+    Params(before): Params<Before>,
+) -> Page {
     let mut reader = app.read().await?;
     let saved = match before.saved {
         Some(token) => {
-            let shown = blind::own(&mut reader, &may.caller, &token).await?;
+            let shown = blind::own(&mut reader, &authorized.caller, &token).await?;
             read_back(&mut reader, shown).await?
         }
-        None => newest(&mut reader, &may.caller).await?,
+        None => newest(&mut reader, &authorized.caller).await?,
     };
-    let reach = may.caller.reach();
+    let reach = authorized.caller.reach();
     let studies = studies::asking_raters(&mut reader, reach)
         .await?
         .into_iter()
         // Names of studies can reveal what is tuned, so raters see the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
-    let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
+    let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
     let assigned = members::reaches_any(&mut reader, reach).await?;
-    let not_blind = blind::sees_or_saw_gaits(&mut reader, &may.caller).await?;
+    let not_blind = blind::sees_or_saw_gaits(&mut reader, &authorized.caller).await?;
     page(&RatePage { studies, assigned, nothing: before.nothing, saved, not_blind, no_password })
 }
 
@@ -162,11 +166,11 @@ async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, E
 
 /// `POST /rate/{id}`: takes the next pair.
 pub(super) async fn next(
-    may: May<Rate>,
+    authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Rate>,
 ) -> Result<Redirect, PageError> {
-    let (writer, shown) = blind::next(app.store_mut(), &may.caller, id).await?;
+    let (writer, shown) = blind::next(app.store_mut(), &authorized.caller, id).await?;
     commit(writer).await?;
     Ok(match shown {
         Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.presentation.token)),
@@ -175,8 +179,12 @@ pub(super) async fn next(
 }
 
 /// `GET /rate/pair/{token}`.
-pub(super) async fn pair(may: May<Rate>, State(mut app): State<AppState>, Path(token): Path<String>) -> Page {
-    show(&mut app, &may.caller, &token, None).await
+pub(super) async fn pair(
+    authorized: Authorized<Rate>,
+    State(mut app): State<AppState>,
+    Path(token): Path<String>,
+) -> Page {
+    show(&mut app, &authorized.caller, &token, None).await
 }
 
 async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> Page {
@@ -223,7 +231,7 @@ pub(super) struct Submitted {
 
 /// `POST /rate/pair/{token}`.
 pub(super) async fn answer(
-    may: May<Rate>,
+    authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
     Path(token): Path<String>,
     Form(form): Form<Submitted>,
@@ -232,33 +240,33 @@ pub(super) async fn answer(
     let answered = async {
         let mut writer = app.write().await?;
         // A form that is sent twice (double click, lost response) counts as one answer.
-        let before = blind::own(&mut writer, &may.caller, &token).await?.answer();
+        let before = blind::own(&mut writer, &authorized.caller, &token).await?.answer();
         if before != Some(given.answer) {
-            blind::answer(&mut writer, &may.caller, &token, &given).await?;
+            blind::answer(&mut writer, &authorized.caller, &token, &given).await?;
             commit(writer).await?;
             app.scheduler.changed();
         }
         Ok(())
     };
     let answered = answered.await;
-    told(&mut app, &may.caller, &token, answered).await
+    told(&mut app, &authorized.caller, &token, answered).await
 }
 
 /// `POST /rate/pair/{token}/take-back`.
 pub(super) async fn take_back(
-    may: May<Rate>,
+    authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Response, PageError> {
     let taken_back = async {
         let mut writer = app.write().await?;
-        blind::take_back(&mut writer, &may.caller, &token).await?;
+        blind::take_back(&mut writer, &authorized.caller, &token).await?;
         commit(writer).await?;
         app.scheduler.changed();
         Ok(())
     };
     let taken_back = taken_back.await;
-    told(&mut app, &may.caller, &token, taken_back).await
+    told(&mut app, &authorized.caller, &token, taken_back).await
 }
 
 /// Redirects after an action; a conflict is shown on the page of the pair.

@@ -4,16 +4,17 @@ use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::figures;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::{Form as Submitted, Params};
-use crate::may::May;
-use crate::reached::Id;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::error::{Error, FieldError};
-use gaitwright_service::studies::recording::{self, Form, Match, NewReferenceGait, Strikes, Unit};
+use gaitwright_service::studies::nearest_reference::{self, Match};
+use gaitwright_service::studies::reference_import::{self, Form, NewReferenceGait, Strikes, Unit};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::{Connection, ReferenceGaitId, SubjectId, commit};
@@ -86,7 +87,7 @@ impl ReferenceGaitsPage {
             None => None,
         };
         let matches = if let Some(subject) = &nearest_to {
-            recording::matches(db, &subject.body()).await?
+            nearest_reference::matches(db, &subject.body()).await?
         } else {
             let all = reference_gaits::all(db).await?.into_iter();
             all.map(|reference_gait| Match { reference_gait, distance: None }).collect()
@@ -112,14 +113,14 @@ pub(super) struct To {
 }
 
 /// `GET /reference-gaits`.
-pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Params(to): Params<To>) -> Page {
-    let may_run = may.caller.may(Run::NEEDED);
+pub(super) async fn list(authorized: Authorized<Read>, State(app): State<AppState>, Params(to): Params<To>) -> Page {
+    let may_run = authorized.caller.may(Run::NEEDED);
     page(&ReferenceGaitsPage::read(&mut *app.read().await?, to.subject, may_run).await?)
 }
 
 /// `POST /reference-gaits`.
 pub(super) async fn import(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Submitted(fields): Submitted<Fields>,
 ) -> Result<Response, PageError> {
@@ -137,7 +138,7 @@ pub(super) async fn import(
         Err(other) => return Err(other.into()),
     };
     let mut writer = app.write().await?;
-    let (added, _) = recording::add(&mut writer, &may.caller.actor, &definition).await?;
+    let (added, _) = reference_import::add(&mut writer, &authorized.caller.actor, &definition).await?;
     commit(writer).await?;
     Ok(Redirect::to(&format!("/reference-gaits/{}", added.id)).into_response())
 }
@@ -151,7 +152,11 @@ struct ReferenceGaitPage {
 }
 
 /// `GET /reference-gaits/{id}`.
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id, _): Id<ReferenceGaitId, Read>) -> Page {
+pub(super) async fn get(
+    _: Authorized<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<ReferenceGaitId, Read>,
+) -> Page {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),

@@ -2,9 +2,9 @@
 
 use super::error::PageError;
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::Form;
-use crate::may::May;
-use crate::reached::Id;
 use axum::extract::State;
 use axum::response::Redirect;
 use gaitwright_service::access;
@@ -13,13 +13,13 @@ use gaitwright_store::{TrialId, commit};
 
 /// `POST /trials/{id}/safety-review`.
 pub(super) async fn post(
-    may: May<access::Answer>,
+    authorized: Authorized<access::Answer>,
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, access::Answer>,
     Form(form): Form<Decision>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    safety_review::give(&mut writer, &may.caller, id, &form).await?;
+    safety_review::give(&mut writer, &authorized.caller, id, &form).await?;
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}")))

@@ -5,9 +5,9 @@ use super::error::{Page, page};
 use super::format::{self, words};
 use super::study::{COURSE, Figures, course, figures};
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::may::May;
-use crate::reached::{Named, reached};
+use crate::accessible::{Named, accessible};
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
@@ -60,11 +60,15 @@ struct Compared {
 }
 
 /// `GET /studies/compare`.
-pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Params(choice): Params<Choice>) -> Page {
-    let reach = may.caller.reach();
+pub(super) async fn get(
+    authorized: Authorized<Read>,
+    State(mut app): State<AppState>,
+    Params(choice): Params<Choice>,
+) -> Page {
+    let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
     let offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;
-    let (a, b) = (reached(&mut reader, reach, choice.a).await?, reached(&mut reader, reach, choice.b).await?);
+    let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
     let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {
             return Err(Error::invalid("b", b.to_string(), "a study other than a").into());

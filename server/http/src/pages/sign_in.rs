@@ -3,9 +3,9 @@
 use super::error::{Page, PageError, page};
 use super::format;
 use super::unsent::{SignInPage, Unsent, send_now};
+use crate::authorization::SignedIn;
 use crate::extract::Form;
 use crate::identify::{browser_cookie, browser_of, cookie, session_of};
-use crate::may::SignedIn;
 use crate::{AppState, ClientAddress};
 use askama::Template;
 use axum::extract::{Path, State};

@@ -3,10 +3,10 @@
 use super::error::{Page, PageError, page};
 use super::format::{variant, words};
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
-use crate::may::May;
 use crate::problem::Problem;
-use crate::reached::Id;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -14,7 +14,7 @@ use gaitwright_service::access::{Administer, Caller, Permission, Reach, Read, Ru
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
 use gaitwright_service::studies::lab::SessionView;
-use gaitwright_service::studies::person::{self, NewCorrection, NewSubject};
+use gaitwright_service::studies::subject::{self, NewCorrection, NewSubject};
 use gaitwright_store::consents::{self, Consent, ConsentKind};
 use gaitwright_store::studies::Study;
 use gaitwright_store::subjects::{self, Correction, Subject};
@@ -82,10 +82,10 @@ struct SubjectPage {
     studies: Vec<StudyRow>,
     /// Lab sessions of these studies; none after a withdrawal.
     sessions: Vec<SessionRow>,
-    /// The newest consent row that the form knows, so that a repeated form is recorded once.
+    /// The newest consent row that the form knows, so that a repeated form is recorded request.
     after: i64,
     corrections: Vec<Correction>,
-    /// The newest correction that the form knows, so that a repeated form is recorded once.
+    /// The newest correction that the form knows, so that a repeated form is recorded request.
     corrected: i64,
     may_administer: bool,
     refused: Option<String>,
@@ -114,23 +114,23 @@ pub(super) struct Before {
 
 /// `GET /subjects`.
 pub(super) async fn list(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(app): State<AppState>,
     Params(Before { before }): Params<Before>,
 ) -> Page {
-    show_list(&app, before, may.caller.may(Run::NEEDED), Described::default(), None).await
+    show_list(&app, before, authorized.caller.may(Run::NEEDED), Described::default(), None).await
 }
 
 /// `POST /subjects`: adds one, before it has a study.
 pub(super) async fn add(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Form(fields): Form<Described>,
 ) -> Result<Response, PageError> {
     let added = async {
         let new = fields.read()?;
         let mut writer = app.write().await?;
-        let subject = person::add(&mut writer, &may.caller.actor, &new).await?;
+        let subject = subject::add(&mut writer, &authorized.caller.actor, &new).await?;
         commit(writer).await?;
         Ok(subject.id)
     };
@@ -171,8 +171,12 @@ async fn show_list(
 }
 
 /// `GET /subjects/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<SubjectId, Read>) -> Page {
-    show(&app, id, &may.caller, None).await
+pub(super) async fn get(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Page {
+    show(&app, id, &authorized.caller, None).await
 }
 
 async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>) -> Page {
@@ -235,39 +239,39 @@ pub(super) struct Signed {
 
 /// `POST /subjects/{id}/consent`.
 pub(super) async fn consent(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
-    let done = give(&app, &may, id, form).await;
-    answer(&app, id, &may.caller, done).await
+    let done = give(&app, &authorized, id, form).await;
+    answer(&app, id, &authorized.caller, done).await
 }
 
-async fn give(app: &AppState, may: &May<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
+async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
     let mut writer = app.write().await?;
     let newest = consents::of_subject(&mut writer, id).await?.last().map_or(0, |last| last.seq);
     if newest != form.after {
         return Err(Error::conflict("Consent was recorded or withdrawn after this form was loaded. Check it first."));
     }
-    consent::give(&mut writer, &may.caller.actor, id, &NewConsent { form: form.form }).await?;
+    consent::give(&mut writer, &authorized.caller.actor, id, &NewConsent { form: form.form }).await?;
     Ok(commit(writer).await?)
 }
 
 /// `POST /subjects/{id}/withdraw`.
 pub(super) async fn withdraw(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
     Form(why): Form<Withdrawal>,
 ) -> Result<Response, PageError> {
-    let done = end(&app, &may, id, &why).await;
-    answer(&app, id, &may.caller, done).await
+    let done = end(&app, &authorized, id, &why).await;
+    answer(&app, id, &authorized.caller, done).await
 }
 
-async fn end(app: &AppState, may: &May<Run>, id: SubjectId, why: &Withdrawal) -> Result<(), Error> {
+async fn end(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, why: &Withdrawal) -> Result<(), Error> {
     let mut writer = app.write().await?;
-    let (_, cancelled) = consent::withdraw(&mut writer, &may.caller.actor, id, why).await?;
+    let (_, cancelled) = consent::withdraw(&mut writer, &authorized.caller.actor, id, why).await?;
     commit(writer).await?;
     for trial in cancelled {
         app.scheduler.cancel_solve(trial).await;
@@ -287,16 +291,16 @@ pub(super) struct Corrected {
 
 /// `POST /subjects/{id}/correct`.
 pub(super) async fn correct(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
     Form(form): Form<Corrected>,
 ) -> Result<Response, PageError> {
-    let done = set_right(&app, &may, id, form).await;
-    answer(&app, id, &may.caller, done).await
+    let done = set_right(&app, &authorized, id, form).await;
+    answer(&app, id, &authorized.caller, done).await
 }
 
-async fn set_right(app: &AppState, may: &May<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
+async fn set_right(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
     let (height_m, body_mass_kg) = body_of(&form.height_m, &form.body_mass_kg)?;
     let new = NewCorrection { height_m, body_mass_kg, reason: form.reason };
     let mut writer = app.write().await?;
@@ -304,7 +308,7 @@ async fn set_right(app: &AppState, may: &May<Run>, id: SubjectId, form: Correcte
     if newest != form.before {
         return Err(Error::conflict("Height and mass were corrected after this form was loaded. Check them first."));
     }
-    person::correct(&mut writer, &may.caller.actor, id, &new).await?;
+    subject::correct(&mut writer, &authorized.caller.actor, id, &new).await?;
     Ok(commit(writer).await?)
 }
 

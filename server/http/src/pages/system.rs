@@ -4,7 +4,7 @@ use super::error::{Page, page};
 use super::format::{duration, words};
 use crate::AppState;
 use crate::api::{Copy, Workers};
-use crate::may::May;
+use crate::authorization::Authorized;
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::{Administer, Caller, Permission, Read};
@@ -48,14 +48,14 @@ impl SystemPage {
 }
 
 /// `GET /system`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>) -> Page {
-    show(&app, &may.caller, None).await
+pub(super) async fn get(authorized: Authorized<Read>, State(app): State<AppState>) -> Page {
+    show(&app, &authorized.caller, None).await
 }
 
 /// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
-pub(super) async fn make_backup(may: May<Administer>, State(app): State<AppState>) -> Page {
-    let copy = Copy::for_page(app.clone(), may.caller.actor.clone()).await?;
-    show(&app, &may.caller, Some(copy)).await
+pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): State<AppState>) -> Page {
+    let copy = Copy::for_page(app.clone(), authorized.caller.actor.clone()).await?;
+    show(&app, &authorized.caller, Some(copy)).await
 }
 
 async fn show(app: &AppState, caller: &Caller, copied: Option<Copy>) -> Page {

@@ -4,8 +4,8 @@
 
 use super::error::{PageError, is_for_programs, page};
 use crate::AppState;
+use crate::authorization::SignedIn;
 use crate::extract::unreadable;
-use crate::may::SignedIn;
 use askama::Template;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request, State};

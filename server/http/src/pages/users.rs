@@ -3,9 +3,9 @@
 use super::error::{Page, PageError, page};
 use super::{format, refusal};
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extract::Form;
-use crate::may::May;
 use crate::problem::Problem;
 use askama::Template;
 use axum::extract::State;
@@ -166,7 +166,7 @@ impl Asked {
 }
 
 /// `GET /users`.
-pub(super) async fn get(_: May<Administer>, State(app): State<AppState>) -> Page {
+pub(super) async fn get(_: Authorized<Administer>, State(app): State<AppState>) -> Page {
     show(&app, Outcome::default(), None, Asked::default()).await
 }
 
@@ -182,7 +182,7 @@ async fn show(app: &AppState, outcome: Outcome, refused: Option<Refused>, typed:
 /// `POST /users`. Answers with the page instead of a redirect, because a link or token is not stored and can be shown only
 /// here.
 pub(super) async fn post(
-    may: May<Administer>,
+    authorized: Authorized<Administer>,
     State(app): State<AppState>,
     secure: Secure,
     headers: HeaderMap,
@@ -190,7 +190,7 @@ pub(super) async fn post(
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
     let origin = origin(secure, &headers);
-    match act(&mut writer, &may.caller, &origin, &asked).await {
+    match act(&mut writer, &authorized.caller, &origin, &asked).await {
         Ok(outcome) => {
             commit(writer).await?;
             // Event streams check again whether their user still has access.

@@ -1,7 +1,7 @@
 //! Commands for studies (start, pause, resume, stop) and trials (cancel, retry), each in one transaction.
 
 use super::lifecycle::{self, Act};
-use super::record;
+use super::trial_result;
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::Study;
@@ -51,7 +51,7 @@ pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reas
 pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Result<Vec<TrialId>, Error> {
     let mut cancelled = Vec::new();
     for trial in trials::of_study(writer, study.id).await?.into_iter().filter(|trial| trial.state.is_open()) {
-        record::cancelled(writer, trial.id, "the study was stopped").await?;
+        trial_result::cancelled(writer, trial.id, "the study was stopped").await?;
         cancelled.push(trial.id);
     }
     move_on(writer, study, Act::Stop, reason).await?;
@@ -71,7 +71,7 @@ async fn move_on(writer: &mut Writer, study: &Study, act: Act, reason: &str) -> 
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] if the trial has ended.
 pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &str) -> Result<Trial, Error> {
-    record::cancelled(writer, id, reason).await?;
+    trial_result::cancelled(writer, id, reason).await?;
     audit::append(writer, actor, "trial.cancel", &format!("trial {id}"), &json!({ "reason": reason })).await?;
     Ok(trials::get(writer, id).await?)
 }
@@ -81,7 +81,7 @@ pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &st
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] if the trial is open or has a result.
 pub async fn retry(writer: &mut Writer, actor: &Actor, id: TrialId) -> Result<Trial, Error> {
-    record::retried(writer, id).await?;
+    trial_result::retried(writer, id).await?;
     audit::append(writer, actor, "trial.retry", &format!("trial {id}"), &json!({})).await?;
     Ok(trials::get(writer, id).await?)
 }

@@ -1,7 +1,7 @@
 //! Checks and creates a study, for pages, REST and the command line.
 
-use super::person::{self, NewSubject};
-use super::{catalogue, membership, recording, search};
+use super::subject::{self, NewSubject};
+use super::{catalogue, membership, nearest_reference, search};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -231,7 +231,7 @@ pub async fn checked(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Er
 /// # Errors
 /// As [`create`]; nothing is written.
 pub async fn checked_for_new(db: &mut Connection, subject: &NewSubject, new: NewStudy) -> Result<StudyPlan, Error> {
-    let body = person::checked(db, subject).await?;
+    let body = subject::checked(db, subject).await?;
     check_for(db, subject.pseudonym.trim(), body, new).await
 }
 
@@ -255,7 +255,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     };
     let reference_gait_id = match new.reference_gait_id {
         Some(id) => reference_gaits::get(db, id).await?.id,
-        None => match recording::nearest(db, &body).await? {
+        None => match nearest_reference::nearest(db, &body).await? {
             Some(nearest) => nearest.id,
             None => catalogue::reference_gait(db).await?.id,
         },

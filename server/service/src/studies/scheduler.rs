@@ -12,9 +12,9 @@ use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::plans_under_way::Plans;
 use super::prefetch::{LikelyNext, PREPARED, Prefetches, Prepared};
-use super::record;
 use super::snapshot::StudySnapshot;
 use super::solve_input::{PackedInput, SolveInput};
+use super::trial_result;
 use crate::error::Error;
 use crate::supervise::{Task, Tasks};
 use crate::workers::{AfterSolves, Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
@@ -355,7 +355,7 @@ impl Scheduler {
     /// Takes a job back from the engine, without counting a failure.
     async fn give_back(&self, lease: &Lease) -> Result<(), Error> {
         self.cancel_solve(lease.trial).await;
-        record::interrupted(&self.0.store, lease).await.map(drop)
+        trial_result::interrupted(&self.0.store, lease).await.map(drop)
     }
 
     /// Handles an expired lease. A job that no worker has started is dispatched again, in case the engine lost it. A
@@ -367,7 +367,7 @@ impl Scheduler {
             return self.submit(lease).await;
         }
         self.cancel_solve(lease.trial).await;
-        record::silent(&self.0.store, lease).await?;
+        trial_result::silent(&self.0.store, lease).await?;
         Ok(())
     }
 
@@ -483,7 +483,7 @@ impl Scheduler {
         let assignment = match assignment(&mut self.0.unpacking.clone(), lease).await {
             Ok(assignment) => assignment,
             Err(error) => {
-                record::broke(&self.0.store, lease, &error.to_string()).await?;
+                trial_result::broke(&self.0.store, lease, &error.to_string()).await?;
                 return Ok(());
             }
         };
@@ -668,7 +668,7 @@ impl Scheduler {
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         let (outcome, iterations) = match finding {
             Finding::Ended { outcome, iterations } => (outcome, iterations),
-            Finding::Broke(reason) => return record::broke(&store, &lease, &reason).await.map(drop),
+            Finding::Broke(reason) => return trial_result::broke(&store, &lease, &reason).await.map(drop),
         };
         let pack = move |pool: &OnPool| {
             let packed = gaits::PackedGait::new(pool, &outcome, &iterations);
@@ -678,9 +678,9 @@ impl Scheduler {
         let packed = packed?;
         if packed.is_none() && outcome.report.status == SolveStatus::Converged {
             let reason = "the solver returned a converged gait with numbers that are not finite";
-            return record::broke(&store, &lease, reason).await.map(drop);
+            return trial_result::broke(&store, &lease, reason).await.map(drop);
         }
-        record::ended(&mut store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)
+        trial_result::ended(&mut store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)
     }
 }
 

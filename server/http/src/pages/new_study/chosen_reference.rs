@@ -4,7 +4,7 @@ use super::super::drawn::Drawn;
 use askama::Template;
 use gaitwright_charts::{Chart, Stroke};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::recording::{self, Match};
+use gaitwright_service::studies::nearest_reference::{self, Match};
 use gaitwright_store::reference_gaits::ReferenceGait;
 use gaitwright_store::studies::StudyPlan;
 use gaitwright_store::{Connection, ReferenceGaitId};
@@ -30,7 +30,7 @@ pub(super) struct Choice {
 impl Choice {
     pub(super) async fn read(db: &mut Connection, plan: &StudyPlan) -> Result<Self, Error> {
         let matches = match &plan.body {
-            Some(body) => recording::matches(db, body).await?,
+            Some(body) => nearest_reference::matches(db, body).await?,
             None => Vec::new(),
         };
         Ok(Self { matches, chosen: plan.reference_gait_id })

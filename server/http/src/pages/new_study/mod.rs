@@ -8,8 +8,8 @@ use self::space_editor::SpaceEditor;
 use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
+use crate::authorization::Authorized;
 use crate::extract::Form;
-use crate::may::May;
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
@@ -19,8 +19,8 @@ use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::{BasinChoice, SolveOptions, TunedBounds};
 use gaitwright_service::access::{Caller, Run};
 use gaitwright_service::error::{Error, FieldError};
-use gaitwright_service::studies::person::{self, NewSubject};
 use gaitwright_service::studies::plan::{self, NewStudy};
+use gaitwright_service::studies::subject::{self, NewSubject};
 use gaitwright_store::devices::Device;
 use gaitwright_store::reference_gaits::ReferenceGait;
 use gaitwright_store::studies::{FeedbackMode, Study, StudyPlan};
@@ -239,7 +239,7 @@ impl NewStudyPage {
 }
 
 /// `GET /studies/new`.
-pub(super) async fn get(_: May<Run>, State(app): State<AppState>) -> Page {
+pub(super) async fn get(_: Authorized<Run>, State(app): State<AppState>) -> Page {
     let offered = Offered::read(&mut *app.read().await?).await?;
     let fields = Fields::default();
     let editor = SpaceEditor::typed(&fields.space)?;
@@ -248,13 +248,13 @@ pub(super) async fn get(_: May<Run>, State(app): State<AppState>) -> Page {
 
 /// `POST /studies/new`.
 pub(super) async fn post(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Form(fields): Form<Fields>,
 ) -> Result<Response, PageError> {
     let editor = SpaceEditor::typed(&fields.space)?;
     let mut writer = app.write().await?;
-    let refused = match make(&mut writer, &may.caller, &fields, &editor).await {
+    let refused = match make(&mut writer, &authorized.caller, &fields, &editor).await {
         Ok(study) => {
             commit(writer).await?;
             app.scheduler.changed();
@@ -283,7 +283,7 @@ pub(super) struct Checked {
 
 /// `POST /studies/new/check`: checks the form as `POST /studies/new` would, and writes nothing.
 pub(super) async fn check(
-    _: May<Run>,
+    _: Authorized<Run>,
     State(app): State<AppState>,
     Form(fields): Form<Fields>,
 ) -> Result<Json<Checked>, PageError> {
@@ -336,7 +336,7 @@ async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error>
 /// Creates the study, and the subject if a new one is entered.
 async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &SpaceEditor) -> Result<Study, Error> {
     let subject = match subject_of(fields)? {
-        Chosen::New(new) => person::add(writer, &caller.actor, &new).await?.id,
+        Chosen::New(new) => subject::add(writer, &caller.actor, &new).await?.id,
         Chosen::Known(id) => id,
     };
     plan::create_by(writer, caller, study_of(fields, editor, subject)?).await

@@ -9,10 +9,10 @@ use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
 use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
-use crate::may::May;
-use crate::reached::Id;
-use crate::shown::Shown;
+use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -195,7 +195,7 @@ const SHOWN: u32 = 200;
 
 /// `GET /studies/{id}`.
 pub(super) async fn get(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
     Params(choice): Params<Choice>,
@@ -212,9 +212,11 @@ pub(super) async fn get(
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     let imports = imports::of_study(&mut reader, id).await?;
     drop(reader);
-    let live =
-        read_live(&mut app, &may.caller, id, choice).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
-    let may_administer = may.caller.may(Administer::NEEDED);
+    let live = read_live(&mut app, &authorized.caller, id, choice)
+        .await?
+        .render()
+        .map_err(|e| Error::Internal(e.to_string()))?;
+    let may_administer = authorized.caller.may(Administer::NEEDED);
     let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
     page(&StudyPage {
         study,
@@ -232,12 +234,12 @@ pub(super) async fn get(
 
 /// `GET /studies/{id}/live`: the changing part alone, for the script.
 pub(super) async fn live(
-    may: May<Read>,
+    authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
-    page(&read_live(&mut app, &may.caller, id, choice).await?)
+    page(&read_live(&mut app, &authorized.caller, id, choice).await?)
 }
 
 /// The progress of a running solve.
@@ -249,9 +251,9 @@ struct Running {
 
 /// `GET /trials/{id}/running`: one running solve, for the script; nothing once it has ended.
 pub(super) async fn running(
-    _: May<Read>,
+    _: Authorized<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<TrialId, Read>,
+    Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Response, PageError> {
     let trial = trials::get(&mut *app.read().await?, id).await?;
     let Some(track) = app.scheduler.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
@@ -269,7 +271,7 @@ pub(super) struct Do {
 
 /// `POST /studies/{id}/do`.
 pub(super) async fn post(
-    may: May<Run>,
+    authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     Form(form): Form<Do>,
@@ -283,10 +285,10 @@ pub(super) async fn post(
         let refused =
             || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
         let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
-        change::extend(&mut writer, &may.caller.actor, id, &more).await?;
+        change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
         Vec::new()
     } else {
-        command::act(&mut writer, &may.caller.actor, id, act, "").await?.cancelled
+        command::act(&mut writer, &authorized.caller.actor, id, act, "").await?.cancelled
     };
     commit(writer).await?;
     for trial in cancelled {

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::comparison::by_gait_rmse;
 use crate::studies::lab::EmgResult;
-use crate::studies::{device, lab, person, plan, recording, search, trial_state};
+use crate::studies::{device, lab, plan, reference_import, search, subject, trial_state};
 use gait_optimizer::metrics::gait_rmse;
 use gait_optimizer::solve::CONVERGED_VIOLATION;
 use gait_optimizer::{Gait, ReferenceGait, WarmStart};
@@ -112,13 +112,13 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     }
     at(
         format!("subject {}", subject.id),
-        person::check(&subject.pseudonym, subject.height_m, subject.body_mass_kg, &subject.notes),
+        subject::check(&subject.pseudonym, subject.height_m, subject.body_mass_kg, &subject.notes),
     )?;
     let device = at("device", devices::get(db, study.plan.device_id).await)?.definition;
     at("device", device::check(&device))?;
     of_definition("devices", &device.name, &at("devices", archive::definition(db, "devices").await)?)?;
     let reference = at("reference gait", reference_gaits::get(db, study.plan.reference_gait_id).await)?.definition;
-    at("reference gait", recording::check(&reference))?;
+    at("reference gait", reference_import::check(&reference))?;
     let written = at("reference_gaits", archive::definition(db, "reference_gaits").await)?;
     of_definition("reference_gaits", &reference.name, &written)?;
 

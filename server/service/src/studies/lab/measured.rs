@@ -1,8 +1,8 @@
 //! Results of lab measurements: muscle activity over the gait cycle and limit cycles, with the model's values for
 //! unblinded walks.
 
-use super::recording::{EmgReading, MotionReading, WHAT};
 use super::session::{gait_of, still_shown};
+use super::upload::{EmgReading, MotionReading, WHAT};
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};

@@ -7,19 +7,17 @@
 
 mod answer;
 mod measured;
-mod recording;
 mod session;
+mod upload;
 
 pub use answer::{AnswerView, NewAnswer, give as answer, take_back};
 pub use measured::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, beside_model, compute, emg, keep_result, known_gait,
     limit_cycles,
 };
-pub use recording::{
-    Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, check_kept, keep,
-};
 pub use session::{
     Condition, GaitOfWalk, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView,
     checked_walk, close, for_device, gaits_to_walk_with, in_the_lab, plan, record_walk, still_open, unblind,
     was_recorded,
 };
+pub use upload::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, check_kept, keep};

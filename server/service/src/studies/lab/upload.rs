@@ -2,7 +2,7 @@
 
 use super::session::{checked_walk, still_open};
 use crate::error::Error;
-use crate::studies::recording::Unit;
+use crate::studies::reference_import::Unit;
 use gait_optimizer::ModelError;
 use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
 use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};

@@ -4,7 +4,7 @@
 //! belongs to. An inaccessible object gets the same response as one that does not exist.
 
 use super::AppState;
-use super::may::{Refused, permitted};
+use super::authorization::{Refused, permitted};
 use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
 use gaitwright_service::access::{Permission, Reach};
@@ -96,7 +96,7 @@ async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result
     Ok(study)
 }
 
-/// The study of what the path names, for [`Once`](super::once::Once), which reads the request afterwards.
+/// The study of what the path names, for [`Idempotent`](super::idempotent::Idempotent), which reads the request afterwards.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OfStudy(pub(super) Option<StudyId>);
 
@@ -136,20 +136,20 @@ pub(crate) struct Named<T>(T);
 
 impl<T: Located> Named<T> {
     /// The identifier, if the caller can access its object.
-    pub(crate) async fn reached(self, db: &mut Connection, reach: Reach) -> Result<T, Error> {
+    pub(crate) async fn accessible(self, db: &mut Connection, reach: Reach) -> Result<T, Error> {
         located(db, reach, self.0).await?;
         Ok(self.0)
     }
 }
 
 /// The optional identifier, if the caller can access its object.
-pub(crate) async fn reached<T: Located>(
+pub(crate) async fn accessible<T: Located>(
     db: &mut Connection,
     reach: Reach,
     named: Option<Named<T>>,
 ) -> Result<Option<T>, Error> {
     match named {
-        Some(named) => Ok(Some(named.reached(db, reach).await?)),
+        Some(named) => Ok(Some(named.accessible(db, reach).await?)),
         None => Ok(None),
     }
 }

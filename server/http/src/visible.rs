@@ -1,8 +1,8 @@
 //! Identifiers of objects that may be shown: their subject has not withdrawn consent.
 
 use super::AppState;
-use super::may::Refused;
-use super::reached::{Located, in_path};
+use super::authorization::Refused;
+use super::accessible::{Located, in_path};
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use gaitwright_service::access::Permission;
@@ -10,21 +10,21 @@ use gaitwright_service::error::Error;
 use gaitwright_store::consents;
 use std::marker::PhantomData;
 
-/// An [`Id`](super::reached::Id) of an object whose subject has not withdrawn consent. Handlers that show data take
+/// An [`Id`](super::accessible::Id) of an object whose subject has not withdrawn consent. Handlers that show data take
 /// this instead.
 #[derive(Debug)]
-pub(crate) struct Shown<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
+pub(crate) struct Visible<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 
-impl<T: Located, P: Permission> FromRequestParts<AppState> for Shown<T, P> {
+impl<T: Located, P: Permission> FromRequestParts<AppState> for Visible<T, P> {
     type Rejection = Refused;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Refused> {
-        let found = shown::<T, P>(parts, app).await;
+        let found = visible::<T, P>(parts, app).await;
         found.map(|id| Self(id, PhantomData)).map_err(|error| Refused::of(parts, error))
     }
 }
 
-async fn shown<T: Located, P: Permission>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
+async fn visible<T: Located, P: Permission>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
     let (id, study) = in_path::<T, P>(parts, app).await?;
     if let Some(study) = study {
         consents::may_be_shown(&mut *app.read().await?, study).await?;

@@ -13,7 +13,7 @@ use std::marker::PhantomData;
 
 /// A caller with the right `P`.
 #[derive(Debug)]
-pub(crate) struct May<P> {
+pub(crate) struct Authorized<P> {
     /// The caller.
     pub(crate) caller: Caller,
     right: PhantomData<P>,
@@ -54,7 +54,7 @@ pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller
     }
 }
 
-impl<P: Permission, S: Send + Sync> FromRequestParts<S> for May<P> {
+impl<P: Permission, S: Send + Sync> FromRequestParts<S> for Authorized<P> {
     type Rejection = Refused;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refused> {

@@ -1,9 +1,9 @@
 //! Idempotent requests: with an Idempotency-Key, a repeated request has one effect and the same response.
 
 use super::AppState;
+use super::accessible::OfStudy;
+use super::authorization::permitted;
 use super::extract::{body, unreadable};
-use super::may::permitted;
-use super::reached::OfStudy;
 use crate::problem::Refusal;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
@@ -23,7 +23,7 @@ static REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 
 /// A changing request by a caller with the right `P`: caller, key and fingerprint.
 #[derive(Debug)]
-pub(crate) struct Once<P> {
+pub(crate) struct Idempotent<P> {
     /// The actor for the audit trail.
     pub(crate) actor: Actor,
     /// The caller.
@@ -34,11 +34,11 @@ pub(crate) struct Once<P> {
     right: PhantomData<P>,
 }
 
-/// [`Once`] with a JSON body.
+/// [`Idempotent`] with a JSON body.
 #[derive(Debug)]
-pub(crate) struct OnceWith<P, T>(pub(crate) Once<P>, pub(crate) T);
+pub(crate) struct IdempotentWith<P, T>(pub(crate) Idempotent<P>, pub(crate) T);
 
-impl<P: Permission> Once<P> {
+impl<P: Permission> Idempotent<P> {
     /// Begins the transaction of the effect. The inner `Err` is the stored response of an earlier request with the key.
     pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<LentWriter<'a>, Response>, Error> {
         let mut writer = app.write().await?;
@@ -71,7 +71,7 @@ impl<P: Permission> Once<P> {
     /// Begins the transaction of an effect whose response contains a secret, and therefore must not be stored.
     pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<LentWriter<'a>, Error> {
         if self.key.is_some() {
-            let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown once.";
+            let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown request.";
             return Err(Error::Malformed(reason.to_owned()));
         }
         Ok(app.write().await?)
@@ -158,13 +158,13 @@ fn response(kept: &Kept) -> Response {
 async fn read<P: Permission, S: Send + Sync>(
     request: Request,
     state: &S,
-) -> Result<(Once<P>, HeaderMap, Bytes), Error> {
+) -> Result<(Idempotent<P>, HeaderMap, Bytes), Error> {
     let caller = permitted::<P>(request.extensions())?;
     let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
     let headers = request.headers().clone();
     let study = request.extensions().get::<OfStudy>().and_then(|of| of.0);
     let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
-    let once = Once {
+    let idempotent = Idempotent {
         actor: caller.actor.clone(),
         caller,
         key: key_in(&headers)?,
@@ -172,10 +172,10 @@ async fn read<P: Permission, S: Send + Sync>(
         study,
         right: PhantomData,
     };
-    Ok((once, headers, bytes))
+    Ok((idempotent, headers, bytes))
 }
 
-impl<P: Permission, S: Send + Sync> FromRequest<S> for Once<P> {
+impl<P: Permission, S: Send + Sync> FromRequest<S> for Idempotent<P> {
     type Rejection = Refusal;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
@@ -183,11 +183,11 @@ impl<P: Permission, S: Send + Sync> FromRequest<S> for Once<P> {
     }
 }
 
-impl<P: Permission, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for OnceWith<P, T> {
+impl<P: Permission, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for IdempotentWith<P, T> {
     type Rejection = Refusal;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
-        let (once, headers, bytes) = read(request, state).await?;
-        Ok(Self(once, body(&headers, &bytes)?))
+        let (idempotent, headers, bytes) = read(request, state).await?;
+        Ok(Self(idempotent, body(&headers, &bytes)?))
     }
 }

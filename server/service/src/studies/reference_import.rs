@@ -1,13 +1,12 @@
-//! Imports reference gaits from recordings of joint angles, and finds the nearest one for a subject. For pages, REST
-//! and the command line.
+//! Imports reference gaits from recordings of joint angles. For pages, REST and the command line.
 
 use crate::error::Error;
 use crate::printable;
-use gait_optimizer::reference::{AngleUnit, HeelStrikes, MotionRecording, Walker, distance};
-use gait_optimizer::{ReferenceGait as Definition, Subject};
+use gait_optimizer::ReferenceGait as Definition;
+use gait_optimizer::reference::{AngleUnit, HeelStrikes, MotionRecording, Walker};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
-use gaitwright_store::{Connection, Store, Writer};
+use gaitwright_store::{Store, Writer};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -186,40 +185,4 @@ pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) ->
         audit::append(writer, actor, "reference_gait.import", &target, &detail).await?;
     }
     Ok((reference, added))
-}
-
-/// A reference gait and the distance between the recorded person and a subject.
-#[derive(Debug, Clone, Serialize, ToSchema)]
-pub struct Match {
-    /// The reference gait.
-    pub reference_gait: ReferenceGait,
-    /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
-    pub distance: Option<f64>,
-}
-
-/// Every reference gait, the nearest to the subject in height and body mass first. Those without height and mass come
-/// last.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Match>, Error> {
-    let mut found: Vec<Match> = reference_gaits::all(db)
-        .await?
-        .into_iter()
-        .map(|reference_gait| Match { distance: distance(subject, &reference_gait.definition), reference_gait })
-        .collect();
-    found.sort_by(|a, b| {
-        let far = |m: &Match| m.distance.unwrap_or(f64::INFINITY);
-        far(a).total_cmp(&far(b))
-    });
-    Ok(found)
-}
-
-/// The reference gait nearest to a subject. `None` if no reference gait states height and mass.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn nearest(db: &mut Connection, subject: &Subject) -> Result<Option<ReferenceGait>, Error> {
-    let matches = matches(db, subject).await?;
-    Ok(matches.into_iter().find(|found| found.distance.is_some()).map(|found| found.reference_gait))
 }

@@ -1,0 +1,45 @@
+//! Finds the reference gait nearest to a subject in height and body mass.
+
+use crate::error::Error;
+use gait_optimizer::Subject;
+use gait_optimizer::reference::distance;
+use gaitwright_store::Connection;
+use gaitwright_store::reference_gaits::{self, ReferenceGait};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// A reference gait and the distance between the recorded person and a subject.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Match {
+    /// The reference gait.
+    pub reference_gait: ReferenceGait,
+    /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
+    pub distance: Option<f64>,
+}
+
+/// Every reference gait, the nearest to the subject in height and body mass first. Those without height and mass come
+/// last.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Match>, Error> {
+    let mut found: Vec<Match> = reference_gaits::all(db)
+        .await?
+        .into_iter()
+        .map(|reference_gait| Match { distance: distance(subject, &reference_gait.definition), reference_gait })
+        .collect();
+    found.sort_by(|a, b| {
+        let far = |m: &Match| m.distance.unwrap_or(f64::INFINITY);
+        far(a).total_cmp(&far(b))
+    });
+    Ok(found)
+}
+
+/// The reference gait nearest to a subject. `None` if no reference gait states height and mass.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn nearest(db: &mut Connection, subject: &Subject) -> Result<Option<ReferenceGait>, Error> {
+    let matches = matches(db, subject).await?;
+    Ok(matches.into_iter().find(|found| found.distance.is_some()).map(|found| found.reference_gait))
+}
