@@ -395,7 +395,7 @@ async fn unblinding_needs_a_reason_is_in_the_audit_trail_and_marks_what_follows(
 }
 
 #[tokio::test]
-async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
+async fn the_last_answer_can_be_retracted_once_and_counts_no_more() {
     const FORM: &str = "application/x-www-form-urlencoded";
     let (_folder, service, study) = waiting(6).await;
     let pair = next(&service, study).await;
@@ -405,12 +405,12 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
         rows.iter().filter(|row| row.by_rater && row.retraction.is_none()).count()
     };
     assert_eq!(heard(&service.feedback(study).await), 1);
-    let back = service.post_text(&at(&pair, "/take-back"), FORM, "").await;
+    let back = service.post_text(&at(&pair, "/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
     assert_eq!(heard(&service.feedback(study).await), 0);
     let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.items();
     assert_eq!((&figures[0]["shown"], &figures[0]["answered"]), (&json!(1), &json!(0)), "{figures}");
-    assert_eq!(service.post_text(&at(&pair, "/take-back"), FORM, "").await.status, StatusCode::CONFLICT);
+    assert_eq!(service.post_text(&at(&pair, "/retract"), FORM, "").await.status, StatusCode::CONFLICT);
 
     // Neither what is not the last answer, nor that a gait is unsafe.
     let mut pairs = Vec::new();
@@ -424,7 +424,7 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
         }
     }
     for pair in &pairs {
-        let refused = service.post_text(&at(pair, "/take-back"), FORM, "").await;
+        let refused = service.post_text(&at(pair, "/retract"), FORM, "").await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
     }
     service.stop().await;

@@ -263,7 +263,7 @@ async fn taking_back_what_somebody_else_took_back_is_no_matter_of_its_kind() {
     let path = format!("/api/v1/preferences/{}/retract", heard.id);
     let retracted = post(&service, &clinician, &path, &json!({"reason": "wrong person"})).await;
     assert!(retracted.status.is_success(), "{}", retracted.text);
-    let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{token}/take-back"), FORM, "").await;
+    let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{token}/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
     let page = get(&service, &rater, back.headers["location"].to_str().unwrap()).await;
     assert!(page.text.contains("was retracted"), "{}", page.text);

@@ -242,7 +242,7 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
     assert_eq!((&back["asks"], &back["answer"]), (&json!(2), &Value::Null));
     let said = json!({"number": 2, "answer": "second", "note": "softer"});
     let seen = service.post(&answers, &said).await.json();
-    assert_eq!((&seen["answer"]["answer"], &seen["can_be_taken_back"]), (&json!("second"), &json!(true)));
+    assert_eq!((&seen["answer"]["answer"], &seen["can_be_retracted"]), (&json!("second"), &json!(true)));
     assert!(heard(&service, study).await.is_empty(), "before unblinding");
 
     service.post(&format!("{session}/unblind"), &json!({"reason": "all were walked"})).await;
@@ -512,7 +512,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
     }
     let page = format!("/lab-sessions/{}", id(&session));
     let form = "walk=1&form=csv&recording=time_s%2CTA_L&heel_strike_column=heel&channels=TA";
-    let refused = service.post_text(&format!("{page}/electromyograms"), FORM, form).await;
+    let refused = service.post_text(&format!("{page}/measurement-files/emg"), FORM, form).await;
     assert!(refused.text.contains("CHANNEL=COLUMN"), "{}", refused.text);
     for typed in ["<details open>", ">time_s,TA_L</textarea>", "value=\"heel\"", "value=\"TA\""] {
         assert!(refused.text.contains(typed), "{typed} comes back: {}", refused.text);
@@ -535,7 +535,7 @@ async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
     let recording = motion().replace('\n', "%0A").replace(',', "%2C");
     for walk in 1..=2 {
         let form = format!("walk={walk}&form=csv&unit=&cutoff_hz=6&recording=%23 walk {walk}%0A{recording}");
-        let kept = service.post_text(&format!("{page}/motions"), FORM, &form).await;
+        let kept = service.post_text(&format!("{page}/measurement-files/motion"), FORM, &form).await;
         assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     }
     let cycles = service.fetch(&format!("{api}/limit-cycles")).await.items();

@@ -96,8 +96,8 @@ fn door_of(operation: &str) -> Option<Door> {
         | "post /api/v1/assessments/{id}/retract"
         | "post /studies/{id}/retract"
         | "post /api/v1/lab-sessions/{id}/retract-answer"
-        | "post /lab/{id}/take-back"
-        | "post /rate/pair/{token}/take-back" => RETRACTS,
+        | "post /lab/{id}/retract"
+        | "post /rate/pair/{token}/retract" => RETRACTS,
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
             Door::None("the lab evaluates a trial by itself; figures, and no person's answer")
         }
@@ -110,8 +110,6 @@ fn door_of(operation: &str) -> Option<Door> {
             "/retry",
             "/emg-results",
             "/process",
-            "/motions",
-            "/electromyograms",
             "/measurement-files",
         ]
         .iter()

@@ -320,7 +320,7 @@ async fn rater_reaches_assigned_studies_alone_until_removed() {
     assert_eq!(send(&service, &rater, &Method::POST, &answer, JSON, body).await.status, StatusCode::NOT_FOUND);
     let sent = send(&service, &rater, &Method::POST, &form, FORM, "answer=first").await;
     assert_eq!(sent.status, StatusCode::NOT_FOUND);
-    let back = send(&service, &rater, &Method::POST, &format!("{form}/take-back"), FORM, "").await;
+    let back = send(&service, &rater, &Method::POST, &format!("{form}/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::NOT_FOUND);
     let saved = send(&service, &rater, &Method::GET, &format!("/rate?saved={token}"), "", "").await;
     assert_eq!(saved.status, StatusCode::NOT_FOUND);

@@ -6,7 +6,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_store::{FORM, Store, backup, verify};
+use gaitwright_tests::archives::exported;
 use gaitwright_tests::cli;
+use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use sqlx::{AssertSqlSafe, Row};
 use std::collections::BTreeMap;
@@ -122,6 +124,35 @@ async fn upgrade_keeps_the_allocations_of_the_baseline() {
         assert!(rows > 0 && unlike == 0, "{of}: {unlike} of {rows} have another order");
     }
     pool.close().await;
+}
+
+/// The lines of an archive.
+fn lines(archive: &[u8]) -> Vec<Value> {
+    let name = archive.iter().position(|byte| *byte == b'\n').unwrap();
+    let text = String::from_utf8(zstd::decode_all(&archive[name + 1..]).unwrap()).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[tokio::test]
+async fn archive_of_an_upgraded_record_omits_the_orders_of_the_baseline() {
+    let (_folder, database) = unpacked(V1);
+    let store = Store::open(&database).await.unwrap();
+    let mut reader = store.read().await.unwrap();
+    let drawn: Vec<(String, bool)> =
+        sqlx::query_as("select study_id, gait_one_first from lab_sessions").fetch_all(&mut **reader).await.unwrap();
+    drop(reader);
+    assert!(drawn.iter().any(|(_, first)| *first), "there is nothing to leave out: {drawn:?}");
+    let mut archived = 0;
+    for (study, _) in &drawn {
+        for line in lines(&exported(&store, study.parse().unwrap()).await) {
+            if let Some(order) = line.pointer("/row/gait_one_first").filter(|_| line["table"] == "lab_sessions") {
+                archived += 1;
+                assert_eq!(*order, json!(0), "{line}");
+            }
+        }
+    }
+    assert!(archived >= drawn.len(), "{archived} of {} sessions are in archives", drawn.len());
+    store.close().await;
 }
 
 #[tokio::test]

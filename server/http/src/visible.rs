@@ -1,8 +1,8 @@
 //! Identifiers of objects that may be shown: their subject has not withdrawn consent.
 
 use super::AppState;
-use super::authorization::Refused;
 use super::accessible::{Located, in_path};
+use super::authorization::Refused;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use gaitwright_service::access::Permission;

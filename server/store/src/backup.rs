@@ -1,7 +1,7 @@
 //! Backups of the record: consistent while the service is running, and checked.
 
 use super::whole_file::{WholeFile, folder_of};
-use super::{Store, StoreError, StoreResult, beside, file_kind, free_name, migrations};
+use super::{Store, StoreError, StoreResult, beside, file_kind, free_name, schema_versions};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
 use std::path::{Path, PathBuf};
@@ -149,7 +149,8 @@ pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
 async fn connect(options: SqliteConnectOptions, file: &Path) -> StoreResult<SqlitePool> {
     let one = SqlitePoolOptions::new().max_connections(1).idle_timeout(None).max_lifetime(None);
     let pool = one.connect_with(options).await.map_err(|error| file_kind::named(file, error.into()))?;
-    let refusal = match migrations::check_version(&pool, file).await.map_err(|error| file_kind::named(file, error)) {
+    let refusal = match schema_versions::check_version(&pool, file).await.map_err(|error| file_kind::named(file, error))
+    {
         Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it contains no record yet".to_owned() },
         Ok(_) => return Ok(pool),
         Err(error) => error,

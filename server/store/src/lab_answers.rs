@@ -53,7 +53,7 @@ pub async fn insert(
 ///
 /// # Errors
 /// A violated constraint if there is no such answer; errors of the database.
-pub async fn take_back(db: &mut Connection, actor: &Actor, id: LabSessionId, number: u32) -> StoreResult<bool> {
+pub async fn retract(db: &mut Connection, actor: &Actor, id: LabSessionId, number: u32) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into lab_answer_retractions (session_id, number, actor, created_at) values (?, ?, ?, ?) \
          on conflict (session_id, number) do nothing",

@@ -53,6 +53,7 @@ pub mod rights;
 pub mod row;
 pub mod safety_reviews;
 pub mod schema;
+mod schema_versions;
 pub mod seals;
 pub mod sessions;
 pub mod sign_in_failures;
@@ -74,8 +75,8 @@ pub use id::{
     PresentationId, ReferenceGaitId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use lent::{Lent, LentWriter, Reader};
-pub use migrations::FORM;
 pub use packed::{Packed, PackedText};
+pub use schema_versions::FORM;
 pub use space::DEFAULT_RESERVE_BYTES;
 pub use time::{Instant, now};
 pub use writing::Writer;
@@ -192,7 +193,7 @@ impl Store {
             // Each table has its own statements for seals.
             .statement_cache_capacity(400);
         let only = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
-        if migrations::check_version(&only, path).await? == 0 {
+        if schema_versions::check_version(&only, path).await? == 0 {
             refuse_to_begin_anew(path, &anchors)?;
         } else {
             for anchor in &anchors {
@@ -351,7 +352,7 @@ async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     }
     let options = SqliteConnectOptions::new().filename(path).read_only(true);
     let Ok(pool) = SqlitePoolOptions::new().max_connections(1).connect_with(options).await else { return Ok(()) };
-    let checked = migrations::check_version(&pool, path).await;
+    let checked = schema_versions::check_version(&pool, path).await;
     pool.close().await;
     match checked {
         Err(refusal @ (StoreError::NotADatabase { .. } | StoreError::NewerSchema { .. })) => Err(refusal),

@@ -281,7 +281,7 @@ pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>)
 ///
 /// # Errors
 /// A violated constraint if there is no answer; errors of the database.
-pub async fn take_back(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
+pub async fn retract(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into presentation_retractions (presentation_id, created_at) values (?, ?) \
          on conflict (presentation_id) do nothing",

@@ -3,7 +3,7 @@
 
 use super::archive::Unpacking;
 use super::row::{Cell, Row};
-use super::{Connection, StoreResult, migrations};
+use super::{Connection, StoreResult, schema_versions};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, SqliteConnection};
 
@@ -32,7 +32,7 @@ impl Quarantine {
             .synchronous(SqliteSynchronous::Off)
             .row_buffer_size(ROWS_AHEAD);
         let mut db = options.connect().await?;
-        migrations::fresh(&mut db).await?;
+        schema_versions::fresh(&mut db).await?;
         sqlx::query("begin").execute(&mut db).await?;
         Ok(Self { db, unpacking: Unpacking::default(), forked_from: None })
     }

@@ -1,7 +1,7 @@
 //! Verifies a record: its file, schema, hash chains, every row, and its anchors.
 
 use super::anchor::{self, Ends};
-use super::{Connection, StoreError, StoreResult, audit, backup, migrations, seals};
+use super::{Connection, StoreError, StoreResult, audit, backup, schema_versions, seals};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row, SqliteConnection, SqlitePool};
 use std::collections::BTreeSet;
@@ -33,7 +33,7 @@ pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
 async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
     let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     backup::check_open(pool).await?;
-    let version = migrations::check_version(pool, record).await?;
+    let version = schema_versions::check_version(pool, record).await?;
     // One consistent state for all comparisons.
     let mut db = pool.begin().await?;
     schema(&mut db, version).await?;
@@ -63,11 +63,11 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
     Ok(Whole { audit, seals, anchors: seen })
 }
 
-/// Checks that tables, indices, triggers and views match the migrations, because a missing trigger protects nothing.
+/// Checks that tables, indices, triggers and views match the schema_versions, because a missing trigger protects nothing.
 async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
     let options = SqliteConnectOptions::new().filename(":memory:");
     let mut fresh = SqliteConnection::connect_with(&options).await?;
-    migrations::up_to(version).run_direct(None, &mut fresh, false).await?;
+    schema_versions::up_to(version).run_direct(None, &mut fresh, false).await?;
     let (expected, found) = (parts(&mut fresh).await?, parts(db).await?);
     fresh.close().await?;
     match expected.symmetric_difference(&found).next() {
@@ -79,7 +79,7 @@ async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
     }
 }
 
-/// Kind, name, table and text of each part of a schema. A library writes the list of migrations; the tests of upgrades
+/// Kind, name, table and text of each part of a schema. A library writes the list of schema_versions; the tests of upgrades
 /// detect if a version of it changes the text.
 async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<(String, String, String, Option<String>)>> {
     let sql = "select type, name, tbl_name, sql from sqlite_master";

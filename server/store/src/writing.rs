@@ -183,7 +183,7 @@ impl Shared {
     }
 
     /// Rolls back a dropped change.
-    async fn take_back(&self, connection: &mut SqliteConnection) {
+    async fn retract(&self, connection: &mut SqliteConnection) {
         if !self.state().begun {
             return;
         }
@@ -200,7 +200,7 @@ impl Shared {
 
     /// Commits the open transaction, and notifies all waiting changes.
     async fn flush(&self, connection: &mut SqliteConnection) {
-        self.take_back(connection).await;
+        self.retract(connection).await;
         if self.state().group.is_none() {
             return;
         }
@@ -261,7 +261,7 @@ impl Shared {
 async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
     let held = line.lock_owned().await;
     let mut connection = OwnedMutexGuard::try_map(held, Option::as_mut).map_err(|_| StoreError::Closed)?;
-    shared.take_back(&mut connection).await;
+    shared.retract(&mut connection).await;
     if shared.state().group.is_none() {
         if let Err(error) = shared.outside.check() {
             shared.save(&mut connection, &error).await;

@@ -254,13 +254,13 @@ async fn browser_rater_takes_the_newest_answer_back_also_later() {
     // The page of the pair offers it, and so does the home page without a word in its address.
     page.goto(&pair).await;
     assert!(page.text(".notice").await.contains("Your answer to this pair: the second gait is better"));
-    assert_eq!(page.count("form[action$='/take-back']").await, 1);
+    assert_eq!(page.count("form[action$='/retract']").await, 1);
     page.goto(&site.at("/rate")).await;
-    page.click("form[action$='/take-back'] button").await;
+    page.click("form[action$='/retract'] button").await;
     page.wait_until("document.querySelector('.notice.good')?.textContent.includes('retracted') ?? false").await;
     assert!(answers(&site, study).await[0].retraction.is_some());
     page.goto(&site.at("/rate")).await;
-    assert_eq!(page.count("form[action$='/take-back']").await, 0, "once");
+    assert_eq!(page.count("form[action$='/retract']").await, 0, "once");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

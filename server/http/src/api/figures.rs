@@ -1,12 +1,12 @@
 //! REST: downloads of figures as SVG, PNG and CSV.
 
 use crate::AppState;
+use crate::accessible::{Id, Named, accessible};
 use crate::authorization::Authorized;
 use crate::extract::Params;
 use crate::openapi::Binary;
 use crate::pages::{belief, figures};
 use crate::problem::Refusal;
-use crate::accessible::{Id, Named, accessible};
 use crate::visible::Visible;
 use axum::extract::{Path, State};
 use axum::http::header;

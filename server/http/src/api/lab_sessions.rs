@@ -307,6 +307,6 @@ pub(super) async fn retract(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let seen = lab::take_back(&mut writer, &request.caller, id).await?;
+    let seen = lab::retract(&mut writer, &request.caller, id).await?;
     request.done(&app, writer, &seen).await
 }

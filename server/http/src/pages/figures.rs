@@ -5,9 +5,9 @@ use super::error::{Page, page};
 use super::side_by_side::Side;
 use super::{lab_charts, study};
 use crate::AppState;
+use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::accessible::{Named, accessible};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -226,7 +226,7 @@ pub(crate) async fn of_session(app: &mut AppState, id: LabSessionId) -> Result<V
     let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
     drop(reader);
     let draw = move |_: &OnPool| {
-        let mut figures = emg.map_or_else(Vec::new, |emg| lab_charts::electromyograms(&session, &emg));
+        let mut figures = emg.map_or_else(Vec::new, |emg| lab_charts::emg(&session, &emg));
         figures.extend(lab_charts::limit_cycles(&session, &cycles));
         figures
     };

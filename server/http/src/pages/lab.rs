@@ -5,7 +5,7 @@ use super::error::{Page, PageError, page};
 use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
-use super::measurement_files::{Forms, Settings};
+use super::measurement_forms::{Forms, Settings};
 use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
@@ -273,7 +273,7 @@ async fn show(
     let draw = move |_: &OnPool| {
         let files = format!("/api/v1/lab-sessions/{id}/figures");
         let drawn = |figures: &[Figure]| figures.iter().map(|figure| Drawn::of(figure, &files, "")).collect();
-        let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::electromyograms(&session, emg)));
+        let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::emg(&session, emg)));
         let drawings = Drawings { emg: of_emg, portraits: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
         (session, emg, drawings)
     };

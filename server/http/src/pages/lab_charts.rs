@@ -39,7 +39,7 @@ pub(super) fn muscle_name(channel: &str) -> &str {
 
 /// Muscle activity over the gait cycle (figure 6 of the paper): a chart for each channel with mean and standard deviation
 /// of each walk, and the activation of the model after unblinding.
-pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Figure> {
+pub(super) fn emg(session: &SessionView, emg: &EmgView) -> Vec<Figure> {
     let Some(normal) = emg.result.walks.first() else { return Vec::new() };
     let chart = |(place, channel): (usize, &CycleActivity)| {
         let mut chart = Chart::new(

@@ -102,15 +102,15 @@ pub(super) async fn answer(
     read_back(&app, id, answered.await, new.note).await
 }
 
-/// `POST /lab/{id}/take-back`.
-pub(super) async fn take_back(
+/// `POST /lab/{id}/retract`.
+pub(super) async fn retract(
     authorized: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
 ) -> Result<Response, PageError> {
     let taken_back = async {
         let mut writer = app.write().await?;
-        lab::take_back(&mut writer, &authorized.caller, id).await?;
+        lab::retract(&mut writer, &authorized.caller, id).await?;
         Ok(commit(writer).await?)
     };
     read_back(&app, id, taken_back.await, String::new()).await

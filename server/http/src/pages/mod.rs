@@ -19,6 +19,7 @@ mod lab;
 mod lab_charts;
 mod lab_walk;
 mod measurement_files;
+mod measurement_forms;
 mod members;
 mod muscles;
 mod new_study;
@@ -76,18 +77,18 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/rate", get(rate::list))
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))
-        .route("/rate/pair/{token}/take-back", post(rate::take_back))
+        .route("/rate/pair/{token}/retract", post(rate::retract))
         .route("/studies/{id}/lab", get(lab::list).post(lab::plan))
         .route("/lab-sessions/{id}", get(lab::get))
         .route("/lab-sessions/{id}/close", post(lab::close))
         .route("/lab-sessions/{id}/unblind", post(lab::unblind))
-        .route("/lab-sessions/{id}/electromyograms", post(measurement_files::electromyogram).layer(recordings()))
-        .route("/lab-sessions/{id}/motions", post(measurement_files::motion).layer(recordings()))
+        .route("/lab-sessions/{id}/measurement-files/emg", post(measurement_files::emg).layer(recordings()))
+        .route("/lab-sessions/{id}/measurement-files/motion", post(measurement_files::motion).layer(recordings()))
         .route("/lab-sessions/{id}/process", post(measurement_files::process))
         .route("/lab", get(lab_walk::list))
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/lab/{id}/answer", post(lab_walk::answer))
-        .route("/lab/{id}/take-back", post(lab_walk::take_back))
+        .route("/lab/{id}/retract", post(lab_walk::retract))
         .route("/users", get(users::get).post(users::post))
         .route("/audit", get(audit::get))
         .route("/access-log", get(access_log::get))

@@ -47,7 +47,7 @@ struct Saved {
     number: u32,
     answer: Judgement,
     at: String,
-    can_be_taken_back: bool,
+    can_be_retracted: bool,
 }
 
 impl Saved {
@@ -150,17 +150,17 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, E
         Err(Error::NotFound { .. }) => return Ok(None),
         shown => shown?,
     };
-    Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_taken_back))
+    Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_retracted))
 }
 
 async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, Error> {
-    let can_be_taken_back = blind::can_be_taken_back(db, &shown.presentation).await?;
+    let can_be_retracted = blind::can_be_retracted(db, &shown.presentation).await?;
     Ok(shown.answer().zip(shown.presentation.answered_at).map(|(said, at)| Saved {
         answer: said,
         at: at.minute(),
         number: shown.presentation.number,
         token: shown.presentation.token,
-        can_be_taken_back,
+        can_be_retracted,
     }))
 }
 
@@ -252,15 +252,15 @@ pub(super) async fn answer(
     told(&mut app, &authorized.caller, &token, answered).await
 }
 
-/// `POST /rate/pair/{token}/take-back`.
-pub(super) async fn take_back(
+/// `POST /rate/pair/{token}/retract`.
+pub(super) async fn retract(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Response, PageError> {
     let taken_back = async {
         let mut writer = app.write().await?;
-        blind::take_back(&mut writer, &authorized.caller, &token).await?;
+        blind::retract(&mut writer, &authorized.caller, &token).await?;
         commit(writer).await?;
         app.scheduler.changed();
         Ok(())

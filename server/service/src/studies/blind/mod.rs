@@ -12,5 +12,5 @@ mod rater;
 pub use draw::{Drawn, draw};
 pub use figures::{RaterFigures, Share, figures};
 pub use knowledge::{could_have_known, sees_or_saw_gaits};
-pub use rater::{Answered, RaterAnswer, UnblindedPair, answer, next, take_back, unblind};
-pub use rater::{can_be_taken_back, own};
+pub use rater::{Answered, RaterAnswer, UnblindedPair, answer, next, retract, unblind};
+pub use rater::{can_be_retracted, own};

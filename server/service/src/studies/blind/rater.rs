@@ -208,9 +208,9 @@ fn answered_already(before: Option<Judgement>) -> String {
 ///
 /// # Errors
 /// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] if the answer cannot be retracted.
-pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
+pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
     let shown = own(writer, caller, token).await?.presentation;
-    if !can_be_taken_back(writer, &shown).await? {
+    if !can_be_retracted(writer, &shown).await? {
         let why = "Only the last answer can be retracted, and only once. A safety report cannot be retracted here: ask the study \
                    coordinator.";
         return Err(Error::conflict(why));
@@ -221,8 +221,8 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Res
     {
         answering::retract(writer, caller, Some(shown.study_id), heard, None, "by the rater").await?;
     }
-    presentations::take_back(writer, shown.id).await?;
-    note(writer, caller, &shown, "presentation.take_back").await?;
+    presentations::retract(writer, shown.id).await?;
+    note(writer, caller, &shown, "presentation.retract").await?;
     Ok(Answered { number: shown.number })
 }
 
@@ -230,7 +230,7 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Res
 ///
 /// # Errors
 /// What the record reports.
-pub async fn can_be_taken_back(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
+pub async fn can_be_retracted(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
     let all = presentations::of_study(db, shown.study_id).await?;
     let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
     let stands = matches!(

@@ -3,7 +3,8 @@
 //! It becomes a preference, or an assessment, at unblinding: what the learner hears is shown to everybody who may
 //! read, and whoever was in the lab would know the order from it.
 
-use super::session::{InTheLab, has_file, in_the_lab, next_walk, still_open};
+use super::question::{can_be_retracted, next_number, next_walk};
+use super::session::{InTheLab, in_the_lab, still_open};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -11,49 +12,16 @@ use crate::studies::assessment;
 use crate::studies::preference::{self, Again, GivenJudgement};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::feedback::{Attribution, Source};
-use gaitwright_store::lab_answers::{self, LabAnswer};
+use gaitwright_store::lab_answers;
 use gaitwright_store::lab_sessions::{Act, LabSession};
 use gaitwright_store::presentations::Judgement;
-use gaitwright_store::{Instant, LabSessionId, Writer, audit, events, lab_sessions, studies, subjects};
-use serde::{Deserialize, Serialize};
+use gaitwright_store::{LabSessionId, Writer, audit, events, lab_sessions, studies, subjects};
+use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
 /// Maximum length of a note, characters.
 const LONGEST_NOTE: usize = 2000;
-
-/// Answer of the subject, in terms of walks.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[schema(as = LabAnswer)]
-pub struct AnswerView {
-    /// Number of the answer, from 1. It grows when an answer is retracted.
-    pub number: u32,
-    /// The answer. First is walk 2, second is walk 3.
-    pub answer: Judgement,
-    /// Free text.
-    pub note: String,
-    /// Who recorded it.
-    pub actor: String,
-    /// Time of recording.
-    pub at: Instant,
-    /// Whether the answer is not blind: it was recorded after unblinding, or by a user who had fetched a controller
-    /// file.
-    pub could_have_known: bool,
-}
-
-impl AnswerView {
-    pub(super) fn of(session: &LabSession, row: &LabAnswer) -> Self {
-        let unblinded = session.done(Act::Unblinded).is_some_and(|done| done.at <= row.at);
-        Self {
-            number: row.number,
-            answer: row.said,
-            note: row.note.clone(),
-            actor: row.actor.clone(),
-            at: row.at,
-            could_have_known: unblinded || has_file(session, &row.actor, row.at),
-        }
-    }
-}
 
 /// Answer of the subject.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
@@ -69,22 +37,6 @@ pub struct NewAnswer {
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub note: String,
-}
-
-/// The number of the answer that is asked for now, if any.
-pub(super) fn asks(session: &LabSession) -> Option<u32> {
-    let open = session.done(Act::Closed).is_none() && next_walk(session).is_none() && session.answer().is_none();
-    open.then(|| next_number(session))
-}
-
-fn next_number(session: &LabSession) -> u32 {
-    u32::try_from(session.answers.len()).unwrap_or(u32::MAX).saturating_add(1)
-}
-
-/// Whether the current answer can be retracted: the session is blinded, and it is not a safety report.
-pub(super) fn can_be_taken_back(session: &LabSession) -> bool {
-    let open = session.done(Act::Closed).is_none() && session.done(Act::Unblinded).is_none();
-    open && session.answer().is_some_and(|answer| !answer.said.is_about_safety())
 }
 
 /// Records the answer of the subject.
@@ -135,17 +87,17 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] if there is no answer, or one that cannot be retracted here.
-pub async fn take_back(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> Result<InTheLab, Error> {
+pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> Result<InTheLab, Error> {
     let session = still_open(writer, id).await?;
     let answer = session.answer().ok_or_else(|| Error::conflict("There is no answer to retract."))?;
-    if !can_be_taken_back(&session) {
+    if !can_be_retracted(&session) {
         let why = "This answer cannot be retracted here, because it is a safety report or the session is unblinded. Ask the study \
                    coordinator to change it on the page of the study.";
         return Err(Error::conflict(why));
     }
-    lab_answers::take_back(writer, &caller.actor, id, answer.number).await?;
+    lab_answers::retract(writer, &caller.actor, id, answer.number).await?;
     let detail = json!({ "number": answer.number });
-    audit::append(writer, &caller.actor, "lab_session.take_back", &format!("lab session {id}"), &detail).await?;
+    audit::append(writer, &caller.actor, "lab_session.retract", &format!("lab session {id}"), &detail).await?;
     in_the_lab(writer, id).await
 }
 

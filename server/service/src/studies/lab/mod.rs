@@ -7,17 +7,20 @@
 
 mod answer;
 mod measured;
+mod question;
 mod session;
+mod unblinding;
 mod upload;
 
-pub use answer::{AnswerView, NewAnswer, give as answer, take_back};
+pub use answer::{NewAnswer, give as answer, retract};
 pub use measured::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, beside_model, compute, emg, keep_result, known_gait,
     limit_cycles,
 };
+pub use question::{AnswerView, WALKS};
 pub use session::{
-    Condition, GaitOfWalk, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView,
-    checked_walk, close, for_device, gaits_to_walk_with, in_the_lab, plan, record_walk, still_open, unblind,
-    was_recorded,
+    Condition, GaitOfWalk, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WalkView, checked_walk,
+    close, for_device, gaits_to_walk_with, in_the_lab, plan, record_walk, still_open, was_recorded,
 };
+pub use unblinding::unblind;
 pub use upload::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, check_kept, keep};

@@ -1,6 +1,6 @@
-//! Lab sessions: planning, recording of walks, closing, unblinding, and the views that conceal the allocation.
+//! Lab sessions: planning, recording of walks, closing, and the views that conceal the allocation.
 
-use super::answer::{self, AnswerView};
+use super::question::{AnswerView, WALKS, asks, can_be_retracted, has_file, next_walk};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -13,8 +13,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// Number of walks of a session.
-pub const WALKS: u8 = 3;
 /// Maximum length of a note, characters.
 const LONGEST_NOTE: usize = 2000;
 
@@ -180,13 +178,6 @@ pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
     }
 }
 
-/// Whether an actor may have fetched a controller file of this session before an instant. Any actor counts if a token
-/// fetched one, because its holder is unknown.
-pub(super) fn has_file(session: &LabSession, actor: &str, at: Instant) -> bool {
-    let may_be = |other: &str| other == actor || Actor::is_token(other) || Actor::is_token(actor);
-    session.allocation.files.iter().any(|file| !file.to_device && may_be(&file.actor) && file.at <= at)
-}
-
 /// Which of a session's two gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GaitOfWalk {
@@ -226,7 +217,7 @@ fn checked_device_walk(walk: u8) -> Result<u8, Error> {
     }
 }
 
-fn not_included() -> Error {
+pub(super) fn not_included() -> Error {
     Error::conflict(
         "The archive of this session did not include the allocation, because the session was blinded. Unblind it where it was \
          planned.",
@@ -310,7 +301,7 @@ pub struct InTheLab {
     /// Current answer of the subject.
     pub answer: Option<AnswerView>,
     /// Whether that answer can be retracted here.
-    pub can_be_taken_back: bool,
+    pub can_be_retracted: bool,
     /// Whether the session is closed.
     pub closed: bool,
 }
@@ -327,15 +318,11 @@ pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLa
         walk: next_walk(&session).filter(|_| !closed),
         walks: WALKS,
         last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(Act::Walk(walk))).map(|done| done.at),
-        asks: answer::asks(&session),
+        asks: asks(&session),
         answer: session.answer().map(|answer| AnswerView::of(&session, answer)),
-        can_be_taken_back: answer::can_be_taken_back(&session),
+        can_be_retracted: can_be_retracted(&session),
         closed,
     })
-}
-
-pub(super) fn next_walk(session: &LabSession) -> Option<u8> {
-    (1..=WALKS).find(|walk| session.done(Act::Walk(*walk)).is_none())
 }
 
 /// Walk to record.
@@ -420,25 +407,4 @@ pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &
     let detail = json!({ "note": note });
     audit::append(writer, actor, "lab_session.close", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)
-}
-
-/// Unblinds a session: reveals which gait each walk used to all readers, and passes the subject's answer to the
-/// learner.
-///
-/// # Errors
-/// [`Error::Invalid`] without a reason, [`Error::Conflict`] if it is already unblinded, or its allocation is not in
-/// this record.
-pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reason: &str) -> Result<LabSession, Error> {
-    let reason = printable::reason("reason", reason, " that say why the session is unblinded")?;
-    if !still_shown(writer, id).await?.allocation.included {
-        return Err(not_included());
-    }
-    if !lab_sessions::act(writer, actor, id, Act::Unblinded, reason).await? {
-        return Err(Error::conflict("This session is already unblinded."));
-    }
-    let detail = json!({ "reason": reason });
-    audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;
-    let session = lab_sessions::get(writer, id).await?;
-    answer::hear(writer, &session).await?;
-    Ok(session)
 }
