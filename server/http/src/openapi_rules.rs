@@ -74,7 +74,7 @@ pub(super) fn state(document: &mut Value) {
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
         add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
         let people =
-            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who says so" });
+            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers" });
         schemas.insert("PersonSource".to_owned(), people);
         for component in ["NewPreference", "NewAssessment", "Suggestion"] {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
