@@ -181,8 +181,8 @@ impl Kind {
                 "/problems/internal",
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "Internal error",
-                "The program or the machine failed. The log has the cause, under the request id of this response.",
-                "Give the request id to the administrator.",
+                "The program or the machine failed. The log has the cause, under the request ID of this response.",
+                "Give the request ID to the administrator.",
             ),
             Self::TimedOut => entry(
                 "/problems/timed-out",
