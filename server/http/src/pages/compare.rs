@@ -362,7 +362,7 @@ const LABELS: [(&str, &str); 6] = [
     ("a", "Gait A"),
     ("b", "Gait B"),
     ("answer", "Answer"),
-    ("source", "Answer by"),
+    ("source", "Answer given by"),
     ("author", "Your name or code"),
     ("note", "Note"),
 ];
