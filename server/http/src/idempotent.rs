@@ -71,7 +71,7 @@ impl<P: Permission> Idempotent<P> {
     /// Begins the transaction of an effect whose response contains a secret, and therefore must not be stored.
     pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<LentWriter<'a>, Error> {
         if self.key.is_some() {
-            let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown request.";
+            let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown once.";
             return Err(Error::Malformed(reason.to_owned()));
         }
         Ok(app.write().await?)

@@ -1,7 +1,7 @@
 //! Adds ranges, lengths, patterns and allowed words to the schemas of the description.
 //!
 //! A value that matches the description is accepted, unless the state of the record forbids it. Names and notes follow
-//! the same rules everywhere, so they are stated request. The ranges of solver and learner settings come from the errors
+//! the same rules everywhere, so they are stated once. The ranges of solver and learner settings come from the errors
 //! of their own checks.
 
 use super::openapi_depends;

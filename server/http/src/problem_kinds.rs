@@ -189,7 +189,7 @@ impl Kind {
                 StatusCode::SERVICE_UNAVAILABLE,
                 "The request timed out",
                 "The service stopped waiting for the request. A change may still have been made.",
-                "Check the current state, then try again. With the same Idempotency-Key, a change is made only request.",
+                "Check the current state, then try again. With the same Idempotency-Key, a change is made only once.",
             ),
             Self::NotReady => entry(
                 "/problems/not-ready",
