@@ -18,7 +18,7 @@ pub enum LearnerError {
         reason: String,
     },
     /// The lengthscale is so short that actions are uncorrelated, or so long that they are indistinguishable.
-    #[error("dimension `{dimension}`: lengthscale {lengthscale} is outside the range from {shortest} to {longest}")]
+    #[error("dimension `{dimension}`: lengthscale is {lengthscale}; it must be {shortest} to {longest}")]
     InvalidLengthscale {
         /// Name of the dimension.
         dimension: String,
@@ -44,7 +44,7 @@ pub enum LearnerError {
         actions: u64,
     },
     /// The number of levels or values differs from the number of dimensions.
-    #[error("{given} coordinates given, but the search space has {expected} dimensions")]
+    #[error("the action has {given} coordinates, but the search space has {expected} dimensions")]
     WrongDimensionCount {
         /// Number of coordinates given.
         given: usize,
@@ -98,11 +98,11 @@ pub enum LearnerError {
         categories: usize,
     },
     /// A setting is out of range or contradicts another one.
-    #[error("setting `{setting}`: {reason}")]
+    #[error("setting `{setting}` {reason}")]
     InvalidSetting {
         /// Name of the setting.
         setting: &'static str,
-        /// What is wrong with it.
+        /// What is wrong with it; follows the name of the setting.
         reason: String,
     },
     /// No action is left to propose: each has been visited or is pending. If actions may be repeated, each is pending.

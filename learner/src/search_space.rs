@@ -46,10 +46,10 @@ impl Dimension {
             return refuse("at least one level is needed".into());
         }
         if self.values.len() > MAX_LEVELS {
-            return refuse(format!("{} levels given, at most {MAX_LEVELS} are allowed", self.values.len()));
+            return refuse(format!("it has {} levels; at most {MAX_LEVELS} are allowed", self.values.len()));
         }
         if let Some(value) = self.values.iter().find(|v| v.is_nan() || v.abs() > MAX_LEVEL) {
-            return refuse(format!("level {value} is outside the range from {:e} to {MAX_LEVEL:e}", -MAX_LEVEL));
+            return refuse(format!("a level is {value}; it must be {:e} to {MAX_LEVEL:e}", -MAX_LEVEL));
         }
         if let Some([low, high]) = self.values.array_windows().find(|[low, high]| low >= high) {
             return refuse(format!("levels must increase, but {high} follows {low}"));
@@ -134,7 +134,7 @@ impl SearchSpace {
                 return Err(LearnerError::InvalidDimension {
                     dimension: dimension.name.clone(),
                     reason: if d >= MAX_DIMENSIONS {
-                        format!("it is dimension {}, at most {MAX_DIMENSIONS} are allowed", d + 1)
+                        format!("it is dimension {}; at most {MAX_DIMENSIONS} are allowed", d + 1)
                     } else {
                         "another dimension has the same name".into()
                     },

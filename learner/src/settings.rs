@@ -255,7 +255,7 @@ impl LearnerSettings {
     /// [`LearnerError::InvalidSetting`] for the first setting that is out of range.
     pub fn validate(&self) -> Result<()> {
         let refuse = |setting, reason: String| Err(LearnerError::InvalidSetting { setting, reason });
-        let outside = |value: f64, low: f64, high: f64| format!("{value} is outside the range from {low} to {high}");
+        let outside = |value: f64, low: f64, high: f64| format!("is {value}; it must be {low} to {high}");
         for (setting, value, low, high) in [
             ("signal_variance", self.signal_variance, 1e-6, 1e6),
             ("nugget", self.nugget, 1e-10 * self.signal_variance, self.signal_variance),
@@ -287,10 +287,7 @@ impl LearnerSettings {
             }
         }
         if self.learn_every == Some(0) {
-            return refuse(
-                "learn_every",
-                "0 is not allowed; give at least 1, or null to keep the hyperparameters".into(),
-            );
+            return refuse("learn_every", "is 0; it must be at least 1, or null to keep the hyperparameters".into());
         }
         if let Some(avoidance) = self.avoidance
             && (avoidance.is_nan() || avoidance.abs() > 1e3)
@@ -300,11 +297,11 @@ impl LearnerSettings {
         if self.additive_share + self.pairwise_share > 1.0 {
             return refuse(
                 "pairwise_share",
-                format!("{} plus additive_share {} is more than 1", self.pairwise_share, self.additive_share),
+                format!("is {}; with additive_share {} it must be at most 1", self.pairwise_share, self.additive_share),
             );
         }
         if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
-            return refuse("link", "expectation propagation requires the probit link".into());
+            return refuse("link", "must be probit for expectation propagation".into());
         }
         let farthest = 10.0 * deviation;
         if let Some(&threshold) = self.ordinal_thresholds.iter().find(|t| t.is_nan() || t.abs() > farthest) {
@@ -313,23 +310,21 @@ impl LearnerSettings {
         }
         let narrowest = 1e-3 * deviation;
         if let Some([below, above]) = self.ordinal_thresholds.array_windows().find(|[a, b]| b - a < narrowest) {
-            let reason = format!("{above} must exceed the threshold before it, {below}, by at least {narrowest}");
+            let reason =
+                format!("has {above} after {below}; each must exceed the one before it by at least {narrowest}");
             return refuse("ordinal_thresholds", reason);
         }
         if self.ordinal_thresholds.len() > 100 {
             return refuse(
                 "ordinal_thresholds",
-                format!("{} thresholds given, at most 100 are allowed", self.ordinal_thresholds.len()),
+                format!("has {} thresholds; it must have at most 100", self.ordinal_thresholds.len()),
             );
         }
         if !(1..=1024).contains(&self.samples_per_iteration) {
-            return refuse(
-                "samples_per_iteration",
-                format!("{} is outside the range from 1 to 1024", self.samples_per_iteration),
-            );
+            return refuse("samples_per_iteration", format!("is {}; it must be 1 to 1024", self.samples_per_iteration));
         }
         if self.buffer > 10_000 {
-            return refuse("buffer", format!("{} is outside the range from 0 to 10000", self.buffer));
+            return refuse("buffer", format!("is {}; it must be 0 to 10000", self.buffer));
         }
         Ok(())
     }

@@ -60,7 +60,7 @@ impl EmgSettings {
             return Err(ModelError::Unknown {
                 field: "emg.order".to_owned(),
                 value: self.order.to_string(),
-                known: "2, 4, 6, 8".to_owned(),
+                known: "2, 4, 6 or 8".to_owned(),
             });
         }
         Ok(())

@@ -329,6 +329,6 @@ mod tests {
         assert_eq!(given, again);
         let refused: GaitSettings = serde_json::from_str(r#"{"naturalness": {"reference_weight": -1}}"#).unwrap();
         let refusal = refused.validate().unwrap_err().to_string();
-        assert_eq!(refusal, "naturalness.reference_weight = -1 is outside the allowed range [0, 100]");
+        assert_eq!(refusal, "naturalness.reference_weight is -1; it must be 0 to 100.");
     }
 }

@@ -3,11 +3,16 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+/// A range in words.
+fn range(minimum: f64, maximum: f64) -> String {
+    if minimum < maximum { format!("{minimum} to {maximum}") } else { minimum.to_string() }
+}
+
 /// Why an input was rejected: a subject, device, bound, setting or file.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ModelError {
     /// A number is outside its allowed range.
-    #[error("{field} = {value} is outside the allowed range [{minimum}, {maximum}]")]
+    #[error("{field} is {value}; it must be {}.", range(*minimum, *maximum))]
     OutOfRange {
         /// Name of the field with its unit, as in the public interface (`height_m`).
         field: String,
@@ -19,17 +24,17 @@ pub enum ModelError {
         maximum: f64,
     },
     /// A name is unknown.
-    #[error("{field}: unknown value {value:?}; known: {known}")]
+    #[error("{field} is {value:?}; it must be {}.", known.trim_end_matches('.'))]
     Unknown {
         /// Field name.
         field: String,
         /// The value that was given.
         value: String,
-        /// The known values.
+        /// The known values, which complete the sentence "it must be ...".
         known: String,
     },
     /// A text or file cannot be parsed.
-    #[error("{what}: {reason}")]
+    #[error("{what}: {}.", reason.trim_end_matches('.'))]
     Malformed {
         /// Name of the text or file.
         what: String,
@@ -90,7 +95,7 @@ impl Subject {
             other => Err(ModelError::Unknown {
                 field: "subject".to_owned(),
                 value: other.to_string(),
-                known: "1, 2 (the subjects of the paper); or give height and mass".to_owned(),
+                known: "1 or 2, a subject of the paper. For any other subject, give height and mass".to_owned(),
             }),
         }
     }

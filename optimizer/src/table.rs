@@ -133,7 +133,7 @@ impl Table {
         let mut row = Vec::with_capacity(cells.len());
         for (column, cell) in cells.iter().enumerate().filter(|(column, _)| Some(*column) != self.words) {
             let value = cell.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
-                let reason = format!("{} = {cell:?} is not a number", self.names[row.len()]);
+                let reason = format!("{} is {cell:?}; it must be a number", self.names[row.len()]);
                 malformed(&self.what, line, Some(column + 1), reason)
             })?;
             row.push(value);

@@ -74,7 +74,7 @@ impl TunedBounds {
             return Err(ModelError::Unknown {
                 field: "bounds".to_owned(),
                 value: name.to_owned(),
-                known: Self::NAMES.join(", "),
+                known: format!("one of {}", Self::NAMES.join(", ")),
             });
         };
         ModelError::check_range(name, value, Self::RANGES[index].0, Self::RANGES[index].1)?;

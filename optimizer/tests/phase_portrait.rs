@@ -83,11 +83,11 @@ fn incomplete_recordings_are_rejected_with_their_place() {
     );
     let short: Vec<String> = csv().lines().take(62).map(str::to_owned).collect();
     let short = JointRecording::from_csv("walk.csv", &short.join("\n")).unwrap().check_walking("walk.csv");
-    let reason = "walk.csv: the recording lasts 0.590 s; a limit cycle needs at least 2 s";
+    let reason = "walk.csv: the recording lasts 0.590 s; a limit cycle needs at least 2 s.";
     assert_eq!(short.unwrap_err().to_string(), reason);
     let recording = JointRecording::from_csv("walk.csv", &csv()).unwrap();
     assert_eq!(recording.check_walking("walk.csv"), Ok(()));
-    assert!(recording.portraits(60.0).unwrap_err().to_string().starts_with("cutoff_hz = 60 is outside"));
+    assert!(recording.portraits(60.0).unwrap_err().to_string().starts_with("cutoff_hz is 60; it must be"));
 }
 
 /// A table of joints over time with a given spacing of rows in s.

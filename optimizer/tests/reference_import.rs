@@ -178,14 +178,14 @@ type Change = fn(&mut ReferenceGait);
 fn implausible_reference_is_rejected_with_the_field() {
     let whole = ReferenceGait::builtin().unwrap();
     let changes: [(Change, &str); 5] = [
-        (|r| r.angles_rad.iter_mut().flatten().for_each(|a| *a = a.to_degrees()), "angles_rad[0][0] = 7"),
-        (|r| r.standard_deviation_rad = Some(vec![[-0.1; 5]; 101]), "standard_deviation_rad[0][0] = -0.1"),
+        (|r| r.angles_rad.iter_mut().flatten().for_each(|a| *a = a.to_degrees()), "angles_rad[0][0] is 7"),
+        (|r| r.standard_deviation_rad = Some(vec![[-0.1; 5]; 101]), "standard_deviation_rad[0][0] is -0.1;"),
         (
             |r| r.standard_deviation_rad = Some(vec![[0.1; 5]; 50]),
             "standard_deviation_rad: the curve has 50 rows; 101 are expected",
         ),
-        (|r| r.height_m = Some(175.0), "height_m = 175"),
-        (|r| r.body_mass_kg = Some(f64::NAN), "body_mass_kg = NaN"),
+        (|r| r.height_m = Some(175.0), "height_m is 175;"),
+        (|r| r.body_mass_kg = Some(f64::NAN), "body_mass_kg is NaN;"),
     ];
     for (change, expected) in changes {
         let mut reference = whole.clone();
@@ -234,7 +234,7 @@ fn exported_gait_is_imported_with_the_same_curves() {
                 .contains(&format!("2 right heel strikes at the ends of the recording: 0.0000, {end:.4} s"))
         );
         let within = recording.heel_strikes(&HeelStrikes::Kinematics).unwrap_err().to_string();
-        assert!(within.ends_with("for a recording of exactly one stride, use its ends"), "{within}");
+        assert!(within.ends_with("for a recording of exactly one stride, use its ends."), "{within}");
         for (domain, name) in gait.domains.iter().zip(0..) {
             for ((time, q), k) in domain.time_s.iter().zip(&domain.q).zip(0..) {
                 let at_an_impact = k == 0 || k + 1 == domain.time_s.len();
@@ -325,7 +325,10 @@ fn built_in_reference_has_the_published_deviations() {
     assert!(refused.contains("line 1: column hip_R_sd_rad is missing"), "{refused}");
     let negative = format!("{},hip_R_sd_rad\n0,.1,.1,.1,.1,.1,.01,.01,-.01,.01,.01\n", columns.trim_end());
     let refused = ReferenceGait::from_csv("negative", &negative).unwrap_err().to_string();
-    assert!(refused.contains("line 2: knee_L_sd_rad = \"-.01\" is not an angle in [0.00, 3.14] rad"), "{refused}");
+    assert!(
+        refused.contains("line 2: knee_L_sd_rad is \"-.01\"; it must be an angle from 0.00 to 3.14 rad"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -358,7 +361,7 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
     assert!(refused(vec![0.5]).contains("1 right heel strikes found; a stride needs two"));
     assert!(refused(vec![0.5, 0.9]).contains("none of the 1 strides lasts 0.8 to 1.6 s"));
     assert!(refused(vec![1.5, 0.5]).contains("must increase"));
-    assert!(refused(vec![0.5, 9.0]).contains("heel strike (s) = 9 is outside"));
+    assert!(refused(vec![0.5, 9.0]).contains("heel strike (s) is 9; it must be"));
     // Forces that end before the first stride.
     let force = VerticalForce { time_s: vec![0.0, 0.1, 0.2], force_n: vec![0.0; 3] };
     let early = MotionRecording { right_force: Some(force), ..recording.clone() };
@@ -370,7 +373,7 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
     assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));
     let short = Walker { height_m: Some(0.5), ..Walker::default() };
     let error = recording.reference("x", &HeelStrikes::Given(vec![0.0, 1.1]), short).unwrap_err();
-    assert!(error.to_string().contains("height_m = 0.5"));
+    assert!(error.to_string().contains("height_m is 0.5;"));
 }
 
 /// Five strides of 1.1 s of the built-in reference as a recording, with angles modified by `change` and delayed by the

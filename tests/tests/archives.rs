@@ -386,14 +386,18 @@ const FORGERIES: [Forgery; 57] = [
         |r| of_source(r, "clinician")["author"] = "a\u{202e}b".into(),
         "printable characters",
     ),
-    ("a consent", |r| r.0.push(("consents".to_owned(), json!({"seq": 1}))), "which no archive has"),
+    ("a consent", |r| r.0.push(("consents".to_owned(), json!({"seq": 1}))), "which is not part of an archive"),
 ];
 
 /// Forgeries of what only the whole file shows.
 const MORE: [Forgery; 8] =
     [
-        ("an audit row", |r| r.0.push(("audit".to_owned(), json!({"seq": 1}))), "which no archive has"),
-        ("a certificate", |r| r.0.push(("certificates".to_owned(), json!({"passed": 1}))), "which no archive has"),
+        ("an audit row", |r| r.0.push(("audit".to_owned(), json!({"seq": 1}))), "which is not part of an archive"),
+        (
+            "a certificate",
+            |r| r.0.push(("certificates".to_owned(), json!({"passed": 1}))),
+            "which is not part of an archive",
+        ),
         ("an unknown column", |r| r.first("trials")["certified"] = 1.into(), "unknown column"),
         (
             "a time to come",

@@ -71,11 +71,11 @@ fn a_gait_is_solved_certified_and_converted() {
     refused(folder, &["convert", "gait.json", "--to", "controller"], "invalid value 'controller'");
     let tiles = done(folder, &["convert", "gait.json", "--to", "tiles"]);
     assert!(tiles.starts_with("<svg") && tiles.contains(">100 %</text>"), "{tiles}");
-    refused(folder, &["convert", "gait.json", "--to", "mot", "--rate-hz", "0", "--out", "x.mot"], "rate_hz = 0");
+    refused(folder, &["convert", "gait.json", "--to", "mot", "--rate-hz", "0", "--out", "x.mot"], "rate_hz is 0;");
     let mut broken = outcome["gait"].clone();
     broken["domains"].as_array_mut().unwrap().pop();
     std::fs::write(folder.join("broken.json"), broken.to_string()).unwrap();
-    refused(folder, &["certify", "broken.json"], "number of domains = 7");
+    refused(folder, &["certify", "broken.json"], "number of domains is 7; it must be 8.");
 }
 
 #[test]
@@ -114,7 +114,7 @@ async fn a_trial_gets_its_certificate_once() {
     let address = format!("/api/v1/trials/{}/certificate", trial.id);
     assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("has no certificate yet") && page.contains("Certify (takes some seconds)"), "{page}");
+    assert!(page.contains("has no certificate yet") && page.contains("Certify (takes a few seconds)"), "{page}");
 
     let motion = service.fetch(&format!("/api/v1/trials/{}/gait.mot?rate_hz=100", trial.id)).await;
     assert!(motion.text.contains("inDegrees=yes") && motion.text.contains("knee_angle_l"), "{}", motion.text);

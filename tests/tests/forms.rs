@@ -144,7 +144,7 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
     for (field, value, says) in [
         ("muscles", "maybe", "it must be on, off"),
         ("muscles", "", "it must be on, off"),
-        ("feedback_mode", "both", "it must be automatic, human, mixed"),
+        ("feedback_mode", "both", "it must be automatic, human or mixed"),
         ("trial_budget", "-1", "it must be 1 to 10000"),
         ("parallel_trials", "1.5", "it must be 1 to 64"),
         ("seed", "-1", "it must be 0 to 9007199254740991"),

@@ -279,7 +279,7 @@ async fn unsafe_walk_closes_both_gaits_until_unblinding() {
     assert_eq!(closed().await, [true, true]);
     let pair = json!({"trial_a": gaits[0].id, "trial_b": gaits[2].id, "answer": "a", "author": "K"});
     let refused = service.post(&format!("/api/v1/studies/{study}/preferences"), &pair).await;
-    assert!(refused.text.contains("a gait that may be walked with"), "{}", refused.text);
+    assert!(refused.text.contains("a walkable gait"), "{}", refused.text);
     let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[2].id});
     let refused = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await;
     assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("gait_one")));

@@ -165,8 +165,8 @@ impl NlpResult {
 fn range(low: f64, high: f64) -> String {
     match (low == f64::MIN_POSITIVE, high >= f64::MAX) {
         (true, true) => "any positive number".to_owned(),
-        (true, false) => format!("more than 0, up to {high}"),
-        (false, true) => format!("{low} and more"),
+        (true, false) => format!("more than 0 and at most {high}"),
+        (false, true) => format!("at least {low}"),
         (false, false) => format!("{low} to {high}"),
     }
 }
@@ -176,7 +176,7 @@ fn range(low: f64, high: f64) -> String {
 #[non_exhaustive]
 pub enum NlpError {
     /// A setting is out of range.
-    #[error("setting {field} is {value}, allowed is {}", range(*low, *high))]
+    #[error("setting {field} is {value}; it must be {}", range(*low, *high))]
     InvalidSetting {
         /// Name of the field.
         field: &'static str,

@@ -78,7 +78,7 @@ impl CycleActivity {
         same.ok_or_else(|| ModelError::Unknown {
             field: "channel".to_owned(),
             value: self.channel.clone(),
-            known: gait.iter().map(|a| a.channel.as_str()).collect::<Vec<_>>().join(", "),
+            known: format!("one of {}", gait.iter().map(|a| a.channel.as_str()).collect::<Vec<_>>().join(", ")),
         })
     }
 

@@ -193,8 +193,8 @@ impl EmgRecording {
         let share = rms(&signal_filter::filter(&band, &about_mean)) / rms(&about_mean);
         (share < LEAST_IN_BAND).then(|| {
             format!(
-                "{:.1} % of the signal (RMS) is within {band_low_hz} to {band_high_hz} Hz, less than {:.0} %: an envelope \
-                 or movement, where the raw signal is needed",
+                "{:.1} % of the signal (RMS) is within {band_low_hz} to {band_high_hz} Hz, less than {:.0} %. It looks \
+                 like an envelope or movement, but the raw signal is needed",
                 100.0 * share,
                 100.0 * LEAST_IN_BAND
             )
@@ -244,8 +244,8 @@ fn rectified(samples: &[f64]) -> Option<String> {
     let share = samples.iter().filter(|sample| **sample <= near).count() as f64 / samples.len() as f64;
     (share >= OFTEN).then(|| {
         format!(
-            "it is never below zero and often at it ({:.0} of 100 samples): a rectified signal, where the raw one is \
-             needed",
+            "the signal is never negative and often near zero ({:.0} of 100 samples). It looks rectified, but the raw signal \
+             is needed",
             100.0 * share
         )
     })

@@ -43,8 +43,8 @@ pub(super) fn domains_at_limit(
         .map(|variable| programme.layout.variable_label(variable).0)
         .chain((0..programme.rows()).filter(|row| row_at_limit(*row)).map(|row| programme.rows.names[row].label()));
     for place in places {
-        // `SS1_R point 3, ...`, or a variable of the whole stride.
-        let name = place.split_once(" point").map_or("stride", |(domain, _)| domain);
+        // `SS1_R node 3, ...`, or a variable of the whole stride.
+        let name = place.split_once(" node").map_or("stride", |(domain, _)| domain);
         if !names.iter().any(|known| known == name) {
             names.push(name.to_owned());
         }

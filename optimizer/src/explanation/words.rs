@@ -249,7 +249,7 @@ mod tests {
             bounds: bounds.iter().map(given).collect(),
             without: Vec::new(),
             naturalness_terms: Vec::new(),
-            violations: missed("SS1_R point 12, C3 forward hip velocity"),
+            violations: missed("SS1_R node 12, C3 forward hip velocity"),
             starts: 5,
             undecided: false,
         }
@@ -291,7 +291,7 @@ mod tests {
             [
                 "a4 = 0.5 m/s (hip velocity upper bound) and a7 = 5 ° (hip angle) conflict with each other: with both, and \
                  the other tuned bounds at their loosest values, no gait was found from 5 starts; the nearest motion violates \
-                 SS1_R point 12, C3 forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
+                 SS1_R node 12, C3 forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
                  there is a gait.",
                 "With a7 = 15 ° (hip angle) instead of 5 ° alone, a gait converges; with 14.6 °, no gait was found from 3 \
                  starts.",
@@ -321,7 +321,7 @@ mod tests {
             fixed,
             "The conflict does not depend on tuned bounds: fixed constraints conflict with each other, among them: a slow start: \
              with every tuned bound at its loosest value, no gait was found from 5 starts; the nearest motion violates SS1_R \
-             point 12, C3 forward hip velocity by 0.107 m/s."
+             node 12, C3 forward hip velocity by 0.107 m/s."
         );
         let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words();
         assert!(further.starts_with("With a4 at its loosest value, another conflict remains. a8 = 5 °"), "{further}");

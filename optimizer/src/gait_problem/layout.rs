@@ -229,7 +229,7 @@ impl Layout {
         Self { muscles, domains, hip_velocities, right_step_length, stride_length, variables: next, scale }
     }
 
-    /// Name and unit of a variable: `SS1_R point 3, velocity of knee_R`.
+    /// Name and unit of a variable: `SS1_R node 3, velocity of knee_R`.
     pub fn variable_label(&self, index: usize) -> (String, &'static str) {
         for layout in &self.domains {
             let name = layout.domain.name();
@@ -237,7 +237,7 @@ impl Layout {
                 let (k, offset) =
                     ((index - layout.start) / layout.per_point, (index - layout.start) % layout.per_point);
                 let (what, unit) = point_variable_label(layout, offset);
-                return (format!("{name} point {k}, {what}"), unit);
+                return (format!("{name} node {k}, {what}"), unit);
             }
             if index == layout.duration {
                 return (format!("{name} duration"), "s");

@@ -199,10 +199,10 @@ impl RowName {
         }
     }
 
-    /// `SS1_R point 3, C3 swing-foot clearance, heel_L`.
+    /// `SS1_R node 3, C3 swing-foot clearance, heel_L`.
     pub fn label(&self) -> String {
         let place = match self.place {
-            RowPlace::Point { domain, point } => format!("{} point {point}", CYCLE[usize::from(domain).min(7)].name()),
+            RowPlace::Point { domain, point } => format!("{} node {point}", CYCLE[usize::from(domain).min(7)].name()),
             RowPlace::Transition { domain } => {
                 let from = usize::from(domain).min(7);
                 format!("{} to {}", CYCLE[from].name(), CYCLE[(from + 1) % 8].name())

@@ -185,7 +185,7 @@ impl MuscleParameters {
                     return Err(ModelError::Unknown {
                         field: format!("muscles.{kind}.{}_lever_m", joint.name()),
                         value: value.to_string(),
-                        known: format!("none, because {kind} does not span the {}", joint.name()),
+                        known: format!("absent, because {kind} does not span the {}", joint.name()),
                     });
                 }
             }
@@ -272,8 +272,8 @@ mod tests {
             assert!((ham.attachments[0].unwrap().lever_m - 0.07).abs() < 1e-12);
         }
         for (text, expected) in [
-            (r#"{"ta": {"max_force_n": 1.0}}"#, "muscles.ta.max_force_n = 1 is outside the allowed range [50, 20000]"),
-            (r#"{"sol": {"knee_lever_m": 0.05}}"#, "muscles.sol.knee_lever_m: unknown value \"0.05\"; known: none"),
+            (r#"{"ta": {"max_force_n": 1.0}}"#, "muscles.ta.max_force_n is 1; it must be 50 to 20000."),
+            (r#"{"sol": {"knee_lever_m": 0.05}}"#, "muscles.sol.knee_lever_m is \"0.05\"; it must be absent"),
         ] {
             let refusal = read(text).validate().unwrap_err().to_string();
             assert!(refusal.contains(expected), "{refusal}");

@@ -91,9 +91,9 @@ impl ReferenceGait {
                         .ok()
                         .filter(|angle| (least..=LARGEST_ANGLE_RAD).contains(angle))
                         .ok_or_else(|| {
-                            let range = format!("[{least:.2}, {LARGEST_ANGLE_RAD:.2}] rad");
+                            let range = format!("from {least:.2} to {LARGEST_ANGLE_RAD:.2} rad");
                             let line = record.position().map_or(0, csv::Position::line);
-                            malformed(line, format!("{wanted} = {cell:?} is not an angle in {range}"))
+                            malformed(line, format!("{wanted} is {cell:?}; it must be an angle {range}"))
                         })?;
                 }
                 Ok(row)

@@ -11,7 +11,7 @@ pub enum SolveError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The warm start belongs to another problem.
-    #[error("the warm start belongs to another problem: {0}")]
+    #[error("The warm start belongs to another problem: {0}.")]
     WarmStartShape(String),
     /// The interior-point solver rejected its input.
     #[error(transparent)]

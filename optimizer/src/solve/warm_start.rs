@@ -73,7 +73,7 @@ fn check_shape(programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveE
         ("upper slack multipliers", point.slack_upper_multipliers.len(), m),
     ] {
         if found != expected {
-            return Err(SolveError::WarmStartShape(format!("{found} {name}, expected {expected}")));
+            return Err(SolveError::WarmStartShape(format!("it has {found} {name}; the problem has {expected}")));
         }
     }
     if !warm.margins.fit(n, m) {

@@ -42,10 +42,10 @@ pub enum Drawing {
 #[derive(Debug, Error)]
 pub enum PngError {
     /// The SVG cannot be read.
-    #[error("Cannot draw a figure: {0}")]
+    #[error("Cannot draw a figure: {0}.")]
     Svg(#[from] resvg::usvg::Error),
     /// The pixels cannot be allocated or encoded.
-    #[error("Cannot draw a figure: {0}")]
+    #[error("Cannot draw a figure: {0}.")]
     Pixels(String),
 }
 

@@ -143,7 +143,7 @@ fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, ModelError> {
     let phase =
         Chart::new("Phase", CYCLE, "phase variable, 0 to 1").with("phase", 0, Stroke::Solid, over(|point| point.phase));
     let charts = vec![cycle.marked(velocity), cycle.marked(phase)];
-    let hint = "The phase is the hip's linearised place over the stance toe, from the planned start of a domain to its planned \
+    let hint = "The phase is the linearised hip position over the stance toe, from the planned start of a domain to its planned \
                 end; it takes the place of time. In all domains but SS1 its velocity is held constant.";
     Ok(Group::new("phase", "Hip velocity and phase", hint, charts))
 }

@@ -180,7 +180,7 @@ async fn write_what_waits(app: AppState, task: Task) -> Result<(), Error> {
                 task.works();
                 failing = false;
             }
-            // The record takes no changes, as `/ready` says: nothing is lost, and the log says so request.
+            // The record takes no changes, as `/ready` says: nothing is lost, and the log says so once.
             Err(error) if error.is_of_machine() => {
                 if !std::mem::replace(&mut failing, true) {
                     tracing::error!(%error, "cannot write the access log; keeping its rows");

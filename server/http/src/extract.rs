@@ -30,7 +30,7 @@ pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
     } else if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
         Error::UnsupportedMediaType(reason.to_owned())
     } else {
-        Error::Malformed(format!("The body cannot be read: {reason}"))
+        Error::Malformed(format!("The body cannot be read: {}.", reason.trim_end_matches('.')))
     }
 }
 

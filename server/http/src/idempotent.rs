@@ -71,7 +71,7 @@ impl<P: Permission> Idempotent<P> {
     /// Begins the transaction of an effect whose response contains a secret, and therefore must not be stored.
     pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<LentWriter<'a>, Error> {
         if self.key.is_some() {
-            let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown request.";
+            let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown once.";
             return Err(Error::Malformed(reason.to_owned()));
         }
         Ok(app.write().await?)
@@ -136,14 +136,14 @@ impl<P: Permission> Idempotent<P> {
 
 /// The one key in a request.
 fn key_in(headers: &HeaderMap) -> Result<Option<String>, Error> {
-    let malformed = |reason: &str| Error::Malformed(format!("Idempotency-Key: {reason}"));
+    let malformed = |reason: &str| Error::Malformed(format!("The Idempotency-Key header {reason}."));
     let mut all = headers.get_all(&IDEMPOTENCY_KEY).iter();
     let Some(value) = all.next() else { return Ok(None) };
     if all.next().is_some() {
-        return Err(malformed("given more than once; one is accepted"));
+        return Err(malformed("occurs more than once"));
     }
     let key = value.to_str().ok().filter(|key| (1..=200).contains(&key.len()));
-    Ok(Some(key.ok_or_else(|| malformed("1 to 200 printable ASCII characters are accepted"))?.to_owned()))
+    Ok(Some(key.ok_or_else(|| malformed("must have 1 to 200 printable ASCII characters"))?.to_owned()))
 }
 
 fn response(kept: &Kept) -> Response {

@@ -19,8 +19,8 @@ use utoipa_axum::router::OpenApiRouter;
         title = "Gaitwright",
         description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
                        not a medical device.\n\nLengths are in metres, masses in kilograms and angles in radians, unless \
-                       a name says otherwise. Times are RFC 3339 in UTC. Whole numbers have no fraction.\n\nA list is answered by pages: `items`, and in `next` the \
-                       `cursor` of the next page.",
+                       a name says otherwise. Times are RFC 3339 in UTC. Whole numbers have no fraction.\n\nLists \
+                       come in pages: `items` has the entries, and `next` is the `cursor` of the next page.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/"))
@@ -122,7 +122,7 @@ fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
         parameters.push(json!({
             "name": "limit", "in": "query", "required": false,
             "schema": { "type": "integer", "format": "int32", "minimum": 1, "maximum": LARGEST_LIMIT, "default": DEFAULT_LIMIT },
-            "description": "Most entries of the page"
+            "description": "Maximum number of entries of the page"
         }));
     }
     if changes && !shown_once {
@@ -171,7 +171,7 @@ fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
     for status in ["201", "202"] {
         if let Some(response) = responses.get_mut(status) {
             response["headers"]["Location"] =
-                json!({ "description": "Address of what was made", "schema": { "type": "string" } });
+                json!({ "description": "Address of the new object", "schema": { "type": "string" } });
         }
     }
     answer_problems(responses);

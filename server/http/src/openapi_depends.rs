@@ -12,11 +12,11 @@ const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more. The values of a di
 const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
 const EMG_FILE: &str = "A file of the given form with the columns of the muscles, sampled at 100 Hz or more, with one whole stride or more. \
-                        Columns and heel strikes that are named are in it.";
+                        It has all columns and heel strikes that the request names.";
 const MOTION_FILE: &str = "A file of the given form with the angle of one joint or more over several strides, as optimizer/data/README.md \
                            describes it.";
 const REFERENCE_FILE: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five joint angles over at \
-                              least one whole stride of a walking person. Heel strikes and columns that are named must be in it.";
+                              least one whole stride of a walking person. It has all columns and heel strikes that the request names.";
 
 /// Component, field, and the rule.
 const RULES: [(&str, &str, &str); 26] = [
@@ -30,7 +30,7 @@ const RULES: [(&str, &str, &str); 26] = [
     (
         "Suggestion",
         "bounds",
-        "Dimensions of the study's search space with values of theirs, one of them not that of the trial.",
+        "Dimensions of the study's search space, each with one of its values. At least one value differs from that of the trial.",
     ),
     ("NewStudy", "subject_id", EXISTS),
     ("NewStudy", "device_id", EXISTS),
@@ -42,7 +42,7 @@ const RULES: [(&str, &str, &str); 26] = [
     (
         "Extend",
         "trial_budget",
-        "More than the study has begun; of a study that has ended, more than its present budget.",
+        "More than the number of trials begun. For a study that has ended, more than its current budget.",
     ),
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
     ("Invitation", "name", "The name of a rater, or one that is not taken."),
@@ -53,11 +53,7 @@ const RULES: [(&str, &str, &str); 26] = [
         "Not before the newest safety report that the decision is about, and not after now.",
     ),
     ("NewEmg", "recording", EMG_FILE),
-    (
-        "NewEmg",
-        "reading",
-        "An OpenSim file has no `rate_hz`. Heel strikes are two or more times, or a column in their place.",
-    ),
+    ("NewEmg", "reading", "An OpenSim file has no `rate_hz`. Heel strikes are two or more times, or a column instead."),
     ("NewMotion", "recording", MOTION_FILE),
     ("NewMotion", "reading", "`cutoff_hz` is at most 0.45 of the sampling rate."),
     ("NewReferenceGait", "recording", REFERENCE_FILE),

@@ -1,7 +1,7 @@
 //! Adds ranges, lengths, patterns and allowed words to the schemas of the description.
 //!
 //! A value that matches the description is accepted, unless the state of the record forbids it. Names and notes follow
-//! the same rules everywhere, so they are stated request. The ranges of solver and learner settings come from the errors
+//! the same rules everywhere, so they are stated once. The ranges of solver and learner settings come from the errors
 //! of their own checks.
 
 use super::openapi_depends;
@@ -74,7 +74,7 @@ pub(super) fn state(document: &mut Value) {
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
         add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
         let people =
-            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who says so" });
+            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers" });
         schemas.insert("PersonSource".to_owned(), people);
         for component in ["NewPreference", "NewAssessment", "Suggestion"] {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });

@@ -95,7 +95,7 @@ fn cursor<K: Serialize>(key: &K) -> Result<String, Error> {
 
 impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
     fn read(query: &str) -> Result<Self, Error> {
-        let malformed = |e: serde_urlencoded::de::Error| Error::Malformed(format!("the query cannot be read: {e}"));
+        let malformed = |e: serde_urlencoded::de::Error| Error::Malformed(format!("The query cannot be read: {e}."));
         let pairs: Vec<(String, String)> = serde_urlencoded::from_str(query).map_err(malformed)?;
         let (mut after, mut limit, mut filter) = (None, None, Vec::new());
         for (name, value) in pairs {
@@ -108,7 +108,7 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
                 }
             };
             if given {
-                return Err(Error::Malformed(format!("the query names {name} twice")));
+                return Err(Error::Malformed(format!("The query has the parameter {name} twice.")));
             }
         }
         let filter = serde_urlencoded::to_string(filter).map_err(|e| Error::Internal(e.to_string()))?;

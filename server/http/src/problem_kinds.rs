@@ -181,15 +181,15 @@ impl Kind {
                 "/problems/internal",
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "Internal error",
-                "The program or the machine failed. The log has the cause, under the request id of this response.",
-                "Give the request id to the administrator.",
+                "The program or the machine failed. The log has the cause, under the request ID of this response.",
+                "Give the request ID to the administrator.",
             ),
             Self::TimedOut => entry(
                 "/problems/timed-out",
                 StatusCode::SERVICE_UNAVAILABLE,
                 "The request timed out",
                 "The service stopped waiting for the request. A change may still have been made.",
-                "Check the current state, then try again. With the same Idempotency-Key, a change is made only request.",
+                "Check the current state, then try again. With the same Idempotency-Key, a change is made only once.",
             ),
             Self::NotReady => entry(
                 "/problems/not-ready",

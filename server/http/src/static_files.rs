@@ -11,7 +11,7 @@ use rust_embed::Embed;
 #[folder = "../../web/static"]
 struct Files;
 
-/// `GET /static/{path}`. Browsers revalidate by content hash, so a new version is used at request.
+/// `GET /static/{path}`. Browsers revalidate by content hash, so a new version is used at once.
 pub(super) async fn get(Path(path): Path<String>, headers: HeaderMap) -> Result<Response, Refusal> {
     let file = Files::get(&path).ok_or_else(|| Error::NotFound { what: "file".to_owned(), id: path })?;
     let tag = format!("\"{}\"", hex::encode(&file.metadata.sha256_hash()[..16]));

@@ -26,7 +26,7 @@ const SHOWN_VALUE: usize = 80;
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|e| unreadable(e, bytes))?;
-    reader.end().map_err(|e| Error::Malformed(format!("There is text after the JSON document: {e}")))?;
+    reader.end().map_err(|e| Error::Malformed(format!("There is text after the JSON document: {e}.")))?;
     let parsed: Value = serde_json::from_slice(bytes).map_err(|e| Error::Malformed(e.to_string()))?;
     serde_path_to_error::deserialize::<_, T>(Named(&parsed)).map_err(|e| unreadable(e, bytes))?;
     Ok(value)

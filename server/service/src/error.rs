@@ -96,7 +96,7 @@ pub enum Error {
     #[error("{0}")]
     Conflict(String),
     /// The learner cannot work with the settings or answers of a study.
-    #[error("The learner failed: {0}")]
+    #[error("The learner failed: {0}.")]
     Learner(LearnerError),
     /// The service and its workers cannot communicate.
     #[error(transparent)]
@@ -105,7 +105,7 @@ pub enum Error {
     #[error(transparent)]
     Store(StoreError),
     /// A command cannot write its output.
-    #[error("Cannot write to standard output: {0}")]
+    #[error("Cannot write to standard output: {0}.")]
     Output(std::io::Error),
     /// The disk is full.
     #[error("{0}")]
@@ -114,7 +114,7 @@ pub enum Error {
     #[error("{0}")]
     NotReady(String),
     /// A bug in the program.
-    #[error("Internal error: {0}")]
+    #[error("Internal error: {}.", .0.trim_end_matches('.'))]
     Internal(String),
 }
 

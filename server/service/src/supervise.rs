@@ -79,9 +79,10 @@ impl Tasks {
         self.all().iter().find_map(|(name, state)| {
             let recent = state.failures.iter().filter(|at| at.elapsed() < RECENTLY).count();
             match &state.down {
-                Some(reason) => Some(format!("{name} is down: {reason}")),
+                Some(reason) => Some(format!("The task {name:?} is down: {}.", reason.trim_end_matches('.'))),
                 None if recent >= OFTEN => {
-                    Some(format!("{name} failed {recent} times within a minute; last reason: {}", state.reason))
+                    let reason = state.reason.trim_end_matches('.');
+                    Some(format!("The task {name:?} failed {recent} times within a minute. The last reason: {reason}."))
                 }
                 None => None,
             }
@@ -151,8 +152,8 @@ mod tests {
                 tasks.keep("planning", &stop, begin).await;
             }
         });
-        until(|| tasks.trouble().as_deref() == Some("planning is down: it panicked: as asked")).await;
-        until(|| tasks.trouble().as_deref() == Some("planning is down: refused")).await;
+        until(|| tasks.trouble().as_deref() == Some("The task \"planning\" is down: it panicked: as asked.")).await;
+        until(|| tasks.trouble().as_deref() == Some("The task \"planning\" is down: refused.")).await;
         until(|| tasks.trouble().is_none()).await;
         assert_eq!(begun.load(Ordering::SeqCst), 3);
         stop.cancel();
@@ -166,6 +167,9 @@ mod tests {
             tasks.failed(task, "refused".to_owned());
             Task { name: task, tasks: tasks.clone() }.works();
         }
-        assert_eq!(tasks.trouble().as_deref(), Some("planning failed 5 times within a minute; last reason: refused"));
+        assert_eq!(
+            tasks.trouble().as_deref(),
+            Some("The task \"planning\" failed 5 times within a minute. The last reason: refused.")
+        );
     }
 }

@@ -35,14 +35,14 @@ impl Certify {
 /// The certificate as text.
 pub(super) fn for_people(certificate: &Certificate) -> String {
     let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
-    lines.extend(certificate.objections.iter().map(|objection| format!("  objection: {objection}")));
+    lines.extend(certificate.objections.iter().map(|objection| format!("  reason: {objection}")));
     for check in &certificate.checks {
         let (value, limit) = (check.value_in_words(), check.limit_in_words());
         lines.push(format!("  {}: {value} (allowed: {limit}; {})", check.name, check.place));
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(
-            "  largest multiplier {:.4e} (by differences {:.4e}, to {:.0e}): {}; of a change of speed a stride leaves {:.1e}, and {:.1e} elsewhere",
+            "  largest multiplier {:.4e} (by differences {:.4e}, to {:.0e}): {}; share of a speed change left after one stride {:.1e}, in other coordinates {:.1e}",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
@@ -51,7 +51,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
             map.speed_leak
         ));
         lines.push(format!(
-            "  from the gait to the periodic motion {:.1e} rad, rad/s; orbit followed for {STRIDES} strides",
+            "  distance of the gait from the periodic motion {:.1e} rad, rad/s; simulated for {STRIDES} strides",
             map.fixed_point_distance
         ));
     }

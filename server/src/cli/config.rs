@@ -235,7 +235,7 @@ impl Settings {
     }
 
     pub(super) fn sign_in(&self) -> Result<bool, Error> {
-        self.parsed("sign_in", "true, false")
+        self.parsed("sign_in", "true or false")
     }
 
     /// When sessions expire.
@@ -257,7 +257,7 @@ impl Settings {
         let headers = match self.text("proxy_headers") {
             "x-forwarded" => ProxyHeaders::XForwarded,
             "forwarded" => ProxyHeaders::Forwarded,
-            _ => return Err(self.refused("proxy_headers", "x-forwarded, forwarded")),
+            _ => return Err(self.refused("proxy_headers", "x-forwarded or forwarded")),
         };
         Ok(Proxies::new(&trusted.map_err(|_| self.refused("trusted_proxies", NETWORKS))?, headers))
     }
@@ -305,7 +305,7 @@ impl Settings {
         match self.text("log_format") {
             "text" => Ok((filter, false)),
             "json" => Ok((filter, true)),
-            _ => Err(self.refused("log_format", "text, json")),
+            _ => Err(self.refused("log_format", "text or json")),
         }
     }
 }
@@ -479,7 +479,7 @@ mod tests {
             |name, value| settings(&Flags::default(), &[(name, value)]).unwrap().log().map_err(|e| e.to_string());
         assert!(with("GAITWRIGHT_LOG_FORMAT", "json").unwrap().1);
         let refused = with("GAITWRIGHT_LOG_FORMAT", "xml").unwrap_err();
-        assert!(refused.contains("GAITWRIGHT_LOG_FORMAT") && refused.contains("text, json"), "{refused}");
+        assert!(refused.contains("GAITWRIGHT_LOG_FORMAT") && refused.contains("text or json"), "{refused}");
         let refused = with("GAITWRIGHT_LOG", "gaitwright=loud").unwrap_err();
         assert!(refused.contains("gaitwright=loud") && refused.contains("targets and levels"), "{refused}");
     }

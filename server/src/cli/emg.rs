@@ -26,8 +26,8 @@ pub(super) struct Emg {
     /// Sampling rate of a CSV file without a column time_s, 100 to 20000.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,
-    /// Columns of the channels, as in TA_L=EMG2,BF_L=EMG3; other channels are ignored (default: columns named like
-    /// channels).
+    /// Columns of the channels, as in TA_L=EMG2,BF_L=EMG3; other channels are ignored (default: columns with the
+    /// names of the channels).
     #[arg(long, value_name = "CHANNEL=COLUMN,...", value_delimiter = ',', value_parser = channel)]
     channels: Vec<(String, String)>,
     /// Column of both files for right heel strikes: a switch under the heel, or the vertical force under the foot.
@@ -86,7 +86,7 @@ impl Filters {
 }
 
 fn channel(text: &str) -> Result<(String, String), String> {
-    let (channel, column) = text.split_once('=').ok_or("write CHANNEL=COLUMN, as in TA_L=EMG2")?;
+    let (channel, column) = text.split_once('=').ok_or("must be CHANNEL=COLUMN, as in TA_L=EMG2")?;
     Ok((channel.trim().to_owned(), column.trim().to_owned()))
 }
 
@@ -109,7 +109,7 @@ impl Emg {
             Some(path) => {
                 let (normal, strikes) = self.read(path, &self.normal_heel_strikes_s)?;
                 if normal == recording {
-                    let allowed = "a different recording than the one that is compared with it";
+                    let allowed = "a recording other than the one that is compared with it";
                     return Err(Error::invalid("normal", path.display().to_string(), allowed));
                 }
                 Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?

@@ -49,9 +49,7 @@ impl ProblemFiles {
     /// The settings of the gait problem, validated.
     pub(super) fn settings(&self) -> Result<GaitSettings, Error> {
         Ok(match &self.settings {
-            Some(path) => read_document(path, "a file with settings of the gait problem", |read: &GaitSettings| {
-                Ok(read.validate()?)
-            })?,
+            Some(path) => read_document(path, "a file of gait settings", |read: &GaitSettings| Ok(read.validate()?))?,
             None => GaitSettings::default(),
         })
     }
@@ -59,9 +57,8 @@ impl ProblemFiles {
     /// The default options, with the given settings of the interior-point method.
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {
         match &self.solver_settings {
-            Some(path) => options_with_solver(&read(path)?).map_err(|e| {
-                Error::Malformed(format!("{} is not a file with settings of the solver: {e}", path.display()))
-            }),
+            Some(path) => options_with_solver(&read(path)?)
+                .map_err(|e| Error::Malformed(format!("{} is not a file of solver settings: {e}", path.display()))),
             None => Ok(SolveOptions::default()),
         }
     }

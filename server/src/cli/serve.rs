@@ -51,11 +51,11 @@ impl Serve {
         if !sign_in {
             // Whoever reaches the service may change everything.
             if !listen.ip().is_loopback() {
-                let allowed = "without sign-in, a loopback address such as 127.0.0.1:8080";
+                let allowed = "a loopback address such as 127.0.0.1:8080, because the service runs without sign-in";
                 return Err(settings.refused("listen", allowed));
             }
             if proxies.are_any() {
-                let allowed = "without sign-in, no proxy: it would let other machines change everything";
+                let allowed = "empty, because the service runs without sign-in and a proxy would let other machines change everything";
                 return Err(settings.refused("trusted_proxies", allowed));
             }
         }

@@ -42,7 +42,7 @@ pub(super) struct Solve {
     )]
     bounds: String,
     /// Problem file (problem.json) of a trial, downloaded from the service. Replaces all flags of the problem and the
-    /// start.
+    /// warm start.
     #[arg(
         long,
         value_name = "FILE",
@@ -55,7 +55,7 @@ pub(super) struct Solve {
     /// Basin in the file of --warm to start from (default: that of its gait).
     #[arg(long, value_name = "NUMBER", requires = "warm")]
     warm_basin: Option<usize>,
-    /// Number of initial guesses to try in any case; --out keeps a gait of every basin that they reach.
+    /// Number of initial guesses that a cold start always tries; --out keeps a gait of every basin that they reach.
     #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
     initial_guesses: Option<usize>,
     /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest [default:

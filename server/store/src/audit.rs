@@ -77,7 +77,7 @@ pub struct AuditRow {
     pub action: String,
     /// Object of the action, such as `study 0190...`.
     pub object: String,
-    /// What exactly, with the reason where there is one.
+    /// Details of the change, with the reason if there is one.
     #[schema(value_type = schema::AuditDetail)]
     pub detail: Value,
     /// Hash of the previous row.

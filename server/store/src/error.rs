@@ -129,7 +129,7 @@ pub enum StoreError {
         key: String,
     },
     /// A migration failed.
-    #[error("Cannot migrate the database: {0}")]
+    #[error("Cannot migrate the database: {0}.")]
     Migrate(#[from] sqlx::migrate::MigrateError),
     /// A row that must exist does not.
     #[error("There is no {what} {id}.")]
@@ -140,15 +140,15 @@ pub enum StoreError {
         id: String,
     },
     /// A stored value cannot be read: the file was damaged or edited.
-    #[error("The record is damaged. {what}: {reason}")]
+    #[error("The record is damaged. {what}: {reason}.")]
     Damaged {
         /// The damaged value.
         what: &'static str,
         /// The kind of damage.
         reason: String,
     },
-    /// The operating system gives no random numbers.
-    #[error("The operating system gives no random numbers: {0}")]
+    /// The operating system cannot provide random numbers.
+    #[error("The operating system cannot provide random numbers: {0}.")]
     NoRandomNumbers(String),
     /// The subject withdrew consent.
     #[error("The subject withdrew consent. The data is kept, but nothing can be added, shown or exported.")]
@@ -157,7 +157,7 @@ pub enum StoreError {
     #[error("The database is closed because the service is shutting down.")]
     Closed,
     /// A change could not be written to the disk, and was rolled back.
-    #[error("The change could not be written to the disk: {0}")]
+    #[error("The change could not be written to the disk: {0}.")]
     NotDurable(String),
     /// The free space has shrunk to the reserve, so nothing large is started.
     #[error(
@@ -170,7 +170,7 @@ pub enum StoreError {
         reserve_mb: u64,
     },
     /// Any other error of the database.
-    #[error("The database failed: {0}")]
+    #[error("The database failed: {0}.")]
     Database(#[from] sqlx::Error),
 }
 

@@ -92,7 +92,7 @@ pub struct FeedbackRow {
     pub id: FeedbackId,
     /// The study.
     pub study_id: StudyId,
-    /// What was said.
+    /// Content of the entry.
     pub said: FeedbackContent,
     /// Source.
     pub source: Source,

@@ -43,13 +43,13 @@ pub struct OpenSolve {
     /// Its study.
     #[serde(skip)]
     pub study_id: StudyId,
-    /// How often a worker was to start it.
+    /// Number of times that it was given to a worker.
     pub attempts: u32,
     /// Attempts that ended with a panic or an error.
     pub failures: u32,
     /// Attempts whose worker stopped responding.
     pub losses: u32,
-    /// Who has it; null while it is queued.
+    /// Worker that has it. Null while it is queued.
     pub worker: Option<String>,
     /// End of the lease, unless it is renewed.
     pub lease_until: Option<Instant>,

@@ -51,7 +51,7 @@ pub struct MeasurementFile {
     pub session_id: LabSessionId,
     /// Number of the walk, 1 to 3.
     pub walk: u8,
-    /// What it is of.
+    /// Kind of measurement.
     pub kind: MeasurementKind,
     /// SHA-256 of the file.
     pub raw_sha256: String,

@@ -45,7 +45,7 @@ impl FromStr for Kind {
     }
 }
 
-/// Judgement of two gaits.
+/// Content of an assessment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {

@@ -14,7 +14,7 @@ macro_rules! document {
 }
 
 document! {
-    /// A gait as the optimiser writes it: `format_version` says in which layout.
+    /// A gait as the optimiser writes it. `format_version` is the version of its layout.
     GaitDocument
 }
 document! {
@@ -22,11 +22,11 @@ document! {
     SolveProblem
 }
 document! {
-    /// What the controller of a device reads; it explains its fields.
+    /// The file that the controller of a device reads. It describes its own fields.
     ControllerFile
 }
 document! {
-    /// A reference gait: joint angles over the cycle, of whom, and how it was made.
+    /// A reference gait: joint angles over the gait cycle, the measured person, and the processing.
     ReferenceGaitDocument
 }
 document! {
@@ -52,7 +52,7 @@ document! {
     MuscleParameters
 }
 document! {
-    /// A device: measures of the prosthesis, each with its range.
+    /// A device: measurements of the prosthesis, each with its range.
     DeviceDefinition
 }
 
@@ -273,13 +273,13 @@ pub struct SolveReport {
     pub cost_of_transport: f64,
     /// Gait RMSE: sum over the five human coordinates, rad.
     pub gait_rmse_rad: f64,
-    /// Its parts: torso, `hip_L`, `knee_L`, `ankle_L`, `hip_R`.
+    /// Parts of Gait RMSE: torso, `hip_L`, `knee_L`, `ankle_L`, `hip_R`.
     pub gait_rmse_parts_rad: Vec<f64>,
     /// Largest violation of a constraint row or bound, scaled.
     pub max_violation: f64,
-    /// How well the conditions of a local optimum are met; null where that is not known.
+    /// How well the conditions of a local optimum are met. Null if unknown.
     pub optimality: Option<Optimality>,
-    /// How many bounds at nodes are tightened so that the gait keeps them between the nodes too.
+    /// Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes too.
     pub tightened_bounds: u64,
     /// Wall time, s.
     pub seconds_total: f64,
@@ -287,7 +287,7 @@ pub struct SolveReport {
     pub seconds_evaluation: f64,
     /// Linear algebra, s.
     pub seconds_linear_algebra: f64,
-    /// Its parts; null where they are not known.
+    /// Parts of the linear algebra. Null if unknown.
     pub linear_algebra: Option<LinearAlgebra>,
     /// Number of variables.
     pub variables: u64,
@@ -301,16 +301,16 @@ pub struct SolveReport {
     pub stride_length_m: f64,
     /// Durations of the eight domains, s.
     pub durations_s: Vec<f64>,
-    /// Hip velocity of the four impact-free runs, m/s.
+    /// Hip velocity in the four intervals between impacts, m/s.
     pub vhip_m_s: Vec<f64>,
-    /// Everything that was tried, in order.
+    /// All attempts, in order.
     pub attempts: Vec<SolveAttempt>,
 }
 
-/// One thing that a solve tried.
+/// One attempt of a solve.
 #[derive(Debug, ToSchema)]
 pub struct SolveAttempt {
-    /// What, in words.
+    /// Strategy, in words.
     pub strategy: String,
     /// How it ended.
     pub status: SolveStatus,
@@ -322,11 +322,11 @@ pub struct SolveAttempt {
     pub objective: f64,
     /// Gait RMSE where it ended, rad.
     pub gait_rmse_rad: f64,
-    /// Why it could not be carried through; empty when it could.
+    /// Reason if it could not be completed; otherwise empty.
     pub reason: String,
     /// Which local optimum it ended in, from 1; null where it did not converge.
     pub basin: Option<u64>,
-    /// Whether it is the answer.
+    /// Whether its gait is the result of the solve.
     pub chosen: bool,
 }
 
@@ -341,7 +341,7 @@ pub struct Optimality {
     pub barrier: f64,
 }
 
-/// What the linear algebra of a solve took.
+/// Operations and times of the linear algebra of a solve.
 #[derive(Debug, ToSchema)]
 pub struct LinearAlgebra {
     /// Analysing the structure of matrices, s.
@@ -354,7 +354,7 @@ pub struct LinearAlgebra {
     pub factorisations: u64,
     /// Forward-backward substitutions.
     pub substitutions: u64,
-    /// Times that another method was asked.
+    /// Number of times that the fallback method was used.
     pub fallbacks: u64,
 }
 
@@ -365,7 +365,7 @@ pub struct Certificate {
     pub format_version: u32,
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
-    /// Why not; empty when passed.
+    /// Reasons if it failed; otherwise empty.
     pub objections: Vec<String>,
     /// Every quantity with its worst value and its limit.
     pub checks: Vec<CertificateCheck>,
@@ -373,9 +373,9 @@ pub struct Certificate {
     pub fall: Option<String>,
     /// The stride-to-stride map.
     pub return_map: Option<ReturnMap>,
-    /// The same with a hip velocity that the controller leaves alone.
+    /// The stride-to-stride map with a free hip velocity (zero dynamics).
     pub free_hip_return_map: Option<ReturnMap>,
-    /// Pushes that are recovered; only of a stable gait.
+    /// Largest pushes from which the walker recovers. Null if the gait is not stable.
     pub pushes: Option<Pushes>,
 }
 
@@ -390,30 +390,30 @@ pub struct CertificateCheck {
     pub value: Option<f64>,
     /// Largest allowed value; null: reported without a judgement.
     pub limit: Option<f64>,
-    /// Domain and time of the stride where the worst value is.
+    /// Domain and time of the worst value.
     pub place: String,
 }
 
-/// What the stride-to-stride map says of a gait.
+/// Stability of a gait, from the stride-to-stride map.
 #[derive(Debug, ToSchema)]
 pub struct ReturnMap {
     /// Largest change of the state over one stride from the gait's own first state, rad and rad/s.
     pub gait_residual: f64,
-    /// The same at the fixed point of the closed loop near it.
+    /// Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
     pub fixed_point_residual: f64,
     /// Largest distance from the gait's first state to the fixed point, rad and rad/s.
     pub fixed_point_distance: f64,
     /// Multipliers from variational equations and saltation, largest first.
     pub multipliers: Vec<Multiplier>,
-    /// Largest modulus of them.
+    /// Largest modulus of the multipliers.
     pub largest: f64,
     /// Largest modulus of the multipliers from differences of simulated domains.
     pub largest_by_differences: f64,
-    /// What the differences resolve.
+    /// Resolution of the differences.
     pub differences_resolve: f64,
-    /// What a stride leaves of a change of all velocities in proportion.
+    /// Fraction of a proportional change of all velocities that remains after one stride.
     pub speed_kept: f64,
-    /// What the stride turns such a change into in other directions, over its size.
+    /// Change in other coordinates that such a change causes within one stride, relative to its size.
     pub speed_leak: f64,
 }
 
@@ -483,7 +483,7 @@ pub struct CycleActivity {
     pub mean: Vec<f64>,
     /// Standard deviation over strides; zero for one stride.
     pub standard_deviation: Vec<f64>,
-    /// How many strides.
+    /// Number of strides.
     pub strides: u64,
 }
 
@@ -492,9 +492,9 @@ pub struct CycleActivity {
 pub struct EmgRmse {
     /// Sum of the parts.
     pub total: f64,
-    /// RMS difference of each channel of normal walking, in its order.
+    /// RMS difference of each channel, in the order of the channels of normal walking.
     pub parts: Vec<f64>,
-    /// What makes the comparison doubtful; absent: nothing.
+    /// Reasons to doubt the comparison. Absent if there are none.
     pub remarks: Option<Vec<String>>,
 }
 
@@ -513,14 +513,14 @@ pub struct ModelActivity {
     pub correlation: Option<f64>,
 }
 
-/// How EMG recordings are filtered; what is left out has its default.
+/// Filters for EMG recordings. Absent settings have their defaults.
 #[derive(Debug, ToSchema)]
 pub struct EmgSettings {
-    /// Lower edge of the band-pass, Hz.
+    /// Lower cut-off frequency of the band-pass filter, Hz.
     pub band_low_hz: Option<f64>,
-    /// Upper edge of the band-pass, Hz; below half the sampling rate.
+    /// Upper cut-off frequency of the band-pass filter, Hz; below half the sampling rate.
     pub band_high_hz: Option<f64>,
-    /// Edge of the low-pass that makes the envelope, Hz.
+    /// Cut-off frequency of the low-pass filter for the envelope, Hz.
     pub envelope_hz: Option<f64>,
     /// Order of both filters: 2, 4, 6 or 8.
     pub order: Option<u64>,

@@ -141,7 +141,7 @@ pub struct StudyPlan {
     pub reference_gait_id: ReferenceGaitId,
     /// Whether to solve with muscles (C1-C12) or without (C1-C4).
     pub muscles: bool,
-    /// Settings of the gait problem; boxed, as plans pass through many futures.
+    /// Settings of the gait problem.
     #[schema(value_type = schema::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.

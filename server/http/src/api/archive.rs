@@ -102,7 +102,7 @@ impl Write for Chunks {
 
 /// List the imports of a study
 ///
-/// One import for each record that the study passed through; empty for a study that was made here.
+/// One import for each record that the study passed through; empty for a study that was created here.
 #[utoipa::path(
     get,
     path = "/studies/{id}/imports",

@@ -20,7 +20,7 @@ pub(super) struct Filter {
 
 /// List the audit trail
 ///
-/// Every change by a person, newest first.
+/// Every change by a user or a program, newest first.
 #[utoipa::path(
     get,
     path = "/audit",

@@ -72,8 +72,8 @@ pub(super) async fn next(
 /// Motion to compare.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct BlindMotion {
-    /// 101 figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left and of the
-    /// right leg) as forward and upward coordinates, m.
+    /// 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
+    /// and of the right leg) as forward and upward coordinates, m.
     #[schema(value_type = Vec<Vec<Vec<f64>>>)]
     figures: Vec<Figure>,
 }

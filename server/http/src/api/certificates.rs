@@ -50,7 +50,7 @@ pub(super) async fn get(
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
         (status = 200, description = "Existing certificate", body = schema::Certificate),
-        (status = 202, description = "Job that makes the certificate, in some seconds", body = Job)
+        (status = 202, description = "Job that makes the certificate, which takes a few seconds", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -67,7 +67,7 @@ pub(super) async fn create(
         return request.done(&app, writer, &certificate).await;
     }
     if !app.scheduler.certify(id) {
-        return Err(Error::NotReady("this service certifies no gaits".to_owned()).into());
+        return Err(Error::NotReady("This service does not certify gaits.".to_owned()).into());
     }
     let id = JobId { kind: JobKind::Certificate, trial: id };
     let job = Job::from(job_status::find(&mut writer, &app.scheduler, id).await?);

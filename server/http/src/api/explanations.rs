@@ -118,7 +118,7 @@ pub(super) async fn get(
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
         (status = 200, description = "Existing explanation", body = TrialExplanation),
-        (status = 202, description = "Job that makes the explanation, in some minutes, at lower priority than solves", body = Job)
+        (status = 202, description = "Job that makes the explanation, which takes a few minutes and has lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

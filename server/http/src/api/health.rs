@@ -20,10 +20,7 @@ pub struct Health {
 /// Check that the service is healthy
 ///
 /// Succeeds if the database responds. Needs no sign-in, and therefore reveals nothing about solves, from which a rater could
-/// infer the effect of an answer.
-///
-/// # Errors
-/// If the database does not respond.
+/// infer the effect of an answer. Fails if the database does not respond.
 #[utoipa::path(
     get,
     path = "/health",
@@ -46,7 +43,8 @@ pub(crate) async fn ready(State(app): State<AppState>) -> Result<String, Refusal
     if app.scheduler.stopping().is_cancelled() {
         return Err(Error::NotReady("The service is stopping.".to_owned()).into());
     }
-    let not_writable = |reason: String| Error::NotReady(format!("The record cannot be written: {reason}"));
+    let not_writable =
+        |reason: String| Error::NotReady(format!("The record cannot be written: {}.", reason.trim_end_matches('.')));
     app.store().probe().await.map_err(not_writable)?;
     if let Some(trouble) = app.scheduler.trouble() {
         return Err(Error::NotReady(trouble).into());

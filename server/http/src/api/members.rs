@@ -19,7 +19,7 @@ use utoipa::ToSchema;
 /// List members of a study
 ///
 /// Raters can access studies of which they are members. Clinicians, and tokens with more scopes than `rate`, can access
-/// every unrestricted study, and restricted studies as members. An inaccessible study is answered with 404.
+/// every unrestricted study, and restricted studies as members. A request for any other study is answered with 404.
 #[utoipa::path(
     get,
     path = "/studies/{id}/members",

@@ -43,8 +43,8 @@ impl From<Closed> for SafetyReport {
 
 /// List safety reports of a study
 ///
-/// From raters, assessments and lab sessions, lifted reports included, retracted ones excluded. For a blinded lab
-/// session, both of its gaits are listed.
+/// From raters, assessments and lab sessions. Includes reports about gaits that were cleared for walking, but not
+/// retracted reports. A report from a blinded lab session is listed for both of its gaits.
 #[utoipa::path(
     get,
     path = "/studies/{id}/safety-reports",
@@ -72,7 +72,7 @@ pub(super) async fn of_study(
 /// Review the safety reports of a gait
 ///
 /// If the gait may be walked again, it can be recommended, compared and planned again, and the preferences derived from
-/// the reports are retracted. A report from a lab session that is unblinded later closes its gait again.
+/// the reports are retracted. When a lab session is unblinded later, its report makes the gait unsafe again.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reviews",

@@ -18,7 +18,7 @@ const TRIES: usize = 20;
 
 /// Ask for a trial to evaluate
 ///
-/// Returns the same trial until its outcome is told.
+/// Returns the same trial until its outcome is reported.
 #[utoipa::path(
     post,
     path = "/studies/{id}/ask",
@@ -49,7 +49,7 @@ pub(super) async fn ask(
     Err(Error::conflict("The study is changing too fast. Try again.").into())
 }
 
-/// Tell the outcome of a trial
+/// Report the outcome of a trial
 ///
 /// A missing gait is a result too. If the script fails, cancel the trial instead.
 #[utoipa::path(

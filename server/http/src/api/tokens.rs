@@ -22,7 +22,7 @@ pub(super) struct MadeToken {
     /// The token.
     #[serde(flatten)]
     token: Token,
-    /// Secret, shown request. Send it as `Authorization: Bearer SECRET`.
+    /// Secret, shown once. Send it as `Authorization: Bearer SECRET`.
     secret: String,
 }
 

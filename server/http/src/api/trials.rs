@@ -147,7 +147,7 @@ pub(super) async fn cancel(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let trial = command::cancel(&mut writer, &request.actor, id, "cancelled on request").await?;
+    let trial = command::cancel(&mut writer, &request.actor, id, "Cancelled on request.").await?;
     let answer = request.done(&app, writer, &trial).await?;
     app.scheduler.cancel_solve(id).await;
     Ok(answer)

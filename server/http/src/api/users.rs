@@ -41,7 +41,7 @@ pub(super) struct Me {
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> {
-    let caller = caller.ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
+    let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
     let rights = Right::ALL.into_iter().filter(|right| caller.may(*right)).collect();
     Ok(Json(Me { name: caller.name, role: caller.role, rights }))
 }

@@ -31,10 +31,13 @@ impl InWords {
             figures.push(("Largest Poincaré multiplier", format::number(map.largest)));
             let (found, resolved) =
                 (format::number(map.largest_by_differences), format::number(map.differences_resolve));
-            figures.push(("The same from finite differences (resolution)", format!("{found} ({resolved})")));
+            figures.push((
+                "Largest Poincaré multiplier from finite differences (resolution)",
+                format!("{found} ({resolved})"),
+            ));
             let (kept, leak) = (format::number(map.speed_kept), format::number(map.speed_leak));
             figures.push((
-                "Change of speed left after a stride: in speed, in other coordinates",
+                "Share of a speed change left after one stride: in speed, in other coordinates",
                 format!("{kept}, {leak}"),
             ));
             let distance = format::number(map.fixed_point_distance);

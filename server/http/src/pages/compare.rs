@@ -362,7 +362,7 @@ const LABELS: [(&str, &str); 6] = [
     ("a", "Gait A"),
     ("b", "Gait B"),
     ("answer", "Answer"),
-    ("source", "Answer by"),
+    ("source", "Answer given by"),
     ("author", "Your name or code"),
     ("note", "Note"),
 ];
@@ -401,7 +401,7 @@ pub(super) async fn post(
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
     let (said, key) = form.read()?;
     let mut writer = app.write().await?;
-    // The key of the form makes a repeated form (double click, reload, two tabs) count request.
+    // The key of the form makes a repeated form (double click, reload, two tabs) count once.
     let key = format!("form {key}");
     let request = form.fingerprint(id);
     if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {

@@ -148,7 +148,7 @@ async fn act(
             Ok(None)
         }
         "remove" => {
-            let unknown = |_| Error::invalid("member", asked.member.as_str(), "a member of this page");
+            let unknown = |_| Error::invalid("member", asked.member.as_str(), "a member listed on this page");
             let member: Named<MemberId> = asked.member.parse().map_err(unknown)?;
             let member = member.accessible(writer, caller.reach()).await?;
             membership::end(writer, &caller.actor, member).await?;
@@ -163,6 +163,6 @@ async fn act(
             Ok(Some((user.name, secret)))
         }
         "invite" => Err(Error::Forbidden("Only administrators can create sign-in links.".to_owned())),
-        other => Err(Error::invalid("act", other, "add, remove, restrict, open, invite")),
+        other => Err(Error::invalid("act", other, "add, remove, restrict, open or invite")),
     }
 }

@@ -82,10 +82,10 @@ struct SubjectPage {
     studies: Vec<StudyRow>,
     /// Lab sessions of these studies; none after a withdrawal.
     sessions: Vec<SessionRow>,
-    /// The newest consent row that the form knows, so that a repeated form is recorded request.
+    /// The newest consent row that the form knows, so that a repeated form is recorded once.
     after: i64,
     corrections: Vec<Correction>,
-    /// The newest correction that the form knows, so that a repeated form is recorded request.
+    /// The newest correction that the form knows, so that a repeated form is recorded once.
     corrected: i64,
     may_administer: bool,
     refused: Option<String>,

@@ -258,9 +258,11 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
             let token = making::revoke(writer, actor, asked.id::<TokenId>()?).await?;
             Ok(done(format!("Revoked token {}.", token.name)))
         }
-        other => {
-            Err(Error::invalid("act", other, "add_user, link, disable, enable, role, end_session, make_token, revoke"))
-        }
+        other => Err(Error::invalid(
+            "act",
+            other,
+            "add_user, link, disable, enable, role, end_session, make_token or revoke",
+        )),
     }
 }
 

@@ -13,11 +13,11 @@ use tokio::sync::Semaphore;
 /// A new random secret of 256 bits, in hexadecimal.
 ///
 /// # Errors
-/// When the operating system gives no random numbers.
+/// When the operating system cannot provide random numbers.
 pub fn fresh() -> Result<String, Error> {
     let mut bytes = [0_u8; 32];
     getrandom::fill(&mut bytes)
-        .map_err(|e| Error::Internal(format!("the operating system gives no random numbers: {e}")))?;
+        .map_err(|e| Error::Internal(format!("the operating system cannot provide random numbers: {e}")))?;
     Ok(hex::encode(bytes))
 }
 
@@ -88,7 +88,7 @@ pub fn hash_password_of(name: &str, password: &str) -> Result<String, Error> {
     password::check(password, name)?;
     let mut salt = [0_u8; 16];
     getrandom::fill(&mut salt)
-        .map_err(|e| Error::Internal(format!("the operating system gives no random numbers: {e}")))?;
+        .map_err(|e| Error::Internal(format!("the operating system cannot provide random numbers: {e}")))?;
     let hash = Argon2::default()
         .hash_password_with_salt(password.as_bytes(), &salt)
         .map_err(|e| Error::Internal(format!("cannot hash a password: {e}")))?;

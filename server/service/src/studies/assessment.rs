@@ -19,7 +19,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewAssessment)]
 pub struct NewAssessment {
-    /// One gait.
+    /// Trial of one gait.
     pub first: TrialId,
     /// Trial of the other gait.
     pub second: TrialId,
@@ -106,7 +106,7 @@ pub async fn retract(
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", reason, " that say why the assessment is retracted")?;
     if !assessments::retract(writer, id, author, reason).await? {
-        return Err(Error::conflict("this assessment was taken back already"));
+        return Err(Error::conflict("This assessment was already retracted."));
     }
     if let Some(heard) = assessment.feedback_id {
         let heard = feedback::get(writer, heard).await?;

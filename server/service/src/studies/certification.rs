@@ -34,7 +34,7 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
         return Ok(Certification::Made(Box::new(certificate)));
     }
     if found.state != TrialState::Converged {
-        let state = found.state.as_str();
+        let state = found.state.as_str().replace('_', " ");
         return Err(Error::conflict(format!(
             "Trial {} is {state}. Only a converged gait can be certified.",
             found.number

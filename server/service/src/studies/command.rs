@@ -51,7 +51,7 @@ pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reas
 pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Result<Vec<TrialId>, Error> {
     let mut cancelled = Vec::new();
     for trial in trials::of_study(writer, study.id).await?.into_iter().filter(|trial| trial.state.is_open()) {
-        trial_result::cancelled(writer, trial.id, "the study was stopped").await?;
+        trial_result::cancelled(writer, trial.id, "The study was stopped.").await?;
         cancelled.push(trial.id);
     }
     move_on(writer, study, Act::Stop, reason).await?;

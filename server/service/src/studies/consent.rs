@@ -59,7 +59,7 @@ pub async fn withdraw(
     }
     let (mut stopped, mut cancelled) = (Vec::new(), Vec::new());
     for study in studies::open_of(writer, id).await? {
-        cancelled.extend(command::stop(writer, &study, "the subject withdrew consent").await?);
+        cancelled.extend(command::stop(writer, &study, "The subject withdrew consent.").await?);
         stopped.push(study.id);
     }
     let row = consents::append(writer, id, ConsentKind::Withdrawn, reason, actor).await?;

@@ -156,7 +156,7 @@ async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, 
         )));
     }
     let Some(status) = trial.status.filter(|_| trial.state == TrialState::NotConverged) else {
-        let state = trial.state.as_str();
+        let state = trial.state.as_str().replace('_', " ");
         return Err(Error::conflict(format!(
             "Trial {number} is {state}. Only a trial that did not converge can be explained."
         )));

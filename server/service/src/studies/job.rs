@@ -51,7 +51,7 @@ impl FromStr for JobId {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let unknown = || format!("{text} names no job");
+        let unknown = || format!("{text} is not the identifier of a job");
         let (kind, trial) = text.split_once('-').ok_or_else(unknown)?;
         let kind = JobKind::ALL.into_iter().find(|known| known.as_str() == kind).ok_or_else(unknown)?;
         Ok(Self { kind, trial: trial.parse().map_err(|_| unknown())? })

@@ -136,7 +136,7 @@ pub async fn cancel(writer: &mut Writer, actor: &Actor, scheduler: &Scheduler, i
         return Err(Error::conflict(format!("job {id} has ended")));
     }
     if id.kind == JobKind::Solve {
-        command::cancel(writer, actor, id.trial, "cancelled on request").await?;
+        command::cancel(writer, actor, id.trial, "Cancelled on request.").await?;
     } else {
         audit::append(writer, actor, "job.cancel", &format!("job {id}"), &json!({})).await?;
     }

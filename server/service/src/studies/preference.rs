@@ -90,7 +90,8 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
 async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
     let trial = trial_of_study(db, study, field, id).await?;
     if trial.state != TrialState::Converged {
-        let allowed = format!("a converged trial, but trial {} is {}", trial.number, trial.state.as_str());
+        let allowed =
+            format!("a converged trial, but trial {} is {}", trial.number, trial.state.as_str().replace('_', " "));
         return Err(Error::invalid(field, id.to_string(), &allowed));
     }
     Ok(trial)

@@ -103,7 +103,8 @@ impl SafetyReports {
             }
             if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {
                 // Naming one of the two gaits would reveal the allocation, so both are closed until unblinding.
-                let by = format!("the subject in lab session {} (which of its two gaits is blinded)", session.number);
+                let by =
+                    format!("the subject in lab session {} (blinded, so either gait may be meant)", session.number);
                 let (at, said) = (answer.at, SafetyReportSource::Subject);
                 let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };
                 found.closed.extend([session.gait_one, session.gait_two].map(closed));

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = SafetyReviewToMake)]
 pub struct Decision {
-    /// `walkable`: the gait may be walked again. `unsafe`: the gait stays closed, and the review is done.
+    /// `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
     pub verdict: SafetyVerdict,
     /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
@@ -48,7 +48,7 @@ pub async fn give(
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     let author = printable::name("author", decision.author.as_deref().unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", &decision.reason, " that say why you decide so")?;
+    let reason = printable::reason("reason", &decision.reason, " that give the reason for the decision")?;
     let closed = SafetyReports::read(writer, trial.study_id).await?.closing(id);
     let number = trial.number;
     let newest = closed.iter().max_by_key(|closed| closed.at);

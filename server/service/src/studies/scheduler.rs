@@ -413,7 +413,7 @@ impl Scheduler {
     /// Pauses a study that cannot be planned, and records the reason.
     async fn hold(&self, study: &Study, error: &Error) -> Result<(), Error> {
         tracing::error!(study = %study.id, %error, "cannot plan a study; pausing it");
-        self.act(study, Act::Pause, &format!("planning failed: {error}")).await.map(drop)
+        self.act(study, Act::Pause, &format!("Planning failed: {error}")).await.map(drop)
     }
 
     async fn act(&self, study: &Study, act: Act, reason: &str) -> Result<Option<Study>, Error> {
@@ -677,7 +677,7 @@ impl Scheduler {
         let (outcome, packed) = store.compute(pack).await?;
         let packed = packed?;
         if packed.is_none() && outcome.report.status == SolveStatus::Converged {
-            let reason = "the solver returned a converged gait with numbers that are not finite";
+            let reason = "The solver returned a converged gait with numbers that are not finite.";
             return trial_result::broke(&store, &lease, reason).await.map(drop);
         }
         trial_result::ended(&mut store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)

@@ -64,17 +64,17 @@ pub async fn suggest(
         return Ok(Suggestion::Same(open));
     }
     if study.state != StudyState::Running {
-        let reason = format!("The study is {}: {}", study.state.as_str(), study.state_reason);
-        return Err(Error::conflict(reason.trim_end_matches(": ")));
+        let reason = format!("The study is {}. {}", study.state.as_str(), study.state_reason);
+        return Err(Error::conflict(reason.trim_end()));
     }
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let plan = &snapshot.study.plan;
     if snapshot.trials.len() >= plan.trial_budget as usize {
-        return Err(Error::conflict(format!("All {} trials of the study were given out.", plan.trial_budget)));
+        return Err(Error::conflict(format!("All {} trials of the study have been handed out.", plan.trial_budget)));
     }
     if snapshot.open() >= plan.parallel_trials as usize {
-        return Err(Error::conflict(format!("{} trials are open. Tell their outcomes first.", snapshot.open())));
+        return Err(Error::conflict(format!("{} trials are open. Report their outcomes first.", snapshot.open())));
     }
     let choose = move |pool: &OnPool| {
         let believed = beliefs.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
@@ -131,7 +131,7 @@ pub enum Outcome {
     NotConverged,
 }
 
-/// The outcome of a trial, as a script tells it.
+/// The outcome of a trial, as a script reports it.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tell {

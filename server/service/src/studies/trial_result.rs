@@ -36,7 +36,7 @@ pub async fn ended(
     let Some(state) = trial_state::result_of(outcome.report.status) else {
         return match outcome.report.status {
             SolveStatus::Cancelled => interrupted(store, lease).await,
-            _ => broke(store, lease, "the solve ran out of time").await,
+            _ => broke(store, lease, "The solve ran out of time.").await,
         };
     };
     let end = TrialEnd {
@@ -74,7 +74,7 @@ pub async fn ended(
         return Ok(true);
     }
     // The worker is free already, so the trial is solved again, at most twice.
-    broke(store, lease, "answers arrived faster than the result could be compared with them").await
+    broke(store, lease, "Answers arrived faster than the result could be compared with them.").await
 }
 
 /// Records an engineering failure: the job is retried at most twice, then the trial is `failed`.
@@ -99,7 +99,7 @@ pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
     let before = jobs::troubles(&mut writer, lease.job).await?;
     let after = Troubles { losses: before.losses + 1, ..before };
-    let reason = "the lease of its worker ended";
+    let reason = "The lease of its worker ended.";
     let recorded = give_up_or_requeue(&mut writer, lease, Happening::Silent(before), after, reason).await?;
     commit(writer).await?;
     Ok(recorded)
@@ -200,14 +200,14 @@ fn message_of(outcome: &SolveOutcome) -> String {
     let worst = outcome.violations.first();
     let cause = match outcome.report.status {
         SolveStatus::Converged => return String::new(),
-        SolveStatus::Infeasible => "no gait near the last iterate satisfies all constraints",
-        SolveStatus::Stalled => "the solver stalled",
-        SolveStatus::IterationLimit => "iteration limit reached",
-        SolveStatus::TimeLimit => "time limit reached",
-        SolveStatus::Cancelled => "cancelled",
+        SolveStatus::Infeasible => "No gait near the last iterate satisfies all constraints.",
+        SolveStatus::Stalled => "The solver stalled.",
+        SolveStatus::IterationLimit => "The solver reached the iteration limit.",
+        SolveStatus::TimeLimit => "The solver reached the time limit.",
+        SolveStatus::Cancelled => "The solve was cancelled.",
     };
     match worst {
-        Some(row) => format!("{cause}; largest violation: {}, {:.3e} {}", row.row, row.amount, row.unit),
+        Some(row) => format!("{cause} Largest violation: {}, by {:.3e} {}.", row.row, row.amount, row.unit),
         None => cause.to_owned(),
     }
 }

@@ -29,12 +29,25 @@ pub enum Happening {
 
 /// The event is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("The trial is {}, which does not allow this ({happening:?}).", state.as_str())]
+#[error("The trial is {}, so it cannot be {}.", state.as_str().replace('_', " "), participle(*happening))]
 pub struct Impossible {
     /// The state of the trial.
     pub state: TrialState,
     /// The event.
     pub happening: Happening,
+}
+
+/// What happens to the trial, as a participle.
+fn participle(happening: Happening) -> &'static str {
+    match happening {
+        Happening::Leased => "started",
+        Happening::Solved(_) => "solved",
+        Happening::Broke(_) => "marked as failed",
+        Happening::Silent(_) => "marked as lost",
+        Happening::Interrupted => "interrupted",
+        Happening::Cancelled => "cancelled",
+        Happening::Retried => "retried",
+    }
 }
 
 /// The result for the learner of a solve status, if it is one.

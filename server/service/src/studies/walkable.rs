@@ -86,7 +86,7 @@ pub enum NotWalkable {
     #[error("The subject withdrew consent.")]
     Withdrawn,
     /// The trial has no converged gait.
-    #[error("Trial {number} is {state}. Only a converged gait can be walked or compared.")]
+    #[error("Trial {number} is {}. Only a converged gait can be walked or compared.", state.replace('_', " "))]
     NotConverged {
         /// Number of the trial.
         number: u32,
@@ -95,7 +95,7 @@ pub enum NotWalkable {
     },
     /// The gait has an open safety report.
     #[error(
-        "The gait of trial {number} was reported as unsafe by {by}. It must not be walked until a review by staff allows it."
+        "The gait of trial {number} was reported as unsafe by {by}. It must not be walked until staff have cleared it."
     )]
     ReportedUnsafe {
         /// Number of the trial.
@@ -105,7 +105,8 @@ pub enum NotWalkable {
     },
     /// The gait has no certificate yet.
     #[error(
-        "the gait of trial {number} has no certificate yet: it is being certified, or POST /api/v1/trials/{id}/certificate has it certified"
+        "The gait of trial {number} has no certificate yet. If it is not being certified, request a certificate with POST \
+         /api/v1/trials/{id}/certificate."
     )]
     NotCertified {
         /// The trial.
@@ -124,7 +125,7 @@ pub enum NotWalkable {
 impl NotWalkable {
     /// The error for a request field that names the trial.
     pub fn of_field(&self, field: &str, trial: TrialId) -> Error {
-        Error::invalid(field, trial.to_string(), &format!("a gait that may be walked with. {self}"))
+        Error::invalid(field, trial.to_string(), &format!("a walkable gait. {self}"))
     }
 }
 

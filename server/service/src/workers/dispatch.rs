@@ -108,7 +108,7 @@ pub enum DispatchError {
         limit: usize,
     },
     /// A message cannot be written or read.
-    #[error("A message between service and worker is malformed: {0}")]
+    #[error("A message between service and worker is malformed: {0}.")]
     Message(String),
     /// The engine cannot be reached.
     #[error("{0}")]

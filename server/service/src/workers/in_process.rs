@@ -176,7 +176,7 @@ fn solve(
     match found {
         Ok(Ok(outcome)) => Finding::Ended { outcome: Box::new(outcome), iterations },
         Ok(Err(reason)) => Finding::Broke(reason),
-        Err(panic) => Finding::Broke(format!("the solver panicked: {}", words_of(panic.as_ref()))),
+        Err(panic) => Finding::Broke(format!("The solver panicked: {}.", words_of(panic.as_ref()))),
     }
 }
 

@@ -163,11 +163,11 @@ pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
     let answer = match throughout {
         _ if pairs == 0 => "cannot be judged: there is no pair of studies",
         1 if pairs == 1 => {
-            "holds in the only pair, which says little: local optima turn it either way, so repeat with more seeds"
+            "holds in the only pair, which says little: local optima can turn it either way, so repeat with more seeds"
         }
         all if all == pairs => "holds in every pair",
         0 => "holds in no pair",
-        _ => "holds in some pairs only: local optima decide",
+        _ => "holds in only some pairs, depending on local optima",
     };
     let lower: usize = verdicts.iter().map(|v| v.lower).sum();
     let compared: usize = verdicts.iter().map(|v| v.compared).sum();
@@ -187,9 +187,9 @@ fn spread(verdicts: &[Verdict]) -> String {
             let median = f64::midpoint(gains[(gains.len() - 1) / 2], gains[gains.len() / 2]);
             if median < 0.0 {
                 let (median, least, most) = (-median, -most, -least);
-                format!("; they raise the final Gait RMSE by {median:.3} rad in the median ({least:.3} to {most:.3})")
+                format!("; they raise the final Gait RMSE by a median of {median:.3} rad ({least:.3} to {most:.3})")
             } else {
-                format!("; they lower the final Gait RMSE by {median:.3} rad in the median ({least:.3} to {most:.3})")
+                format!("; they lower the final Gait RMSE by a median of {median:.3} rad ({least:.3} to {most:.3})")
             }
         }
         _ => String::new(),
@@ -312,12 +312,12 @@ mod tests {
         assert_eq!(found[0].last, Some((0.5, 0.6)));
         assert!(found[1].throughout());
         let words = conclusion(&found);
-        assert!(words.contains("some pairs only: local optima decide (1 of 2)."), "{words}");
+        assert!(words.contains("only some pairs, depending on local optima (1 of 2)."), "{words}");
         assert!(words.contains("lower at 4 of 5 iterations, and at the end in 1 of 2 pairs"), "{words}");
-        assert!(words.contains("by 0.050 rad in the median (-0.100 to 0.200)"), "{words}");
+        assert!(words.contains("by a median of 0.050 rad (-0.100 to 0.200)"), "{words}");
         assert!(conclusion(&found[1..]).contains("holds in the only pair, which says little"));
         assert!(conclusion(&[found[1].clone(), found[1].clone()]).contains("holds in every pair (2 of 2)"));
-        assert!(conclusion(&found[..1]).contains("they raise the final Gait RMSE by 0.100 rad"));
+        assert!(conclusion(&found[..1]).contains("they raise the final Gait RMSE by a median of 0.100 rad"));
         assert!(conclusion(&[]).contains("cannot be judged"));
     }
 

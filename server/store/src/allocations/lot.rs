@@ -24,7 +24,7 @@ impl Lot {
     /// Draws a lot.
     ///
     /// # Errors
-    /// If the operating system gives no random numbers.
+    /// If the operating system cannot provide random numbers.
     pub fn draw() -> StoreResult<Self> {
         let mut bytes = [0_u8; 40];
         getrandom::fill(&mut bytes).map_err(|e| StoreError::NoRandomNumbers(e.to_string()))?;

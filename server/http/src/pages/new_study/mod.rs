@@ -97,7 +97,7 @@ impl Default for Fields {
 /// The learners to choose from: value, label, and when to choose it. The benchmarks of the learner support this advice.
 const LEARNERS: [(&str, &str, &str); 3] = [
     ("linecospar", "LineCoSpar", "the method of the paper; for answers by people, some of which may be wrong"),
-    ("eubo", "EUBO", "for answers by Gait RMSE; from 10 comparisons on, closer to the best gait than LineCoSpar"),
+    ("eubo", "EUBO", "for answers by Gait RMSE; after 10 comparisons, closer to the best gait than LineCoSpar"),
     (
         "eubo_uncertain",
         "EUBO for uncertain answers",
@@ -232,7 +232,7 @@ impl NewStudyPage {
         let [with, without] = &self.offered.measured;
         let both: Vec<String> = [words(with, "with"), words(without, "without")].into_iter().flatten().collect();
         if both.is_empty() {
-            return "No solve times measured yet; expect some seconds to a minute per solve.".to_owned();
+            return "No solve times measured yet; expect a few seconds to a minute per solve.".to_owned();
         }
         format!("Solve time here: {}.", both.join(", "))
     }
@@ -328,7 +328,7 @@ async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error>
     Ok(match trials::measured(db, plan.muscles).await?.map(took) {
         Some(seconds) => format!("{size} and takes about {}{people}.", format::duration(seconds)),
         None => format!(
-            "{size}. No solve times measured yet: the first trial takes up to a minute, later ones some seconds{people}."
+            "{size}. No solve times measured yet: the first trial takes up to a minute, later ones a few seconds{people}."
         ),
     })
 }
@@ -381,12 +381,12 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
         muscles: match fields.muscles.as_str() {
             "on" => true,
             "off" => false,
-            other => return Err(Error::invalid("muscles", other, "on, off")),
+            other => return Err(Error::invalid("muscles", other, "on or off")),
         },
         search_space: Some(search_space),
         base_bounds,
         feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
-            .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human, mixed"))?,
+            .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human or mixed"))?,
         solve_options: SolveOptions { basin_choice: basin_choice(fields)?, ..SolveOptions::default() },
         learner: learner(&fields.learner)
             .ok_or_else(|| Error::invalid("learner", fields.learner.as_str(), &learners))?,

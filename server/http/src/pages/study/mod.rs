@@ -279,7 +279,7 @@ pub(super) async fn post(
     let act = lifecycle::Act::ALL
         .into_iter()
         .find(|act| act.as_str() == form.act && acts_for_pages(*act))
-        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop, extend"))?;
+        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop or extend"))?;
     let mut writer = app.write().await?;
     let cancelled = if act == Act::Extend {
         let refused =

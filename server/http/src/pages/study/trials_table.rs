@@ -47,7 +47,7 @@ impl Choice {
             })?),
         };
         if !["ascending", DESCENDING].contains(&self.order.as_str()) {
-            return Err(Error::invalid("order", self.order.as_str(), "ascending, descending"));
+            return Err(Error::invalid("order", self.order.as_str(), "ascending or descending"));
         }
         Ok(Listing {
             sort: sort.ok_or_else(|| Error::invalid("sort", self.sort.as_str(), &SORTS.join(", ")))?,
@@ -182,7 +182,7 @@ fn heading(sort: &'static str) -> (&'static str, &'static str) {
         "number" => ("Trial", "In the order of proposals"),
         "state" => ("State", ""),
         "gait_rmse_rad" => ("RMSE, rad", "Gait RMSE against the reference gait"),
-        "cost_of_transport" => ("Cost", "Cost of transport, without unit"),
+        "cost_of_transport" => ("Cost", "Cost of transport, no unit"),
         "iterations" => ("Iterations", "Interior-point iterations of the solve"),
         "seconds_total" => ("Time, s", "Wall time of the solve"),
         bound => (bound, format::meaning(bound)),

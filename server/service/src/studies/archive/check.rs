@@ -316,7 +316,7 @@ async fn answers(
         at(&what, of_gaits(trials, [assessment.first, assessment.second]))?;
         let wanted = sorted(assessment.first, assessment.second);
         if assessment.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
-            return Err(refuse(format!("{what}: what the learner heard of it is of other trials")));
+            return Err(refuse(format!("{what}: the preference derived from it is about other trials")));
         }
     }
     for shown in at("presentations", presentations::of_study(db, id).await)? {
@@ -338,7 +338,7 @@ fn is_of_person(row: &FeedbackRow) -> bool {
 /// Checks that what people are asked about are gaits of the study.
 fn of_gaits<const N: usize>(trials: &HashMap<TrialId, &Trial>, asked: [TrialId; N]) -> Result<(), String> {
     match asked.iter().find(|id| trials.get(*id).is_none_or(|trial| trial.state != TrialState::Converged)) {
-        Some(id) => Err(format!("trial {id} is no gait of this study")),
+        Some(id) => Err(format!("trial {id} is not a gait of this study")),
         None => Ok(()),
     }
 }
@@ -416,7 +416,7 @@ async fn lab(
     for session in &sessions {
         at(format!("lab session {}", session.id), of_gaits(trials, [session.gait_one, session.gait_two]))?;
         for found in at("lab_recordings", measurement_files::of_session(db, session.id).await)? {
-            at(format!("recording {}", found.id), lab::check_kept(db, pool, &found).await)?;
+            at(format!("measurement file {}", found.id), lab::check_kept(db, pool, &found).await)?;
         }
         let results = measurement_files::results::<EmgResult>(db, session.id).await;
         at(format!("EMG results of lab session {}", session.id), results)?;

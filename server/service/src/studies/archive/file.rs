@@ -150,7 +150,7 @@ pub(super) struct Unpacker<R: Read> {
 /// The error for an archive that is refused.
 pub(super) fn refuse(reason: impl std::fmt::Display) -> Error {
     // The reason may quote a row, which can have any length.
-    let reason: String = reason.to_string().chars().take(LONGEST_REASON).collect();
+    let reason: String = reason.to_string().trim_end_matches('.').chars().take(LONGEST_REASON).collect();
     Error::Malformed(format!("The archive was refused and nothing was changed: {reason}."))
 }
 
@@ -201,7 +201,9 @@ impl<R: Read> Unpacker<R> {
                 self.rows = row;
                 drop(text);
                 let Some((place, table)) = table(&name) else {
-                    return Err(refuse(format!("row {row} belongs to the table {name:?}, which no archive has")));
+                    return Err(refuse(format!(
+                        "row {row} belongs to the table {name:?}, which is not part of an archive"
+                    )));
                 };
                 if place < self.place {
                     return Err(refuse(format!("row {row} belongs to table {table}, which must come earlier")));

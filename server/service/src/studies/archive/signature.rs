@@ -21,10 +21,10 @@ impl SigningKey {
     /// Generates a key and returns the text of its key file.
     ///
     /// # Errors
-    /// When the operating system gives no random numbers.
+    /// When the operating system cannot provide random numbers.
     pub fn generate() -> Result<String, Error> {
         let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new())
-            .map_err(|_| Error::Internal("the operating system gives no random numbers".to_owned()))?;
+            .map_err(|_| Error::Internal("the operating system cannot provide random numbers".to_owned()))?;
         Ok(format!("{PREFIX}{}\n", hex::encode(document.as_ref())))
     }
 

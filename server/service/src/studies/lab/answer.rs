@@ -55,7 +55,9 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
     printable::note("note", &new.note, LONGEST_NOTE)?;
     let session = still_open(writer, id).await?;
     if let Some(walk) = next_walk(&session) {
-        return Err(Error::conflict(format!("Walk {walk} is not recorded yet. Record all walks before the answer.")));
+        return Err(Error::conflict(format!(
+            "Walk {walk} is not recorded yet. Record all walks before you record the answer."
+        )));
     }
     if let Some(stands) = session.answer() {
         let same = (stands.number, stands.said, stands.note.as_str()) == (new.number, new.answer, new.note.as_str());
@@ -92,7 +94,7 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> 
     let answer = session.answer().ok_or_else(|| Error::conflict("There is no answer to retract."))?;
     if !can_be_retracted(&session) {
         let why = "This answer cannot be retracted here, because it is a safety report or the session is unblinded. Ask the study \
-                   coordinator to change it on the page of the study.";
+                   coordinator to change it on the study page.";
         return Err(Error::conflict(why));
     }
     lab_answers::retract(writer, &caller.actor, id, answer.number).await?;

@@ -21,7 +21,7 @@ use utoipa::ToSchema;
 pub struct WalkActivity {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
-    /// What it was made of.
+    /// Measurement file that it was computed from.
     pub recording_id: MeasurementFileId,
     /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, in shares of
     /// the peak of walk 1.
@@ -29,7 +29,7 @@ pub struct WalkActivity {
     pub channels: Vec<CycleActivity>,
     /// Mean of each channel over the cycle.
     pub averages: Vec<f64>,
-    /// Distance from walk 1: in all, and of each channel; none for walk 1.
+    /// EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
     #[schema(value_type = Option<schema::EmgRmse>)]
     pub emg_rmse: Option<EmgRmse>,
 }
@@ -65,7 +65,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     }
     drop(db);
     if files.first().is_none_or(|(walk, ..)| *walk != 1) {
-        return Err(Error::conflict("Walk 1 has no EMG recording, which the other walks are compared with."));
+        return Err(Error::conflict("Walk 1 has no EMG recording. The other walks are compared with it."));
     }
     let process = move |pool: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();

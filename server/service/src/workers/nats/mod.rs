@@ -47,7 +47,7 @@ impl Link {
             .retry_on_initial_connect()
             .connect(url)
             .await
-            .map_err(|error| DispatchError::Unreachable(format!("The NATS broker cannot be reached: {error}")))?;
+            .map_err(|error| DispatchError::Unreachable(format!("The NATS broker cannot be reached: {error}.")))?;
         Ok(Self { context: jetstream::new(client), queue: queue.to_owned(), lease })
     }
 
@@ -126,7 +126,7 @@ impl Link {
     /// Why the broker cannot be reached now, if it cannot.
     fn trouble(&self) -> Option<String> {
         (self.context.client().connection_state() != State::Connected)
-            .then(|| "The NATS broker cannot be reached".to_owned())
+            .then(|| "The NATS broker cannot be reached.".to_owned())
     }
 
     /// Refuses a message that is too large, for which the broker would close the connection.
