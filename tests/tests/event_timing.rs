@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use tower::ServiceExt;
 
 /// Sessions that are watched.
-const SESSIONS: usize = 100;
+const SESSIONS: usize = 200;
 
 /// Events with the instants at which they came.
 type Heard = Arc<Mutex<Vec<(Instant, String)>>>;

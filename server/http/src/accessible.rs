@@ -50,13 +50,9 @@ of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult:
 of_study!(AssessmentId, "assessment", async |db: &mut Connection, id| StoreResult::Ok(
     assessments::get(db, id).await?.study_id
 ));
-of_study!(JobId, "job", async |db: &mut Connection, id: JobId| {
-    // A job of a trial that is not there is not there either, and is refused in the same words.
-    trials::get(db, id.trial).await.map(|trial| trial.study_id).map_err(|error| match error {
-        StoreError::Missing { .. } => StoreError::Missing { what: "job", id: id.to_string() },
-        other => other,
-    })
-});
+of_study!(JobId, "job", async |db: &mut Connection, id: JobId| StoreResult::Ok(
+    trials::get(db, id.trial).await?.study_id
+));
 of_study!(MemberId, "member", async |db: &mut Connection, id| StoreResult::Ok(members::get(db, id).await?.study_id));
 of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
     StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
@@ -85,13 +81,18 @@ shared!(UserId, "user");
 shared!(TokenId, "token");
 shared!(SessionId, "session");
 
-/// The study of an object, if the caller can access it.
+/// The study of an object, if the caller can access it. What is missing and what is out of reach is refused in the same
+/// words.
 async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result<Option<StudyId>, Error> {
-    let study = id.study(db).await?;
+    let missing = || StoreError::Missing { what: T::WHAT, id: id.to_string() };
+    let study = match id.study(db).await {
+        Err(StoreError::Missing { .. }) => return Err(missing().into()),
+        found => found?,
+    };
     if let Some(study) = study
         && !members::reaches(db, reach, study).await?
     {
-        return Err(StoreError::Missing { what: T::WHAT, id: id.to_string() }.into());
+        return Err(missing().into());
     }
     Ok(study)
 }
@@ -129,7 +130,7 @@ pub(super) async fn in_path<T: Located, P: Permission>(
     Ok((id, study))
 }
 
-/// An identifier in a query or form, usable only through [`Named::reached`].
+/// An identifier in a query or form, usable only through [`Named::accessible`].
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(transparent)]
 pub(crate) struct Named<T>(T);

@@ -8,6 +8,7 @@ mod accessible;
 mod answers;
 pub mod api;
 mod authorization;
+mod binary;
 mod blind_motion;
 mod client_address;
 pub mod connections;

@@ -27,11 +27,6 @@ use utoipa_axum::router::OpenApiRouter;
 )]
 struct Described;
 
-/// Bytes that are no text: a picture, an archive.
-#[derive(ToSchema)]
-#[schema(value_type = String, format = Binary)]
-pub(super) struct Binary(#[allow(dead_code)] Vec<u8>);
-
 /// Marks an operation whose response contains a secret. It takes no Idempotency-Key.
 const SHOWN_ONCE: &str = "x-shown-once";
 

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::openapi::Binary;
+use crate::binary::Binary;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::visible::Visible;

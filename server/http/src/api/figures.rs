@@ -3,8 +3,8 @@
 use crate::AppState;
 use crate::accessible::{Id, Named, accessible};
 use crate::authorization::Authorized;
+use crate::binary::Binary;
 use crate::extract::Params;
-use crate::openapi::Binary;
 use crate::pages::{belief, figures};
 use crate::problem::Refusal;
 use crate::visible::Visible;
