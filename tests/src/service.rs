@@ -9,6 +9,7 @@ use axum::middleware::map_request;
 use gait_optimizer::Gait;
 use gaitwright_http::{Access, AppState, Hosts, router};
 use gaitwright_service::access::Reach;
+use gaitwright_service::backups::Backups;
 use gaitwright_service::studies::catalogue;
 use gaitwright_service::studies::plan::{self, NewStudy};
 use gaitwright_service::studies::scheduler::Scheduler;
@@ -22,7 +23,7 @@ use gaitwright_store::{
     ReferenceGaitId, Store, StudyId, SubjectId, commit, feedback, reference_gaits, studies, subjects, trials,
 };
 use http_body_util::BodyExt;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -37,6 +38,8 @@ pub struct Service {
     pub scheduler: Scheduler,
     /// Who may do what: everybody everything, unless a test says otherwise.
     pub access: Arc<Access>,
+    /// Backups on request.
+    pub backups: Arc<Backups>,
     work: JoinHandle<()>,
     /// Passes every gait at once; none where the service certifies gaits itself.
     certifier: Option<JoinHandle<()>>,
@@ -129,7 +132,14 @@ impl Service {
             let scheduler = scheduler.clone();
             async move { Box::pin(scheduler.run()).await.unwrap() }
         });
-        Self { store, scheduler, access: Arc::new(Access::without_sign_in()), work, certifier: None }
+        Self {
+            store,
+            scheduler,
+            access: Arc::new(Access::without_sign_in()),
+            backups: Arc::default(),
+            work,
+            certifier: None,
+        }
     }
 
     /// Passes every gait as it comes: people are asked about certified gaits only.
@@ -248,7 +258,7 @@ impl Service {
     /// What handlers can reach.
     pub fn state(&self) -> AppState {
         let hosts = Hosts::new(([127, 0, 0, 1], 0).into(), &[]);
-        AppState::new(self.scheduler.clone(), Arc::clone(&self.access), hosts)
+        AppState::new(self.scheduler.clone(), Arc::clone(&self.access), Arc::clone(&self.backups), hosts)
     }
 
     /// The router; a request without a Host header is one for localhost.
@@ -271,6 +281,22 @@ impl Service {
     /// `POST` of a JSON document.
     pub async fn post(&self, path: &str, body: &Value) -> Answer {
         self.post_text(path, "application/json", &body.to_string()).await
+    }
+
+    /// A backup that is requested over REST, when it is complete.
+    pub async fn backed_up(&self) -> Value {
+        let requested = self.post("/api/v1/backups", &json!({})).await;
+        assert_eq!(requested.status, StatusCode::ACCEPTED, "{}", requested.text);
+        let job = requested.headers["location"].to_str().unwrap().to_owned();
+        for _ in 0..2000 {
+            let found = self.fetch(&job).await.json();
+            match found["state"].as_str() {
+                Some("running") => tokio::time::sleep(Duration::from_millis(5)).await,
+                Some("done") => return self.fetch(found["result"].as_str().unwrap()).await.json(),
+                _ => panic!("{found}"),
+            }
+        }
+        panic!("{job} does not end");
     }
 
     /// `PUT` of a JSON document.

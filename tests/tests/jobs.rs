@@ -4,11 +4,15 @@
 
 use axum::http::StatusCode;
 use gait_optimizer::Gait;
+use gaitwright_service::access::{Caller, Right};
+use gaitwright_service::studies::job::{JobId, JobState};
+use gaitwright_service::studies::job_status;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{StudyId, TrialId};
+use gaitwright_store::{StudyId, TokenId, TrialId, commit};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::certified::Verdicts;
+use gaitwright_tests::cli;
 use gaitwright_tests::explained::{Clearance, with_few_gaits};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
@@ -145,6 +149,56 @@ async fn an_explanation_is_a_job_that_stops_and_begins_again() {
     assert!(listed(&service, "explanation").await.is_empty());
     address(&service.post(&explanation, &json!({})).await);
     wait_for(&service, &job, "running").await;
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_backup_is_a_job_that_leads_to_its_result() {
+    let (folder, service, ..) = service().await;
+    let job = address(&service.post("/api/v1/backups", &json!({})).await);
+    let done = wait_for(&service, &job, "done").await;
+    assert_eq!((&done["kind"], &done["trial_id"], &done["study_id"]), (&json!("backup"), &Value::Null, &Value::Null));
+    let backup = service.fetch(done["result"].as_str().unwrap()).await.json();
+    assert!(folder.path().join(backup["file"].as_str().unwrap()).exists(), "{backup}");
+    assert!(listed(&service, "backup").await.is_empty());
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.status, StatusCode::CONFLICT, "it has ended");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_backup_that_is_cancelled_or_interrupted_leaves_no_file() {
+    let (folder, service, ..) = service().await;
+    let state = service.state();
+    let (store, runners) = (&service.store, state.runners());
+    let admin = Caller::token(TokenId::fresh(), "admin", &[Right::Run, Right::Administer]);
+    let mut writer = store.write().await.unwrap();
+    let requested = state.backups.request(store, &mut writer, &admin.actor).await.unwrap();
+    let left = state.backups.request(store, &mut writer, &admin.actor).await.unwrap();
+    commit(writer).await.unwrap();
+    let (id, interrupted) = (requested.id, left.id);
+    // A backup needs a reader, and all are taken.
+    let mut readers = Vec::new();
+    for _ in 0..4 {
+        readers.push(store.read().await.unwrap());
+    }
+    let work = requested.begin(store.clone(), admin.actor.clone());
+    let mut writer = store.write().await.unwrap();
+    let program = Caller::token(TokenId::fresh(), "script", &[Right::Run]);
+    let refused = job_status::cancel(&mut writer, &program, runners, JobId::Backup(id)).await.unwrap_err();
+    assert!(refused.to_string().contains("administrator"), "{refused}");
+    let cancelled = job_status::cancel(&mut writer, &admin, runners, JobId::Backup(id)).await.unwrap();
+    assert_eq!(cancelled.state, JobState::Cancelled);
+    commit(writer).await.unwrap();
+    job_status::stop(runners, JobId::Backup(id)).await;
+    work.await.unwrap();
+    drop((readers, left));
+    let found = async |id| service.fetch(&format!("/api/v1/jobs/backup-{id}")).await.json();
+    assert_eq!(found(id).await["state"], "cancelled");
+    let interrupted = found(interrupted).await;
+    assert_eq!(interrupted["state"], "failed");
+    assert!(interrupted["reason"].as_str().unwrap().contains("ended before"), "{interrupted}");
+    let files = cli::files(folder.path());
+    assert!(!files.iter().any(|name| name.contains("backup-")), "{files:?}");
     service.stop().await;
 }
 

@@ -106,7 +106,7 @@ impl Closed {
 }
 
 /// What the whole service shares: it reveals no study.
-const SHARED: [&str; 6] = ["subjects", "devices", "reference-gaits", "users", "tokens", "sessions"];
+const SHARED: [&str; 7] = ["backups", "subjects", "devices", "reference-gaits", "users", "tokens", "sessions"];
 /// The same of pages.
 const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "reference-gaits"];
 

@@ -91,13 +91,11 @@ async fn queued_jobs_and_workers_are_listed() {
 async fn a_copy_is_made_and_checked_on_request() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let copied = service.post("/api/v1/backups", &json!({})).await;
-    assert_eq!(copied.status, StatusCode::OK, "{}", copied.text);
-    let copied = copied.json();
+    let copied = service.backed_up().await;
     let file = folder.path().join(copied["file"].as_str().unwrap());
     assert_eq!(std::fs::metadata(&file).unwrap().len(), copied["bytes"].as_u64().unwrap());
     backup::check(&file).await.unwrap();
-    let again = service.post("/api/v1/backups", &json!({})).await.json();
+    let again = service.backed_up().await;
     assert_ne!(again["file"], copied["file"]);
     service.stop().await;
 }
@@ -106,12 +104,10 @@ async fn a_copy_is_made_and_checked_on_request() {
 async fn copies_that_are_asked_for_together_are_made_one_after_the_other() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let nothing = json!({});
-    let asked = (0..6).map(|_| service.post("/api/v1/backups", &nothing));
+    let asked = (0..6).map(|_| service.backed_up());
     let mut names = std::collections::BTreeSet::new();
-    for answer in futures_util::future::join_all(asked).await {
-        assert_eq!(answer.status, StatusCode::OK, "{}", answer.text);
-        let file = answer.json()["file"].as_str().unwrap().to_owned();
+    for backup in futures_util::future::join_all(asked).await {
+        let file = backup["file"].as_str().unwrap().to_owned();
         backup::check(&folder.path().join(&file)).await.unwrap();
         assert!(names.insert(file), "two copies have one name");
     }

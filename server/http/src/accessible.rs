@@ -11,9 +11,9 @@ use gaitwright_service::access::{Permission, Reach};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::job::JobId;
 use gaitwright_store::{
-    AssessmentId, Connection, DeviceId, FeedbackId, LabSessionId, MeasurementFileId, MemberId, ReferenceGaitId,
-    SessionId, StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, assessments, feedback,
-    lab_sessions, measurement_files, members, trials,
+    AssessmentId, BackupId, Connection, DeviceId, FeedbackId, LabSessionId, MeasurementFileId, MemberId,
+    ReferenceGaitId, SessionId, StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, assessments,
+    feedback, lab_sessions, measurement_files, members, trials,
 };
 use serde::Deserialize;
 use std::fmt::Display;
@@ -50,9 +50,6 @@ of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult:
 of_study!(AssessmentId, "assessment", async |db: &mut Connection, id| StoreResult::Ok(
     assessments::get(db, id).await?.study_id
 ));
-of_study!(JobId, "job", async |db: &mut Connection, id: JobId| StoreResult::Ok(
-    trials::get(db, id.trial).await?.study_id
-));
 of_study!(MemberId, "member", async |db: &mut Connection, id| StoreResult::Ok(members::get(db, id).await?.study_id));
 of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
     StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
@@ -61,6 +58,17 @@ of_study!(MeasurementFileId, "measurement file", async |db: &mut Connection, id|
     let session = measurement_files::get(db, id).await?.session_id;
     StoreResult::Ok(lab_sessions::get(db, session).await?.study_id)
 });
+
+impl Located for JobId {
+    const WHAT: &'static str = "job";
+
+    async fn study(self, db: &mut Connection) -> StoreResult<Option<StudyId>> {
+        match self.trial() {
+            Some(trial) => Ok(Some(trials::get(db, trial).await?.study_id)),
+            None => Ok(None),
+        }
+    }
+}
 
 macro_rules! shared {
     ($id:ty, $what:literal) => {
@@ -75,6 +83,7 @@ macro_rules! shared {
 }
 
 shared!(SubjectId, "subject");
+shared!(BackupId, "backup");
 shared!(DeviceId, "device");
 shared!(ReferenceGaitId, "reference gait");
 shared!(UserId, "user");

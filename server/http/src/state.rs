@@ -8,8 +8,10 @@ use gaitwright_compute::{ComputeError, OnPool};
 use gaitwright_service::access::Clock;
 use gaitwright_service::access::secret::Turns;
 use gaitwright_service::access::sign_in::Limits;
+use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::job_status::Runners;
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_store::{Instant, LentWriter, Reader, Store, StoreResult, clock};
 use std::sync::Arc;
@@ -35,6 +37,8 @@ pub struct AppState {
     pub proxies: Proxies,
     /// Time limit of a response. Streams have started by then.
     pub slowest_answer: Duration,
+    /// Backups on request.
+    pub backups: Arc<Backups>,
     /// The record, with the thread pool for requests.
     store: Store,
 }
@@ -81,11 +85,16 @@ impl Access {
 
 impl AppState {
     /// Creates the state of a service.
-    pub fn new(scheduler: Scheduler, access: Arc<Access>, hosts: Hosts) -> Self {
+    pub fn new(scheduler: Scheduler, access: Arc<Access>, backups: Arc<Backups>, hosts: Hosts) -> Self {
         let beliefs = Arc::clone(scheduler.beliefs());
         let store = scheduler.store().with_own_pool();
         let (requests, proxies) = (Arc::default(), Proxies::default());
-        Self { scheduler, access, requests, beliefs, hosts, proxies, slowest_answer: SLOWEST_ANSWER, store }
+        Self { scheduler, access, requests, beliefs, hosts, proxies, slowest_answer: SLOWEST_ANSWER, backups, store }
+    }
+
+    /// What runs jobs.
+    pub fn runners(&self) -> Runners<'_> {
+        Runners { scheduler: &self.scheduler, backups: &self.backups }
     }
 
     /// The record.

@@ -97,7 +97,7 @@ impl Serve {
         let access = Arc::new(access);
         // Exports by commands while the service was not running.
         access.log.write(&store, true).await?;
-        let mut state = AppState::new(scheduler.clone(), Arc::clone(&access), hosts);
+        let mut state = AppState::new(scheduler.clone(), Arc::clone(&access), Arc::default(), hosts);
         state.proxies = proxies.clone();
         let app = router(state);
         let work = tokio::spawn({

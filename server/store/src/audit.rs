@@ -129,6 +129,15 @@ pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limi
     rows.iter().map(from_row).collect()
 }
 
+/// The rows of an object, oldest first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_object(db: &mut Connection, object: &str) -> StoreResult<Vec<AuditRow>> {
+    let rows = sqlx::query("select * from audit where object = ? order by seq").bind(object).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// The result of verifying the chain.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ChainCheck {

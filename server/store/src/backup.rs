@@ -28,6 +28,14 @@ pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
     Ok((to, size))
 }
 
+/// Refuses a backup next to the record that would leave less free space than is kept in reserve.
+///
+/// # Errors
+/// [`StoreError::NearlyFull`].
+pub fn room(store: &Store) -> StoreResult<()> {
+    store.room_for_copy(store.path())
+}
+
 /// Prefix of the names of scheduled backups.
 const SCHEDULED: &str = "scheduled";
 

@@ -73,6 +73,7 @@ identifier!(StudyId, "study");
 identifier!(TrialId, "trial");
 identifier!(FeedbackId, "feedback row");
 identifier!(JobId, "job");
+identifier!(BackupId, "backup");
 identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(MemberId, "membership in a study");

@@ -71,8 +71,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    AssessmentId, DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabSessionId, MeasurementFileId, MemberId,
-    PresentationId, ReferenceGaitId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    AssessmentId, BackupId, DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabSessionId, MeasurementFileId,
+    MemberId, PresentationId, ReferenceGaitId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use packed::{Packed, PackedText};

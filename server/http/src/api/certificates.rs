@@ -14,7 +14,7 @@ use gait_optimizer::certificate::Certificate;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certification;
-use gaitwright_service::studies::job::{JobId, JobKind};
+use gaitwright_service::studies::job::JobId;
 use gaitwright_service::studies::job_status;
 use gaitwright_store::{TrialId, certificates, schema};
 
@@ -69,7 +69,7 @@ pub(super) async fn create(
     if !app.scheduler.certify(id) {
         return Err(Error::NotReady("This service does not certify gaits.".to_owned()).into());
     }
-    let id = JobId { kind: JobKind::Certificate, trial: id };
-    let job = Job::from(job_status::find(&mut writer, &app.scheduler, id).await?);
+    let id = JobId::Certificate(id);
+    let job = Job::from(job_status::find(&mut writer, app.runners(), id).await?);
     request.accepted(&app, writer, Job::address(id), &job).await
 }

@@ -15,7 +15,7 @@ use gait_optimizer::{SolveStatus, Violation};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, ExplanationState};
-use gaitwright_service::studies::job::{JobId, JobKind};
+use gaitwright_service::studies::job::JobId;
 use gaitwright_service::studies::job_status;
 use gaitwright_store::explanations::Explained;
 use gaitwright_store::{Instant, TrialId, schema, trials};
@@ -136,7 +136,7 @@ pub(super) async fn create(
         return request.done(&app, writer, &TrialExplanation::new(id, made)).await;
     }
     app.scheduler.explain_again(id);
-    let id = JobId { kind: JobKind::Explanation, trial: id };
-    let job = Job::from(job_status::find(&mut writer, &app.scheduler, id).await?);
+    let id = JobId::Explanation(id);
+    let job = Job::from(job_status::find(&mut writer, app.runners(), id).await?);
     request.accepted(&app, writer, Job::address(id), &job).await
 }

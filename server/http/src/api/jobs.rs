@@ -28,10 +28,10 @@ pub(super) struct Job {
     kind: JobKind,
     /// State of the job.
     state: JobState,
-    /// Trial of the job.
-    trial_id: TrialId,
-    /// Study of the trial.
-    study_id: StudyId,
+    /// Trial of the job. Null for a backup.
+    trial_id: Option<TrialId>,
+    /// Study of the trial. Null for a backup.
+    study_id: Option<StudyId>,
     /// Address of the result. Null until the job is done.
     result: Option<String>,
     /// Reason if it failed. Null otherwise.
@@ -43,12 +43,14 @@ pub(super) struct Job {
 impl From<JobStatus> for Job {
     fn from(job: JobStatus) -> Self {
         let JobStatus { id, study, state, reason, solve } = job;
-        let result = match id.kind {
-            JobKind::Solve => format!("/api/v1/trials/{}", id.trial),
-            JobKind::Certificate | JobKind::Explanation => format!("/api/v1/trials/{}/{}", id.trial, id.kind.as_str()),
+        let result = match id {
+            JobId::Backup(backup) => format!("/api/v1/backups/{backup}"),
+            JobId::Certificate(trial) => format!("/api/v1/trials/{trial}/certificate"),
+            JobId::Explanation(trial) => format!("/api/v1/trials/{trial}/explanation"),
+            JobId::Solve(trial) => format!("/api/v1/trials/{trial}"),
         };
         let result = (state == JobState::Done).then_some(result);
-        Self { id, kind: id.kind, state, trial_id: id.trial, study_id: study, result, reason, solve }
+        Self { id, kind: id.kind(), state, trial_id: id.trial(), study_id: study, result, reason, solve }
     }
 }
 
@@ -69,7 +71,7 @@ pub(super) struct Filter {
 
 /// List jobs
 ///
-/// Jobs that have not ended, of studies that the caller can access.
+/// Jobs that have not ended: backups, and those of studies that the caller can access.
 #[utoipa::path(
     get,
     path = "/jobs",
@@ -88,8 +90,10 @@ pub(super) async fn list(
     paging: Paging<JobId, Filter>,
 ) -> Result<Json<Page<Job>>, Refusal> {
     let Filter { kind, study_id } = paging.filter;
-    let mut all = job_status::open(&mut *app.read().await?, &app.scheduler, authorized.caller.reach()).await?;
-    all.retain(|job| kind.is_none_or(|kind| kind == job.id.kind) && study_id.is_none_or(|study| study == job.study));
+    let mut all = job_status::open(&mut *app.read().await?, app.runners(), authorized.caller.reach()).await?;
+    all.retain(|job| {
+        kind.is_none_or(|kind| kind == job.id.kind()) && study_id.is_none_or(|study| Some(study) == job.study)
+    });
     Ok(Json(paging.cut(all, |job| job.id)?.map(Job::from)))
 }
 
@@ -110,12 +114,13 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<JobId, Read>,
 ) -> Result<Json<Job>, Refusal> {
-    Ok(Json(job_status::find(&mut *app.read().await?, &app.scheduler, id).await?.into()))
+    Ok(Json(job_status::find(&mut *app.read().await?, app.runners(), id).await?.into()))
 }
 
 /// Cancel a job
 ///
-/// A solve stops within one iteration, and its trial is cancelled.
+/// A solve stops within one iteration, and its trial is cancelled. The cancellation of a backup needs the right
+/// `administer`.
 #[utoipa::path(
     post,
     path = "/jobs/{id}/cancel",
@@ -134,11 +139,9 @@ pub(super) async fn cancel(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let job = job_status::find(&mut writer, &app.scheduler, id).await?;
-    job_status::cancel(&mut writer, &request.actor, &app.scheduler, id).await?;
-    let cancelled = Job::from(JobStatus { state: JobState::Cancelled, solve: None, ..job });
-    let answer = request.done(&app, writer, &cancelled).await?;
-    app.scheduler.cancel_job(id).await;
+    let cancelled = job_status::cancel(&mut writer, &request.caller, app.runners(), id).await?;
+    let answer = request.done(&app, writer, &Job::from(cancelled)).await?;
+    job_status::stop(app.runners(), id).await;
     Ok(answer)
 }
 

@@ -37,7 +37,6 @@ mod users;
 
 use super::{AppState, RECORDING_LIMIT_BYTES};
 use axum::extract::DefaultBodyLimit;
-pub(super) use backups::Copy;
 pub(super) use jobs::Workers;
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouterExt};
 use utoipa_axum::routes;
@@ -163,6 +162,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(jobs::cancel))
         .routes(routes!(jobs::workers))
         .routes(routes!(backups::create))
+        .routes(routes!(backups::get))
         .routes(routes!(audit::list))
         .routes(routes!(access_log::list))
         .routes(routes!(health::get))

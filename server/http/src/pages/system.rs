@@ -3,14 +3,18 @@
 use super::error::{Page, page};
 use super::format::{duration, words};
 use crate::AppState;
-use crate::api::{Copy, Workers};
+use crate::api::Workers;
 use crate::authorization::Authorized;
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::{Administer, Caller, Permission, Read};
+use gaitwright_service::backups;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::job::JobState;
+use gaitwright_store::backup::those_beside;
 use gaitwright_store::totals::{self, Totals};
-use gaitwright_store::{FORM, backup, jobs, trials};
+use gaitwright_store::{FORM, commit, jobs, trials};
+use std::time::Duration;
 
 #[derive(Template)]
 #[template(path = "system.html")]
@@ -19,8 +23,8 @@ struct SystemPage {
     /// Version of the database schema.
     form: i64,
     workers: Workers,
-    /// The backup that was just made.
-    copied: Option<Copy>,
+    /// What became of the backup that was just requested.
+    backup: Option<BackupNotice>,
     /// Backups in the folder of the record, newest first: name and bytes.
     copies: Vec<(String, i64)>,
     queued: u32,
@@ -52,27 +56,50 @@ pub(super) async fn get(authorized: Authorized<Read>, State(app): State<AppState
     show(&app, &authorized.caller, None).await
 }
 
-/// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
-pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): State<AppState>) -> Page {
-    let copy = Copy::for_page(app.clone(), authorized.caller.actor.clone()).await?;
-    show(&app, &authorized.caller, Some(copy)).await
+/// What became of a requested backup.
+enum BackupNotice {
+    Complete { file: String },
+    Running,
+    Failed { reason: String },
 }
 
-async fn show(app: &AppState, caller: &Caller, copied: Option<Copy>) -> Page {
+/// Time that the page waits for a backup.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
+pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): State<AppState>) -> Page {
+    let actor = &authorized.caller.actor;
+    let mut writer = app.write().await?;
+    let requested = app.backups.request(app.store(), &mut writer, actor).await?;
+    commit(writer).await?;
+    let id = requested.id;
+    // It goes on if it takes longer.
+    let _ = tokio::time::timeout(PATIENCE, requested.begin(app.store().clone(), actor.clone())).await;
+    let mut reader = app.read().await?;
+    let notice = match app.backups.find(&mut reader, id).await? {
+        Some((JobState::Done, _)) => BackupNotice::Complete { file: backups::get(&mut reader, id).await?.file },
+        Some((JobState::Failed, reason)) => BackupNotice::Failed { reason: reason.unwrap_or_default() },
+        _ => BackupNotice::Running,
+    };
+    drop(reader);
+    show(&app, &authorized.caller, Some(notice)).await
+}
+
+async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> Page {
     let workers = Workers::read(app).await?;
     let mut reader = app.read().await?;
     let totals = totals::read(&mut reader).await?;
     let (queued, running) = jobs::depth(&mut reader).await?;
     let may_administer = caller.may(Administer::NEEDED);
     let record = app.store().path();
-    let copies = if may_administer { backup::those_beside(record) } else { Ok(Vec::new()) };
+    let copies = if may_administer { those_beside(record) } else { Ok(Vec::new()) };
     let measured = [trials::measured(&mut reader, true).await?, trials::measured(&mut reader, false).await?];
     page(&SystemPage {
         version: env!("CARGO_PKG_VERSION"),
         form: FORM,
         copies: copies.map_err(|e| Error::Internal(format!("cannot list the backups: {e}")))?,
         workers,
-        copied,
+        backup,
         queued,
         running,
         oldest_queued: duration(totals.oldest_queued_seconds),

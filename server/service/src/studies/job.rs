@@ -1,6 +1,6 @@
 //! Identifiers, kinds and states of jobs.
 
-use gaitwright_store::TrialId;
+use gaitwright_store::{BackupId, TrialId};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -10,6 +10,8 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobKind {
+    /// A backup of the record.
+    Backup,
     /// The certificate of a gait.
     Certificate,
     /// The explanation of a trial without a gait.
@@ -18,32 +20,48 @@ pub enum JobKind {
     Solve,
 }
 
-impl JobKind {
-    const ALL: [Self; 3] = [Self::Certificate, Self::Explanation, Self::Solve];
+/// Identifier of a job, such as `solve-` and the identifier of its trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum JobId {
+    /// A backup.
+    Backup(BackupId),
+    /// The certificate of the gait of a trial.
+    Certificate(TrialId),
+    /// The explanation of a trial.
+    Explanation(TrialId),
+    /// The solve of a trial.
+    Solve(TrialId),
+}
 
-    /// Name in identifiers and addresses.
-    pub fn as_str(self) -> &'static str {
+impl JobId {
+    /// Kind of the job.
+    pub fn kind(self) -> JobKind {
         match self {
-            Self::Certificate => "certificate",
-            Self::Explanation => "explanation",
-            Self::Solve => "solve",
+            Self::Backup(_) => JobKind::Backup,
+            Self::Certificate(_) => JobKind::Certificate,
+            Self::Explanation(_) => JobKind::Explanation,
+            Self::Solve(_) => JobKind::Solve,
+        }
+    }
+
+    /// Trial of the job; `None` for a backup.
+    pub fn trial(self) -> Option<TrialId> {
+        match self {
+            Self::Backup(_) => None,
+            Self::Certificate(trial) | Self::Explanation(trial) | Self::Solve(trial) => Some(trial),
         }
     }
 }
 
-/// Identifier of a job, such as `solve-` and the identifier of its trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct JobId {
-    /// Kind of the job.
-    pub kind: JobKind,
-    /// Trial of the job.
-    pub trial: TrialId,
-}
-
 impl fmt::Display for JobId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}-{}", self.kind.as_str(), self.trial)
+        match self {
+            Self::Backup(id) => write!(f, "backup-{id}"),
+            Self::Certificate(trial) => write!(f, "certificate-{trial}"),
+            Self::Explanation(trial) => write!(f, "explanation-{trial}"),
+            Self::Solve(trial) => write!(f, "solve-{trial}"),
+        }
     }
 }
 
@@ -52,9 +70,15 @@ impl FromStr for JobId {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let unknown = || format!("{text} is not the identifier of a job");
-        let (kind, trial) = text.split_once('-').ok_or_else(unknown)?;
-        let kind = JobKind::ALL.into_iter().find(|known| known.as_str() == kind).ok_or_else(unknown)?;
-        Ok(Self { kind, trial: trial.parse().map_err(|_| unknown())? })
+        let (kind, id) = text.split_once('-').ok_or_else(unknown)?;
+        match kind {
+            "backup" => id.parse().ok().map(Self::Backup),
+            "certificate" => id.parse().ok().map(Self::Certificate),
+            "explanation" => id.parse().ok().map(Self::Explanation),
+            "solve" => id.parse().ok().map(Self::Solve),
+            _ => None,
+        }
+        .ok_or_else(unknown)
     }
 }
 

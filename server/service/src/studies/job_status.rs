@@ -1,14 +1,15 @@
-//! Status and cancellation of jobs: solves, certificates and explanations of trials.
+//! Status and cancellation of jobs: backups, and solves, certificates and explanations of trials.
 //!
 //! A job has no row of its own. Its state follows from the record and the running process.
 
 use super::command;
 use super::explanation::{self, Effort, ExplanationState};
-use super::job::{JobId, JobKind, JobState};
+use super::job::{JobId, JobState};
 use super::scheduler::Scheduler;
-use crate::access::Reach;
+use crate::access::{Caller, Reach, Right};
+use crate::backups::{self, Backups};
 use crate::error::Error;
-use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::audit;
 use gaitwright_store::jobs::{self, OpenSolve};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, StudyId, TrialId, Writer, certificates, explanations, members, trials};
@@ -19,8 +20,8 @@ use serde_json::json;
 pub struct JobStatus {
     /// Identifier.
     pub id: JobId,
-    /// The study of its trial.
-    pub study: StudyId,
+    /// The study of its trial; `None` for a backup.
+    pub study: Option<StudyId>,
     /// State.
     pub state: JobState,
     /// Reason if it failed.
@@ -29,20 +30,35 @@ pub struct JobStatus {
     pub solve: Option<OpenSolve>,
 }
 
+/// What runs jobs in this process.
+#[derive(Debug, Clone, Copy)]
+pub struct Runners<'a> {
+    /// Runs the jobs of trials.
+    pub scheduler: &'a Scheduler,
+    /// Makes backups.
+    pub backups: &'a Backups,
+}
+
 /// The status of a job, which may have ended.
 ///
 /// # Errors
 /// [`Error::NotFound`] if it was never requested; errors of the database.
-pub async fn find(db: &mut Connection, scheduler: &Scheduler, id: JobId) -> Result<JobStatus, Error> {
-    let trial = trials::get(db, id.trial).await?;
-    let found = match id.kind {
-        JobKind::Solve => solve(&trial),
-        JobKind::Certificate => certificate(db, scheduler, id.trial).await?,
-        JobKind::Explanation => explanation(db, scheduler, &trial).await?,
+pub async fn find(db: &mut Connection, runners: Runners<'_>, id: JobId) -> Result<JobStatus, Error> {
+    let missing = || Error::NotFound { what: "job".to_owned(), id: id.to_string() };
+    let trial = match id.trial() {
+        Some(trial) => Some(trials::get(db, trial).await?),
+        None => None,
     };
-    let (state, reason) = found.ok_or_else(|| Error::NotFound { what: "job".to_owned(), id: id.to_string() })?;
-    let solve = if id.kind == JobKind::Solve { jobs::open_of(db, id.trial).await? } else { None };
-    Ok(JobStatus { id, study: trial.study_id, state, reason, solve })
+    let found = match (id, &trial) {
+        (JobId::Backup(backup), _) => runners.backups.find(db, backup).await?,
+        (JobId::Solve(_), Some(trial)) => solve(trial),
+        (JobId::Certificate(id), _) => certificate(db, runners.scheduler, id).await?,
+        (JobId::Explanation(_), Some(trial)) => explanation(db, runners.scheduler, trial).await?,
+        (JobId::Solve(_) | JobId::Explanation(_), None) => None,
+    };
+    let (state, reason) = found.ok_or_else(missing)?;
+    let solve = if let JobId::Solve(trial) = id { jobs::open_of(db, trial).await? } else { None };
+    Ok(JobStatus { id, study: trial.map(|trial| trial.study_id), state, reason, solve })
 }
 
 /// State of a job, and the reason if it failed.
@@ -89,56 +105,65 @@ async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) 
 ///
 /// # Errors
 /// What the database reports.
-pub async fn open(db: &mut Connection, scheduler: &Scheduler, reach: Reach) -> Result<Vec<JobStatus>, Error> {
-    let mut all = Vec::new();
-    for (trial, state) in scheduler.certifying() {
+pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Result<Vec<JobStatus>, Error> {
+    let status = |id, study, state, solve| JobStatus { id, study, state, reason: None, solve };
+    let mut all: Vec<JobStatus> = runners
+        .backups
+        .running()
+        .into_iter()
+        .map(|id| status(JobId::Backup(id), None, JobState::Running, None))
+        .collect();
+    for (trial, state) in runners.scheduler.certifying() {
         let study = trials::get(db, trial).await?.study_id;
         if members::reaches(db, reach, study).await? {
-            all.push(JobStatus {
-                id: JobId { kind: JobKind::Certificate, trial },
-                study,
-                state,
-                reason: None,
-                solve: None,
-            });
+            all.push(status(JobId::Certificate(trial), Some(study), state, None));
         }
     }
     for (trial, study) in explanations::requested(db, reach).await? {
-        let state = match scheduler.explaining(trial) {
+        let state = match runners.scheduler.explaining(trial) {
             Effort::Running => JobState::Running,
             Effort::Ready | Effort::None => JobState::Queued,
             Effort::Cancelled | Effort::Refused(_) => continue,
         };
-        all.push(JobStatus {
-            id: JobId { kind: JobKind::Explanation, trial },
-            study,
-            state,
-            reason: None,
-            solve: None,
-        });
+        all.push(status(JobId::Explanation(trial), Some(study), state, None));
     }
     for solve in jobs::open(db, reach).await? {
         let state = if solve.worker.is_some() { JobState::Running } else { JobState::Queued };
-        let (id, study) = (JobId { kind: JobKind::Solve, trial: solve.trial_id }, solve.study_id);
-        all.push(JobStatus { id, study, state, reason: None, solve: Some(solve) });
+        all.push(status(JobId::Solve(solve.trial_id), Some(solve.study_id), state, Some(solve)));
     }
     all.sort_by_key(|job| job.id);
     Ok(all)
 }
 
-/// Cancels a job that has not ended. Its work stops once the change is durable and [`Scheduler::cancel_job`] was told.
+/// Cancels a job that has not ended. Its work stops once the change is durable and [`stop`] was called.
 ///
 /// # Errors
-/// [`Error::NotFound`], or [`Error::Conflict`] when it has ended.
-pub async fn cancel(writer: &mut Writer, actor: &Actor, scheduler: &Scheduler, id: JobId) -> Result<(), Error> {
-    let job = find(writer, scheduler, id).await?;
+/// [`Error::Forbidden`] for the backup of an administrator, [`Error::NotFound`], or [`Error::Conflict`] when it has
+/// ended.
+pub async fn cancel(writer: &mut Writer, caller: &Caller, runners: Runners<'_>, id: JobId) -> Result<JobStatus, Error> {
+    let job = find(writer, runners, id).await?;
     if !matches!(job.state, JobState::Queued | JobState::Running) {
         return Err(Error::conflict(format!("job {id} has ended")));
     }
-    if id.kind == JobKind::Solve {
-        command::cancel(writer, actor, id.trial, "Cancelled on request.").await?;
-    } else {
-        audit::append(writer, actor, "job.cancel", &format!("job {id}"), &json!({})).await?;
+    match id {
+        JobId::Backup(_) if !caller.may(Right::Administer) => {
+            return Err(Error::Forbidden("Only an administrator can cancel a backup.".to_owned()));
+        }
+        JobId::Backup(backup) => backups::cancel(writer, &caller.actor, backup).await?,
+        JobId::Solve(trial) => {
+            command::cancel(writer, &caller.actor, trial, "Cancelled on request.").await?;
+        }
+        JobId::Certificate(_) | JobId::Explanation(_) => {
+            audit::append(writer, &caller.actor, "job.cancel", &format!("job {id}"), &json!({})).await?;
+        }
     }
-    Ok(())
+    Ok(JobStatus { state: JobState::Cancelled, solve: None, ..job })
+}
+
+/// Stops the work of a job whose cancellation is durable.
+pub async fn stop(runners: Runners<'_>, id: JobId) {
+    match id {
+        JobId::Backup(backup) => runners.backups.stop(backup),
+        JobId::Certificate(_) | JobId::Explanation(_) | JobId::Solve(_) => runners.scheduler.cancel_job(id).await,
+    }
 }

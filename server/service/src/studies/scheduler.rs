@@ -7,7 +7,7 @@ use super::belief::Beliefs;
 use super::certifier::Certifier;
 use super::explainer::Explainer;
 use super::explanation::Effort;
-use super::job::{JobId, JobKind, JobState};
+use super::job::{JobId, JobState};
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::plans_under_way::Plans;
@@ -173,11 +173,11 @@ impl Scheduler {
 
     /// Stops the work of a job that was cancelled.
     pub async fn cancel_job(&self, id: JobId) {
-        match (id.kind, &self.0.after_solves) {
-            (JobKind::Solve, _) => self.cancel_solve(id.trial).await,
-            (JobKind::Certificate, Some((certifier, _))) => certifier.cancel(id.trial),
-            (JobKind::Explanation, Some((_, explainer))) => explainer.cancel(id.trial),
-            (JobKind::Certificate | JobKind::Explanation, None) => {}
+        match (id, &self.0.after_solves) {
+            (JobId::Solve(trial), _) => self.cancel_solve(trial).await,
+            (JobId::Certificate(trial), Some((certifier, _))) => certifier.cancel(trial),
+            (JobId::Explanation(trial), Some((_, explainer))) => explainer.cancel(trial),
+            (JobId::Certificate(_) | JobId::Explanation(_), None) | (JobId::Backup(_), _) => {}
         }
     }
 

@@ -74,7 +74,10 @@ pub async fn suggest(
         return Err(Error::conflict(format!("All {} trials of the study have been handed out.", plan.trial_budget)));
     }
     if snapshot.open() >= plan.parallel_trials as usize {
-        return Err(Error::conflict(format!("{} trials are open. Report their outcomes first.", snapshot.open())));
+        return Err(Error::conflict(match snapshot.open() {
+            1 => "A trial is open. Report its outcome first.".to_owned(),
+            open => format!("{open} trials are open. Report their outcomes first."),
+        }));
     }
     let choose = move |pool: &OnPool| {
         let believed = beliefs.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
