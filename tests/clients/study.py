@@ -1,55 +1,224 @@
-"""Runs a whole study through the client that openapi-python-client generates.
+"""Runs whole studies through the client that openapi-python-client generates.
 
     python study.py ADDRESS
 """
 
 import sys
+import time
 from http import HTTPStatus
+from typing import TypeVar
+from uuid import UUID
 
-from gaitwright_client import Client
+from gaitwright_client import AuthenticatedClient as Client
+from gaitwright_client.api.access import create_token
+from gaitwright_client.api.figures import get_study_figure
+from gaitwright_client.api.operation import get_job
+from gaitwright_client.api.preferences import create_preference, get_preference, list_preferences
 from gaitwright_client.api.scripts import ask_for_trial, tell_outcome
-from gaitwright_client.api.studies import create_study, get_study, get_study_history
-from gaitwright_client.api.subjects import list_subjects
-from gaitwright_client.api.trials import list_trials
-from gaitwright_client.models import Ask, Evaluation, NewStudy, Outcome, StudyState, Tell
+from gaitwright_client.api.studies import (
+    create_study,
+    get_recommendation,
+    get_study,
+    get_study_archive,
+    get_study_history,
+)
+from gaitwright_client.api.subjects import create_subject, get_subject
+from gaitwright_client.api.trials import get_certificate, list_trials, request_certificate
+from gaitwright_client.models import (
+    Ask,
+    Bounds,
+    Certificate,
+    Dimension,
+    DimensionName,
+    Evaluation,
+    FeedbackMode,
+    FeedbackRow,
+    FeedbackRowPage,
+    Job,
+    JobState,
+    MadeToken,
+    MilestonePage,
+    NewPreference,
+    NewStudy,
+    NewSubject,
+    NewToken,
+    NewTokenScopesItem,
+    Outcome,
+    PairAnswer,
+    Problem,
+    Recommendation,
+    Recorded,
+    SearchSpace,
+    StudyState,
+    StudyView,
+    Subject,
+    Tell,
+    Trial,
+    TrialPage,
+    TrialState,
+)
+from gaitwright_client.types import UNSET, File, Response, Unset
 
 BUDGET = 10
+SECONDS = 60
+FIGURE = "course-gait-rmse-of-the-best-action-by-iteration"
+
+ARCHIVE = b"gaitwright study"
+
+T = TypeVar("T")
+Made = TypeVar("Made", MadeToken, Recorded, StudyView, Subject)
 
 
-def measure(bounds):
+def given(kind: type[T], reply: object) -> T:
+    """The answer of this kind, or an exception with what the problem says."""
+    if isinstance(reply, Problem):
+        raise RuntimeError(reply.detail)
+    assert isinstance(reply, kind), reply
+    return reply
+
+
+def created(kind: type[Made], path: str, reply: Response[Made | Problem]) -> Made:
+    """What a 201 made, whose address is `path` and its identifier."""
+    made = given(kind, reply.parsed)
+    assert reply.status_code == HTTPStatus.CREATED, reply.status_code
+    assert reply.headers["Location"] == f"/api/v1/{path}/{made.id}", reply.headers
+    return made
+
+
+def measure(bounds: Bounds) -> float | None:
     """Gait RMSE of a made-up walker, rad; None where it stumbles."""
     if bounds.a5 > 0.03 and bounds.a6 < 0.15:
         return None
     return 0.1 + 3 * abs(bounds.a5 - 0.026) + abs(bounds.a6 - 0.3) / 2
 
 
-def main():
-    client = Client(base_url=sys.argv[1])
-    subject = next(one for one in list_subjects.sync(client=client).items if one.pseudonym == "paper-1")
-    new = NewStudy(subject_id=subject.id, name="python", evaluation=Evaluation.SCRIPT, trial_budget=BUDGET)
-    study = create_study.sync(client=client, body=new)
+def trials_of(client: Client, study: UUID) -> list[Trial]:
+    """All trials in order, three at a time."""
+    trials: list[Trial] = []
+    cursor: str | Unset = UNSET
+    while True:
+        page = given(TrialPage, list_trials.sync(study, client=client, limit=3, cursor=cursor))
+        trials += page.items
+        if page.next_ is None or isinstance(page.next_, Unset):
+            break
+        assert len(page.items) == 3, page
+        cursor = page.next_
+    return sorted(trials, key=lambda trial: trial.number)
+
+
+def by_script(client: Client, subject: UUID) -> None:
+    """A script evaluates every trial."""
+    new = NewStudy(subject_id=subject, name="python", evaluation=Evaluation.SCRIPT, trial_budget=BUDGET)
+    study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new))
     while True:
         asked = ask_for_trial.sync_detailed(study.id, client=client, body=Ask(worker="treadmill"))
         if asked.status_code == HTTPStatus.CONFLICT:
             break
-        trial, rmse = asked.parsed, measure(asked.parsed.action)
+        trial = given(Trial, asked.parsed)
+        rmse = measure(trial.action)
         told = (
             Tell(outcome=Outcome.NOT_CONVERGED, reason="the walker stumbled")
             if rmse is None
             else Tell(outcome=Outcome.CONVERGED, gait_rmse_rad=rmse)
         )
-        tell_outcome.sync(trial.id, client=client, body=told)
-    trials, cursor = [], None
-    while True:
-        page = list_trials.sync(study.id, client=client, limit=3, **({"cursor": cursor} if cursor else {}))
-        trials += page.items
-        cursor = page.next_
-        if cursor is None:
-            break
-    assert len(trials) == BUDGET, trials
-    best = get_study_history.sync(study.id, client=client).items[-1]
-    assert get_study.sync(study.id, client=client).state == StudyState.FINISHED
+        given(Trial, tell_outcome.sync(trial.id, client=client, body=told))
+    trials = trials_of(client, study.id)
+    assert [trial.number for trial in trials] == list(range(1, BUDGET + 1)), trials
+    best = given(MilestonePage, get_study_history.sync(study.id, client=client)).items[-1]
+    assert given(StudyView, get_study.sync(study.id, client=client)).state == StudyState.FINISHED
     print(f"python: {len(trials)} trials, best: trial {best.number}, {best.gait_rmse_rad:.4f} rad")
+
+
+def wait_until(client: Client, study: UUID, *states: StudyState) -> StudyState:
+    """Waits until the study has one of these states."""
+    for _ in range(SECONDS * 20):
+        state = given(StudyView, get_study.sync(study, client=client)).state
+        if state in states:
+            return state
+        time.sleep(0.05)
+    raise TimeoutError(f"the study is {state}")
+
+
+def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
+    """A person answers the comparisons."""
+    space = SearchSpace(
+        dimensions=[
+            Dimension(name=DimensionName.A5, values=[0.013, 0.026], lengthscale=0.013),
+            Dimension(name=DimensionName.A6, values=[0.05, 0.1, 0.15, 0.2], lengthscale=0.05),
+        ]
+    )
+    new = NewStudy(subject_id=subject, feedback_mode=FeedbackMode.HUMAN, search_space=space, trial_budget=4)
+    study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new)).id
+    compared = 1
+    while wait_until(client, study, StudyState.WAITING, StudyState.FINISHED) == StudyState.WAITING:
+        trials = trials_of(client, study)
+        if len(trials) == compared:
+            time.sleep(0.05)
+            continue
+        newest = trials[-1]
+        for trial in trials[:-1]:
+            assert isinstance(trial.gait_rmse_rad, float) and isinstance(newest.gait_rmse_rad, float), trial
+            answer = PairAnswer.A if trial.gait_rmse_rad < newest.gait_rmse_rad else PairAnswer.B
+            body = NewPreference(trial_a=trial.id, trial_b=newest.id, answer=answer)
+            reply = create_preference.sync_detailed(study, client=client, body=body)
+            said = created(Recorded, "preferences", reply)
+            assert given(FeedbackRow, get_preference.sync(said.id, client=client)).seq == said.seq
+        compared = len(trials)
+    assert len(given(FeedbackRowPage, list_preferences.sync(study, client=client)).items) == 6
+    best = given(Recommendation, get_recommendation.sync(study, client=client))
+    picture = get_study_figure.sync_detailed(study, f"{FIGURE}.png", client=client)
+    assert picture.headers["Content-Type"] == "image/png", picture.headers
+    assert picture.content.startswith(b"\x89PNG\r\n\x1a\n"), picture.content[:8]
+    table = given(str, get_study_figure.sync(study, f"{FIGURE}.csv", client=client))
+    archive = given(File, get_study_archive.sync(study, client=administrator)).payload.read()
+    assert archive.startswith(ARCHIVE), archive[:16]
+    print(
+        f"python: recommends trial {best.number}, {len(picture.content)} bytes of a picture, "
+        f"{len(table.splitlines())} lines of a table, {len(archive)} bytes of an archive"
+    )
+
+
+def with_a_job(client: Client, subject: UUID) -> None:
+    """Gait RMSE answers the comparisons; a certificate is made on request."""
+    new = NewStudy(subject_id=subject, trial_budget=BUDGET)
+    study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new)).id
+    wait_until(client, study, StudyState.FINISHED)
+    followed = 0
+    for trial in trials_of(client, study):
+        if trial.state != TrialState.CONVERGED:
+            continue
+        asked = request_certificate.sync_detailed(trial.id, client=client)
+        if asked.status_code == HTTPStatus.OK:
+            given(Certificate, asked.parsed)
+            continue
+        assert asked.status_code == HTTPStatus.ACCEPTED, asked
+        job = given(Job, asked.parsed)
+        assert asked.headers["Location"] == f"/api/v1/jobs/{job.id}", asked.headers
+        begun = time.monotonic()
+        while job.state in (JobState.QUEUED, JobState.RUNNING):
+            assert time.monotonic() < begun + SECONDS, job
+            time.sleep(0.05)
+            job = given(Job, get_job.sync(job.id, client=client))
+        assert job.state == JobState.DONE, job
+        assert job.result == f"/api/v1/trials/{trial.id}/certificate", job
+        given(Certificate, get_certificate.sync(trial.id, client=client))
+        followed += 1
+    assert followed > 0, "every gait had a certificate"
+    print(f"python: followed {followed} jobs")
+
+
+def main() -> None:
+    # The service runs without sign-in: whoever sends no token may do everything. Scripts send one.
+    administrator = Client(base_url=sys.argv[1], token="none", auth_header_name="X-Without-Sign-In")
+    scopes = [NewTokenScopesItem.READ, NewTokenScopesItem.RUN, NewTokenScopesItem.ANSWER]
+    reply = create_token.sync_detailed(client=administrator, body=NewToken(name="python", scopes=scopes))
+    client = Client(base_url=sys.argv[1], token=created(MadeToken, "tokens", reply).secret)
+    new = NewSubject(pseudonym="python", height_m=1.75, body_mass_kg=70)
+    subject = created(Subject, "subjects", create_subject.sync_detailed(client=client, body=new))
+    assert given(Subject, get_subject.sync(subject.id, client=client)) == subject
+    by_script(client, subject.id)
+    by_a_person(administrator, client, subject.id)
+    with_a_job(client, subject.id)
 
 
 if __name__ == "__main__":
