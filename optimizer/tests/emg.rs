@@ -220,7 +220,7 @@ fn table_without_time_needs_a_rate_and_foot_switch_gives_heel_strikes() {
         "rate_hz is 1; it must be 100 to 20000.",
         "column \"TA\" is missing; the columns are EMG 1, switch",
         "rises 0 times above 0.9",
-        "heel strike (s) is 9;",
+        "heel_strikes_s is 9;",
     ]) {
         assert!(refusal.contains(expected), "{refusal}");
     }

@@ -313,7 +313,7 @@ fn malformed_emg_files_are_rejected_with_place_and_reason() {
         "emg.csv, line 1: the file has a time column, \"time_s\"; rate_hz is for files without one.",
         "emg.csv: column \"toe\" is missing; the columns are TA_L, BF_L, heel.",
         "emg.csv: column \"heel\" rises 0 times above 2; a stride needs two heel strikes.",
-        "heel strike (s) is 9; it must be 0 to 0.999.",
+        "heel_strikes_s is 9; it must be 0 to 0.999.",
         "emg.csv: the heel strikes must increase.",
         "rate_hz is 5; it must be 100 to 20000.",
     ];

@@ -361,7 +361,7 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
     assert!(refused(vec![0.5]).contains("1 right heel strikes found; a stride needs two"));
     assert!(refused(vec![0.5, 0.9]).contains("none of the 1 strides lasts 0.8 to 1.6 s"));
     assert!(refused(vec![1.5, 0.5]).contains("must increase"));
-    assert!(refused(vec![0.5, 9.0]).contains("heel strike (s) is 9; it must be"));
+    assert!(refused(vec![0.5, 9.0]).contains("heel_strikes_s is 9; it must be"));
     // Forces that end before the first stride.
     let force = VerticalForce { time_s: vec![0.0, 0.1, 0.2], force_n: vec![0.0; 3] };
     let early = MotionRecording { right_force: Some(force), ..recording.clone() };

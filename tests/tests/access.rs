@@ -72,7 +72,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 71] = [
+const PAGES: [(&str, Option<Right>); 72] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -117,6 +117,7 @@ const PAGES: [(&str, Option<Right>); 71] = [
     ("get /lab-sessions/{id}", Some(Right::Read)),
     ("post /lab-sessions/{id}/close", Some(Right::Run)),
     ("post /lab-sessions/{id}/unblind", Some(Right::Administer)),
+    ("post /trials/{id}/safety-report", Some(Right::Answer)),
     ("post /lab-sessions/{id}/measurement-files/emg", Some(Right::Run)),
     ("post /lab-sessions/{id}/measurement-files/motion", Some(Right::Run)),
     ("post /lab-sessions/{id}/process", Some(Right::Run)),

@@ -89,6 +89,9 @@ fn door_of(operation: &str) -> Option<Door> {
         "post /api/v1/studies/{id}/suggestions" => {
             Door::None("says which bounds would have been better than a trial: nobody is asked to walk with that one")
         }
+        "post /api/v1/trials/{id}/safety-reports" | "post /trials/{id}/safety-report" => {
+            Door::None("closes a gait; `safety_review.rs` holds its rules")
+        }
         "post /api/v1/trials/{id}/safety-reviews" | "post /trials/{id}/safety-review" => {
             Door::None("decides about a report; `safety_review.rs` holds its rules")
         }

@@ -75,7 +75,7 @@ async fn incomplete_archive_imports_nothing_and_names_the_place() {
         (json!({"recording": text.replace("hip_R_rad", "hip_rad")}), "hip_R_rad"),
         (json!({"form": "opensim"}), "endheader"),
         (json!({"strikes": "force"}), "the recording has no force under the right foot"),
-        (json!({"heel_strikes_s": [0.5, 99.0]}), "heel strike (s) is 99;"),
+        (json!({"heel_strikes_s": [0.5, 99.0]}), "heel_strikes_s is 99;"),
         (json!({"height_m": 17.2}), "height_m is 17.2; it must be 1.4 to 2.2."),
         (json!({"recording": format!("# {}\n{text}", "x".repeat(30_000))}), "at most 20000 bytes of comments"),
         (json!({"name": " "}), "1 to 200 printable characters"),

@@ -69,7 +69,7 @@ fn loaded(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<Range<usize>> {
 /// Checks given heel strikes: at least two, increasing, and within the recording.
 pub(crate) fn given(what: &str, times: &[f64], first: f64, last: f64) -> Result<(), ModelError> {
     for &time in times {
-        ModelError::check_range("heel strike (s)", time, first, last)?;
+        ModelError::check_range("heel_strikes_s", time, first, last)?;
     }
     if times.windows(2).any(|pair| pair[1] <= pair[0]) {
         let reason = "the heel strikes must increase".to_owned();

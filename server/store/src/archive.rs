@@ -10,7 +10,7 @@ use tokio::sync::mpsc::Sender;
 
 /// Tables in the order in which their rows can be written, with the condition for rows of a study. Certificates and
 /// explanations are not included: the importing service computes them again.
-const TABLES: [(&str, &str); 29] = [
+const TABLES: [(&str, &str); 30] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -30,6 +30,7 @@ const TABLES: [(&str, &str); 29] = [
     ("unblindings", "study_id = ? order by seq"),
     ("remarks", "study_id = ? order by id"),
     ("remark_retractions", "remark_id in (select id from remarks where study_id = ?)"),
+    ("safety_reports", "trial_id in (select id from trials where study_id = ?) order by rowid"),
     ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by id"),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_allocations", archived_allocations::LAB),

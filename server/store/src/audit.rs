@@ -129,6 +129,11 @@ pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limi
     rows.iter().map(from_row).collect()
 }
 
+/// Time of the newest row.
+pub(super) async fn newest(db: &mut Connection) -> StoreResult<Option<Instant>> {
+    Ok(sqlx::query_scalar("select at from audit order by seq desc limit 1").fetch_optional(db).await?)
+}
+
 /// The rows of an object, oldest first.
 ///
 /// # Errors

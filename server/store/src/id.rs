@@ -80,6 +80,7 @@ identifier!(MemberId, "membership in a study");
 identifier!(SessionId, "session of a user");
 identifier!(PresentationId, "presentation");
 identifier!(AssessmentId, "assessment");
+identifier!(SafetyReportId, "safety report");
 identifier!(SafetyReviewId, "safety review");
 identifier!(LabSessionId, "lab session");
 identifier!(MeasurementFileId, "measurement file of a lab session");

@@ -51,6 +51,7 @@ pub mod restore;
 pub mod results;
 pub mod rights;
 pub mod row;
+pub mod safety_reports;
 pub mod safety_reviews;
 pub mod schema;
 mod schema_versions;
@@ -72,13 +73,14 @@ mod writing;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
     AssessmentId, BackupId, DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabSessionId, MeasurementFileId,
-    MemberId, PresentationId, ReferenceGaitId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    MemberId, PresentationId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId,
+    TrialId, UserId,
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use packed::{Packed, PackedText};
 pub use schema_versions::FORM;
 pub use space::DEFAULT_RESERVE_BYTES;
-pub use time::{Instant, now};
+pub use time::{Instant, now, set_machine_clock};
 pub use writing::Writer;
 
 use anchor::Anchors;
@@ -201,6 +203,9 @@ impl Store {
             }
         }
         migrations::apply(&only, path).await?;
+        if let Some(newest) = audit::newest(&mut *only.acquire().await?).await? {
+            time::never_before(newest);
+        }
         let mut connection = only.acquire().await?.detach();
         seals::watch(&mut connection).await?;
         // The log is merged into the file only after it was verified, not in the middle of a commit.

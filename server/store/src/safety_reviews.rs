@@ -126,34 +126,40 @@ fn from_row(row: &SqliteRow) -> StoreResult<SafetyReview> {
     })
 }
 
-/// The numbers of assessments, answers, retractions, unblindings and reviews of a study. These tables are append-only,
-/// so equal versions mean that no safety report or review came in between.
+/// The numbers of reports, assessments, answers, retractions, unblindings and reviews of all studies of a subject. These
+/// tables are append-only, so equal versions mean that no safety report or review came in between.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SafetyVersion([i64; 8]);
+pub struct SafetyVersion([i64; 9]);
 
-/// The current version.
+/// The current version for a study.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyVersion> {
     let row = sqlx::query(
-        "select (select count(*) from presentation_answers a join presentations p on p.id = a.presentation_id
-                 where p.study_id = ?1),
+        "with own as (select id from studies where subject_id = (select subject_id from studies where id = ?1))
+         select (select count(*) from presentation_answers a join presentations p on p.id = a.presentation_id
+                 where p.study_id in own),
                 (select count(*) from presentation_retractions r join presentations p on p.id = r.presentation_id
-                 where p.study_id = ?1),
-                (select count(*) from remarks where study_id = ?1),
-                (select count(*) from remark_retractions r join remarks m on m.id = r.remark_id where m.study_id = ?1),
-                (select count(*) from lab_answers a join lab_sessions s on s.id = a.session_id where s.study_id = ?1),
+                 where p.study_id in own),
+                (select count(*) from remarks where study_id in own),
+                (select count(*) from remark_retractions r join remarks m on m.id = r.remark_id
+                 where m.study_id in own),
+                (select count(*) from lab_answers a join lab_sessions s on s.id = a.session_id
+                 where s.study_id in own),
                 (select count(*) from lab_answer_retractions r join lab_sessions s on s.id = r.session_id
-                 where s.study_id = ?1),
+                 where s.study_id in own),
                 (select count(*) from lab_acts a join lab_sessions s on s.id = a.session_id
-                 where s.study_id = ?1 and a.act = 'unblinded'),
-                (select count(*) from safety_reviews r cross join trials t on t.id = r.trial_id where t.study_id = ?1)",
+                 where s.study_id in own and a.act = 'unblinded'),
+                (select count(*) from safety_reviews r cross join trials t on t.id = r.trial_id
+                 where t.study_id in own),
+                (select count(*) from safety_reports r cross join trials t on t.id = r.trial_id
+                 where t.study_id in own)",
     )
     .bind(study)
     .fetch_one(db)
     .await?;
-    let mut counts = [0; 8];
+    let mut counts = [0; 9];
     for (place, count) in counts.iter_mut().enumerate() {
         *count = row.try_get(place)?;
     }

@@ -16,6 +16,7 @@ const FILES: &[(i64, &str, &str)] = &[
     (6, "allocations", include_str!("../../../migrations/0006_allocations.sql")),
     (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
     (8, "role changes", include_str!("../../../migrations/0008_role_changes.sql")),
+    (9, "safety reports", include_str!("../../../migrations/0009_safety_reports.sql")),
 ];
 
 /// Newest schema version.

@@ -56,6 +56,7 @@ pub const TABLES: &[Sealed] = &[
     sealed("unblindings", &["seq"]),
     sealed("remarks", &["id"]),
     sealed("remark_retractions", &["remark_id"]),
+    sealed("safety_reports", &["id"]),
     sealed("safety_reviews", &["id"]),
     sealed("lab_sessions", &["id"]),
     sealed("lab_allocations", &["session_id"]),

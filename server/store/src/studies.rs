@@ -364,6 +364,19 @@ pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -
     query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 
+/// SQL for the studies with a safety report.
+macro_rules! reported {
+    () => {
+        "select t.study_id from safety_reports r join trials t on t.id = r.trial_id \
+         union select m.study_id from remarks m where m.answer glob 'unsafe*' \
+         and m.id not in (select remark_id from remark_retractions) \
+         union select p.study_id from presentations p join presentation_answers a on a.presentation_id = p.id \
+         where a.answer glob 'unsafe*' \
+         union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
+         where a.answer glob 'unsafe*'"
+    };
+}
+
 /// The newest accessible studies with a safety report that was not retracted, without those of subjects who withdrew
 /// consent.
 ///
@@ -374,13 +387,9 @@ pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) 
     let rows = sqlx::query(concat!(
         "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and ",
         reached!("s.id"),
-        " and s.id in (\
-         select m.study_id from remarks m where m.answer glob 'unsafe*' \
-         and m.id not in (select remark_id from remark_retractions) \
-         union select p.study_id from presentations p join presentation_answers a on a.presentation_id = p.id \
-         where a.answer glob 'unsafe*' \
-         union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
-         where a.answer glob 'unsafe*') order by s.id desc limit ?4",
+        " and s.id in (",
+        reported!(),
+        ") order by s.id desc limit ?4",
     ))
     .bind(every)
     .bind(open)
@@ -389,6 +398,20 @@ pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) 
     .fetch_all(db)
     .await?;
     rows.iter().map(from_row).collect()
+}
+
+/// The other studies of a study's subject that have a safety report.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn others_with_safety_reports(db: &mut Connection, study: StudyId) -> StoreResult<Vec<StudyId>> {
+    let sql = concat!(
+        "select s.id from studies s where s.subject_id = (select subject_id from studies where id = ?1) and s.id <> ?1 \
+         and s.id in (",
+        reported!(),
+        ") order by s.id"
+    );
+    Ok(sqlx::query_scalar(sql).bind(study).fetch_all(db).await?)
 }
 
 /// The newest accessible studies of a subject.

@@ -6,7 +6,9 @@ use sqlx::error::BoxDynError;
 use sqlx::{Decode, Encode, Sqlite, Type};
 use std::fmt;
 use std::str::FromStr;
-use std::time::Duration;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant as Steady};
 use utoipa::ToSchema;
 
 /// An instant of the record.
@@ -15,9 +17,47 @@ use utoipa::ToSchema;
 #[serde(try_from = "String", into = "String")]
 pub struct Instant(jiff::Timestamp);
 
-/// The current time of the server, for all rows.
+/// The clock of this process, in milliseconds.
+struct Course {
+    /// An instant, and the steady time at which it was current.
+    anchor: (i64, Steady),
+    /// The latest instant that was given.
+    latest: i64,
+}
+
+static COURSE: Mutex<Option<Course>> = Mutex::new(None);
+/// What [`set_machine_clock`] adds to the clock of the machine, in milliseconds.
+static SET_BY_MS: AtomicI64 = AtomicI64::new(0);
+
+/// The current time of the server, for all rows. Later than every earlier instant of this process, and than those in
+/// the record that it opened, so that the order of times is the order of recording even if the machine's clock is set
+/// back. Time passes all the same.
 pub fn now() -> Instant {
-    Instant(jiff::Timestamp::now())
+    let machine = jiff::Timestamp::now().as_millisecond().saturating_add(SET_BY_MS.load(Ordering::Relaxed));
+    let mut course = COURSE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Course { anchor: (start, since), latest } =
+        course.get_or_insert_with(|| Course { anchor: (machine, Steady::now()), latest: machine.saturating_sub(1) });
+    let passed = start.saturating_add(i64::try_from(since.elapsed().as_millis()).unwrap_or(i64::MAX));
+    if machine > passed {
+        (*start, *since) = (machine, Steady::now());
+    }
+    *latest = machine.max(passed).max(latest.saturating_add(1));
+    Instant(jiff::Timestamp::from_millisecond(*latest).unwrap_or(jiff::Timestamp::MAX))
+}
+
+/// Makes every later [`now`] later than an instant.
+pub(crate) fn never_before(instant: Instant) {
+    let least = now().max(instant).0.as_millisecond();
+    let mut course = COURSE.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(course) = course.as_mut().filter(|course| course.latest < least) {
+        (course.anchor, course.latest) = ((least, Steady::now()), least);
+    }
+}
+
+/// Sets the clock of the machine ahead or back for this process, as tests of a wrong clock do.
+#[doc(hidden)]
+pub fn set_machine_clock(by_seconds: i64) {
+    SET_BY_MS.store(by_seconds.saturating_mul(1000), Ordering::Relaxed);
 }
 
 impl Instant {

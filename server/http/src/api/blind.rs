@@ -107,7 +107,7 @@ pub(super) async fn motion(
     Path((token, side)): Path<(String, Side)>,
 ) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
-    let shown = blind::own(&mut reader, &authorized.caller, &token).await?;
+    let shown = blind::own_to_show(&mut reader, &authorized.caller, &token).await?;
     let (first, second) = shown.shown();
     let trial = match side {
         Side::First => first,

@@ -111,6 +111,8 @@ pub(super) async fn controller(
     let number = gait.number();
     let write = move |pool: &OnPool| gait.controller_file(&trajectory.unpack(pool)?, sampling.rate_hz);
     let text = app.compute(write).await??;
+    // A report may have been acknowledged while the file was written.
+    walkable::admit(&mut *app.read().await?, id).await??;
     Ok(file("application/json", &format!("device-trial-{number}.json"), text))
 }
 

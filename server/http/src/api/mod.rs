@@ -142,6 +142,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(assessments::get))
         .routes(routes!(assessments::retract))
         .routes(routes!(safety_reports::of_study))
+        .routes(routes!(safety_reports::report))
         .routes(routes!(safety_reports::review))
         // access
         .routes(routes!(users::me))

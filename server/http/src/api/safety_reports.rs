@@ -11,10 +11,12 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::safety_report::{self, Report};
 use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
 use gaitwright_service::studies::safety_review::{self, Decision};
 use gaitwright_store::safety_reviews::{SafetyReview, SafetyVerdict};
-use gaitwright_store::{Instant, StudyId, TrialId, studies};
+use gaitwright_store::{Instant, StudyId, TrialId, studies, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -43,7 +45,7 @@ impl From<Closed> for SafetyReport {
 
 /// List safety reports of a study
 ///
-/// From raters, assessments and lab sessions. Includes reports about gaits that were cleared for walking, but not
+/// From raters, assessments, lab sessions and reports about one gait. Includes reports about gaits that were cleared for walking, but not
 /// retracted reports. A report from a blinded lab session is listed for both of its gaits.
 #[utoipa::path(
     get,
@@ -67,6 +69,38 @@ pub(super) async fn of_study(
     let at = |report: &SafetyReport| (report.at, report.trial_id, report.by.clone());
     all.sort_by_key(at);
     Ok(Json(paging.cut(all, at)?))
+}
+
+/// Report a gait as unsafe
+///
+/// The gait, and every trial of the subject with the same motion, is not recommended, compared or walked until staff
+/// have reviewed the report. The learner hears nothing of it.
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/safety-reports",
+    operation_id = "create_safety_report",
+    tag = "preferences",
+    params(("id" = TrialId, Path, description = "The trial")),
+    request_body = Report,
+    responses((status = 201, description = "Report", body = SafetyReport)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn report(
+    State(app): State<AppState>,
+    Id(id, _): Id<TrialId, access::Answer>,
+    IdempotentWith(request, report): IdempotentWith<access::Answer, Report>,
+) -> Result<Response, Refusal> {
+    let mut writer = match request.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    safety_report::give(&mut writer, &request.caller, id, &report).await?;
+    let study = trials::get(&mut writer, id).await?.study_id;
+    let reports = SafetyReports::read(&mut writer, study).await?.closing(id);
+    let newest = reports.into_iter().max_by_key(|report| report.at);
+    let newest = newest.ok_or_else(|| Error::Internal("a safety report did not take effect".to_owned()))?;
+    let location = format!("/api/v1/studies/{study}/safety-reports");
+    request.created(&app, writer, location, &SafetyReport::from(newest)).await
 }
 
 /// Review the safety reports of a gait

@@ -51,6 +51,8 @@ struct GaitPage {
     phases: [(&'static str, &'static str); 4],
     /// Safety reports in force.
     unsafe_by: Vec<Closed>,
+    /// Why the gait must not be walked, if the report is about another trial with the same motion.
+    unsafe_elsewhere: Option<String>,
     /// Safety reports after which staff cleared the gait.
     lifted: Vec<Closed>,
     /// The name of a user who may review the reports.
@@ -83,7 +85,12 @@ pub(super) async fn get(
         Some(gait) => Some((gait, gaits::iterations(&mut reader, id).await?)),
         None => None,
     };
-    let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = SafetyReports::read(&mut reader, study.id).await?;
+    let reports = SafetyReports::read(&mut reader, study.id).await?;
+    let elsewhere = reports.standing(&trial).and_then(|closed| closed.other_trial(&trial));
+    let unsafe_elsewhere = elsewhere.map(|other| {
+        format!("This gait is also that of {other}, where it was reported as unsafe. Do not walk with it.")
+    });
+    let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = reports;
     for said in [&mut unsafe_by, &mut lifted] {
         said.retain(|closed| closed.trial == id);
     }
@@ -123,6 +130,7 @@ pub(super) async fn get(
         tiles: drawn.tiles,
         phases: gait_charts::PHASES,
         unsafe_by,
+        unsafe_elsewhere,
         lifted,
         reviewer,
         trial,

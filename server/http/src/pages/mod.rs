@@ -71,6 +71,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/trials/{id}/explain", post(explanation::post))
+        .route("/trials/{id}/safety-report", post(safety_review::report))
         .route("/trials/{id}/safety-review", post(safety_review::post))
         .route("/reference-gaits", get(reference_gaits::list).post(reference_gaits::import).layer(recordings()))
         .route("/reference-gaits/{id}", get(reference_gaits::get))

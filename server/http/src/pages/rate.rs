@@ -197,6 +197,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
         let saved = read_back(&mut reader, shown).await?;
         return page(&PairPage { token, number, not_blind, saved, refused, strides: None });
     }
+    blind::own_to_show(&mut reader, caller, &token).await?;
     let mut pair = Vec::new();
     let (first, second) = shown.shown();
     for trial in [first, second] {

@@ -103,6 +103,9 @@ pub async fn retract(
         return Err(Error::NotFound { what: "assessment".to_owned(), id: id.to_string() });
     }
     consents::may_be_shown(writer, assessment.study_id).await?;
+    if assessment.answer.is_about_safety() {
+        return Err(Error::conflict("A safety report cannot be retracted. Staff review it, and can clear the gait."));
+    }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", reason, " that say why the assessment is retracted")?;
     if !assessments::retract(writer, id, author, reason).await? {

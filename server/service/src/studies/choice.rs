@@ -70,7 +70,7 @@ pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option
 /// # Errors
 /// As [`best_converged`].
 pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial.id))
+    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial))
 }
 
 /// Converged trials by decreasing posterior mean; ties by number.
@@ -108,7 +108,7 @@ pub fn ranking_to_show(
 /// The trial that was best at the newest proposal, if its gait has no open safety report. Needs only the newest trials.
 pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
     let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
-    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.closes(best.id)).then_some(best.id)
+    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.closes(best)).then_some(best.id)
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

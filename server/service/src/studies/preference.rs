@@ -1,7 +1,8 @@
 //! The only writer of the learner's log: every answer of pages, REST, raters, lab sessions, suggestions and Gait RMSE
 //! ends here. A test fails if another module writes the table.
 
-use super::walkable::{self, Grounds, NotWalkable, WalkablePair, is_same_gait, trial_of_study};
+use super::motion::is_same_gait;
+use super::walkable::{self, Grounds, NotWalkable, WalkablePair, trial_of_study};
 use crate::error::Error;
 use crate::printable;
 use gait_learner::ActionIndex;
@@ -79,7 +80,7 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
-    let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.closes(trial.id));
+    let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.closes(trial));
     let heard = said.heard(pair).filter(|_| both_open && !is_same_gait(&first, &second));
     match heard {
         Some(said) => Ok(Some(feedback::append(writer, study, &said, attribution).await?)),

@@ -1,10 +1,12 @@
 //! Collects the safety reports and the "cannot tell" answers of a study from all places where people give them.
 
+use super::motion::Motion;
 use crate::access::Reach;
-use crate::error::Error;
 use gaitwright_store::presentations::Judgement;
+use gaitwright_store::safety_reports as reports;
 use gaitwright_store::safety_reviews::{self, SafetyReview, SafetyVerdict};
 use gaitwright_store::studies::{self, Study};
+use gaitwright_store::trials::{self, Trial};
 use gaitwright_store::{
     AssessmentId, Connection, Instant, PresentationId, StoreResult, StudyId, TrialId, assessments, lab_sessions,
     presentations,
@@ -33,6 +35,8 @@ pub enum SafetyReportSource {
     Rater(PresentationId),
     /// In an assessment.
     Staff(AssessmentId),
+    /// In a report about this gait alone.
+    Alone,
     /// The subject, in a lab session that is not unblinded.
     Subject,
 }
@@ -53,11 +57,43 @@ pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreRe
     Ok(found)
 }
 
+/// An open report with the motion that it is about, which other trials of the subject can have, too.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClosedMotion {
+    /// The report.
+    pub report: Closed,
+    /// The study of the report.
+    study: StudyId,
+    /// Number of the trial of the report.
+    number: u32,
+    motion: Option<Motion>,
+}
+
+impl ClosedMotion {
+    /// Whether the report is about this motion.
+    fn has(&self, motion: &Motion) -> bool {
+        self.motion.as_ref().is_some_and(|own| own.is_same(motion))
+    }
+
+    /// The trial of the report, as shown to people, if it is not the given one.
+    pub fn other_trial(&self, trial: &Trial) -> Option<String> {
+        if self.report.trial == trial.id {
+            None
+        } else if self.study == trial.study_id {
+            Some(format!("trial {}", self.number))
+        } else {
+            Some(format!("trial {} of another study of this subject", self.number))
+        }
+    }
+}
+
 /// The safety reports of a study, and the pairs that are not compared again.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SafetyReports {
     /// Open reports: their gaits must not be walked.
     pub closed: Vec<Closed>,
+    /// Open reports of every study of the subject, with their motions.
+    motions: Vec<ClosedMotion>,
     /// Reports after which staff decided that the gait may be walked again.
     pub lifted: Vec<Closed>,
     /// Pairs of which somebody could not tell which gait is better.
@@ -65,11 +101,31 @@ pub struct SafetyReports {
 }
 
 impl SafetyReports {
-    /// Reads the reports of a study that were not retracted.
+    /// Reads the reports of a study that were not retracted, and the motions that reports in any study of its subject are
+    /// about.
     ///
     /// # Errors
     /// Errors of the database.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
+        let mut found = Self::given_in(db, study).await?;
+        found.add_motions(db, study, found.closed.clone()).await?;
+        for other in studies::others_with_safety_reports(db, study).await? {
+            let elsewhere = Self::given_in(db, other).await?.closed;
+            found.add_motions(db, other, elsewhere).await?;
+        }
+        Ok(found)
+    }
+
+    async fn add_motions(&mut self, db: &mut Connection, study: StudyId, closed: Vec<Closed>) -> StoreResult<()> {
+        for report in closed {
+            let trial = trials::get(db, report.trial).await?;
+            self.motions.push(ClosedMotion { report, study, number: trial.number, motion: Motion::of(&trial) });
+        }
+        Ok(())
+    }
+
+    /// The reports of one study.
+    async fn given_in(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::default();
         for shown in presentations::assessments_of_study(db, study).await? {
             if let Some((said, at)) = shown.answer.zip(shown.answered_at) {
@@ -95,6 +151,10 @@ impl SafetyReports {
                 said,
                 review: None,
             });
+        }
+        for report in reports::of_study(db, study).await? {
+            let (trial, by, at) = (report.trial_id, report.author, report.created_at);
+            found.closed.push(Closed { trial, by, at, said: SafetyReportSource::Alone, review: None });
         }
         for session in lab_sessions::of_study(db, study).await? {
             if session.done(lab_sessions::Act::Unblinded).is_some() {
@@ -132,33 +192,26 @@ impl SafetyReports {
     }
 
     /// The open reports about the gait of this trial.
-    pub fn closing(mut self, trial: TrialId) -> Vec<Closed> {
-        self.closed.retain(|closed| closed.trial == trial);
-        self.closed
+    pub fn closing(&self, trial: TrialId) -> Vec<Closed> {
+        self.closed.iter().filter(|closed| closed.trial == trial).cloned().collect()
+    }
+
+    /// An open report about the gait of this trial, which may have been given for another trial of the subject.
+    pub fn standing(&self, trial: &Trial) -> Option<&ClosedMotion> {
+        if self.motions.is_empty() {
+            return None;
+        }
+        let own = self.motions.iter().find(|closed| closed.report.trial == trial.id);
+        own.or_else(|| Motion::of(trial).and_then(|motion| self.motions.iter().find(|closed| closed.has(&motion))))
     }
 
     /// Whether the gait of this trial has an open report.
-    pub fn closes(&self, trial: TrialId) -> bool {
-        self.closed.iter().any(|closed| closed.trial == trial)
+    pub fn closes(&self, trial: &Trial) -> bool {
+        self.standing(trial).is_some()
     }
 
     /// Whether somebody could not tell which of the two gaits is better.
     pub fn is_skipped(&self, (a, b): (TrialId, TrialId)) -> bool {
         self.skipped.iter().any(|pair| *pair == (a, b) || *pair == (b, a))
-    }
-
-    /// Refuses a gait with an open report; `field` names its trial.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`].
-    pub fn refuse(&self, field: &str, trial: TrialId) -> Result<(), Error> {
-        match self.closed.iter().find(|closed| closed.trial == trial) {
-            None => Ok(()),
-            Some(closed) => {
-                let allowed =
-                    format!("a gait without an open safety report. This gait was reported as unsafe by {}", closed.by);
-                Err(Error::invalid(field, trial.to_string(), &allowed))
-            }
-        }
     }
 }

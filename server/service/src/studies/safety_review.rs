@@ -49,11 +49,19 @@ pub async fn give(
     consents::may_be_shown(writer, trial.study_id).await?;
     let author = printable::name("author", decision.author.as_deref().unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", &decision.reason, " that give the reason for the decision")?;
-    let closed = SafetyReports::read(writer, trial.study_id).await?.closing(id);
+    let reports = SafetyReports::read(writer, trial.study_id).await?;
+    let closed = reports.closing(id);
     let number = trial.number;
     let newest = closed.iter().max_by_key(|closed| closed.at);
-    let newest =
-        newest.ok_or_else(|| Error::conflict(format!("The gait of trial {number} has no open safety report.")))?;
+    let Some(newest) = newest else {
+        let elsewhere = reports.standing(&trial).and_then(|closed| closed.other_trial(&trial));
+        return Err(Error::conflict(match elsewhere {
+            Some(other) => {
+                format!("The gait of trial {number} was reported as unsafe in {other}. Review the report there.")
+            }
+            None => format!("The gait of trial {number} has no open safety report."),
+        }));
+    };
     if decision.said_until.is_some_and(|seen| newest.at > seen) {
         let again = format!(
             "The gait of trial {number} was reported as unsafe again, by {}. Read that report first.",
@@ -96,7 +104,7 @@ async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<
     match said {
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
-        // The learner receives it only at unblinding.
-        SafetyReportSource::Subject => Ok(None),
+        // The learner receives what a subject says only at unblinding, and nothing of a report about one gait.
+        SafetyReportSource::Subject | SafetyReportSource::Alone => Ok(None),
     }
 }

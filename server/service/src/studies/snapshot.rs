@@ -137,8 +137,7 @@ impl StudySnapshot {
     /// Actions whose gaits Gait RMSE compares: converged, without an open safety report. Nobody walks because of such a
     /// comparison, so it needs no certificate.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
-        let shown =
-            |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.closes(trial.id);
+        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.closes(trial);
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 

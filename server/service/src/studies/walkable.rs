@@ -3,10 +3,11 @@
 //! [`WalkableGait`] has private fields and one constructor, [`admit`]. Every controller file, walk, lab session,
 //! comparison and recommendation takes one, so code that skips the rules does not compile.
 
+use super::motion::is_same_gait;
 use super::safety_reports::SafetyReports;
 use crate::error::Error;
+use gait_optimizer::Gait;
 use gait_optimizer::export::ControllerFile;
-use gait_optimizer::{Gait, SolveReport};
 use gaitwright_store::certificates::{self, CertificateOnRecord};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, Packed, StoreError, StoreResult, StudyId, TrialId, consents, gaits, trials};
@@ -103,6 +104,19 @@ pub enum NotWalkable {
         /// Who reported it.
         by: String,
     },
+    /// Another trial of the subject has the same gait, which has an open safety report.
+    #[error(
+        "The gait of trial {number} is also that of {other}, where it was reported as unsafe by {by}. It must not be walked \
+         until staff have cleared it there."
+    )]
+    SameGaitReportedUnsafe {
+        /// Number of the trial.
+        number: u32,
+        /// The other trial, as shown to people.
+        other: String,
+        /// Who reported it.
+        by: String,
+    },
     /// The gait has no certificate yet.
     #[error(
         "The gait of trial {number} has no certificate yet. If it is not being certified, request a certificate with POST \
@@ -136,7 +150,7 @@ impl From<NotWalkable> for Error {
 }
 
 /// The facts that decide which gaits of a study are walkable: safety reports, certificates and consent.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Grounds {
     /// Safety reports and their reviews.
     pub safety_reports: SafetyReports,
@@ -188,8 +202,11 @@ impl Grounds {
         if trial.state != TrialState::Converged {
             return Err(NotWalkable::NotConverged { number, state: trial.state.as_str() });
         }
-        if let Some(closed) = self.safety_reports.closed.iter().find(|closed| closed.trial == trial.id) {
-            return Err(NotWalkable::ReportedUnsafe { number, by: closed.by.clone() });
+        if let Some(closed) = self.safety_reports.standing(trial) {
+            return Err(match closed.other_trial(trial) {
+                None => NotWalkable::ReportedUnsafe { number, by: closed.report.by.clone() },
+                Some(other) => NotWalkable::SameGaitReportedUnsafe { number, other, by: closed.report.by.clone() },
+            });
         }
         let certified = match self.certificates.get(&trial.id) {
             _ if trial.asked_by.is_some() => Certified::ByLab,
@@ -279,16 +296,4 @@ pub async fn trial_of_study(db: &mut Connection, study: StudyId, field: &str, id
         Ok(_) | Err(StoreError::Missing { .. }) => Err(Error::invalid(field, id.to_string(), "a trial of this study")),
         Err(other) => Err(other.into()),
     }
-}
-
-/// Whether two trials gave the same motion, as when they differ only in a bound that is not active. Different motions
-/// do not agree in so many figures to the last bit.
-pub fn is_same_gait(one: &Trial, other: &Trial) -> bool {
-    let figures = |report: &SolveReport| {
-        let single = [report.objective, report.cost_of_transport, report.stride_length_m];
-        let all = single.iter().chain(&report.gait_rmse_parts_rad).chain(&report.durations_s).chain(&report.vhip_m_s);
-        all.map(|figure| figure.to_bits()).collect::<Vec<_>>()
-    };
-    one.id == other.id
-        || one.report.as_ref().zip(other.report.as_ref()).is_some_and(|(one, other)| figures(one) == figures(other))
 }

@@ -13,4 +13,4 @@ pub use draw::{Drawn, draw};
 pub use figures::{RaterFigures, Share, figures};
 pub use knowledge::{could_have_known, sees_or_saw_gaits};
 pub use rater::{Answered, RaterAnswer, UnblindedPair, answer, next, retract, unblind};
-pub use rater::{can_be_retracted, own};
+pub use rater::{can_be_retracted, own, own_to_show};

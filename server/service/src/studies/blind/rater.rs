@@ -18,10 +18,11 @@ use gaitwright_store::presentations::{self, Judgement, Kind, NewAnswer, NewPrese
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{
     Connection, Instant, LentWriter, PresentationId, Store, StudyId, TrialId, Writer, consents, events, members,
-    studies,
+    studies, trials,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use std::collections::BTreeSet;
 use utoipa::ToSchema;
 
 /// Answer of a rater.
@@ -78,9 +79,9 @@ pub async fn next<'a>(
     let question = question(store, study).await?;
     let mut writer = store.write().await?;
     let safety_reports = SafetyReports::read(&mut writer, study).await?;
-    let closed: Vec<TrialId> = safety_reports.closed.iter().map(|closed| closed.trial).collect();
     let mut own = presentations::of_study(&mut writer, study).await?;
     own.retain(|shown| shown.rater == caller.name);
+    let closed = closed_among(&mut writer, &safety_reports, own.iter().map(Presentation::pair)).await?;
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
         // An imported study does not have the sides of pairs that were still blinded.
         if walkable::are_walkable(&mut writer, open.pair()).await?
@@ -92,10 +93,10 @@ pub async fn next<'a>(
         }
         withdraw(&mut writer, open).await?;
     }
-    let is_closed = |pair: &(TrialId, TrialId)| {
-        closed.contains(&pair.0) || closed.contains(&pair.1) || safety_reports.is_skipped(*pair)
-    };
-    let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
+    let Some(pair) = question.filter(|pair| !safety_reports.is_skipped(*pair)) else { return Ok((writer, None)) };
+    if !walkable::are_walkable(&mut writer, pair).await? {
+        return Ok((writer, None));
+    }
     let lot = Lot::draw()?;
     let drawn = draw(lot.number(), pair, &own, &closed);
     let token = secret::fresh()?;
@@ -114,6 +115,21 @@ pub async fn next<'a>(
     let shown = own_pair(&mut writer, caller, &token).await?;
     note(&mut writer, caller, &shown.presentation, "presentation.draw").await?;
     Ok((writer, Some(shown)))
+}
+
+/// The trials of pairs whose gaits have an open safety report.
+async fn closed_among(
+    db: &mut Connection,
+    safety_reports: &SafetyReports,
+    pairs: impl Iterator<Item = (TrialId, TrialId)>,
+) -> Result<Vec<TrialId>, Error> {
+    let mut closed = Vec::new();
+    for trial in pairs.flat_map(|(a, b)| [a, b]).collect::<BTreeSet<_>>() {
+        if safety_reports.closes(&trials::get(db, trial).await?) {
+            closed.push(trial);
+        }
+    }
+    Ok(closed)
 }
 
 async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
@@ -250,6 +266,18 @@ pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Si
         return Err(unknown_pair());
     }
     consents::may_be_shown(db, shown.presentation.study_id).await?;
+    Ok(shown)
+}
+
+/// The pair of a token, if its motions may still be shown to this rater.
+///
+/// # Errors
+/// As [`own`], and [`Error::Conflict`] if a gait of the pair must no longer be shown.
+pub async fn own_to_show(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+    let shown = own(db, caller, token).await?;
+    if !walkable::are_walkable(db, shown.presentation.pair()).await? {
+        return Err(Error::conflict("This pair is no longer shown. Take the next pair."));
+    }
     Ok(shown)
 }
 

@@ -42,8 +42,8 @@ pub struct NewAnswer {
 /// Records the answer of the subject.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::Conflict`] before all walks are recorded or if there is another
-/// answer.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if there is another answer, or before all walks are recorded:
+/// a safety report is taken from the first walk with the device on.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
     if new.answer == Judgement::Withdrawn {
         return Err(Error::invalid(
@@ -54,7 +54,8 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
     let session = still_open(writer, id).await?;
-    if let Some(walk) = next_walk(&session) {
+    // Nobody walks on to report that a walk was unsafe.
+    if let Some(walk) = next_walk(&session).filter(|walk| *walk == 1 || !new.answer.is_about_safety()) {
         return Err(Error::conflict(format!(
             "Walk {walk} is not recorded yet. Record all walks before you record the answer."
         )));

@@ -55,6 +55,12 @@ pub(super) fn asks(session: &LabSession) -> Option<u32> {
     open.then(|| next_number(session))
 }
 
+/// The number of an answer that reports an unsafe walk now, if one is taken: from the first walk with the device on.
+pub(super) fn takes_report(session: &LabSession) -> Option<u32> {
+    let open = session.done(Act::Closed).is_none() && session.answer().is_none();
+    (open && next_walk(session) != Some(1)).then(|| next_number(session))
+}
+
 pub(super) fn next_number(session: &LabSession) -> u32 {
     u32::try_from(session.answers.len()).unwrap_or(u32::MAX).saturating_add(1)
 }

@@ -1,6 +1,6 @@
 //! Lab sessions: planning, recording of walks, closing, and the views that conceal the allocation.
 
-use super::question::{AnswerView, WALKS, asks, can_be_retracted, has_file, next_walk};
+use super::question::{AnswerView, WALKS, asks, can_be_retracted, has_file, next_walk, takes_report};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -188,14 +188,15 @@ pub enum GaitOfWalk {
 }
 
 /// Releases the controller file of a walk and records who fetched it, because the file reveals the gait. Only the
-/// device's token leaves the session blinded for its caller.
+/// device's token leaves the session blinded for its caller. Both gaits are admitted in the transaction of the release,
+/// so no file is released after a report was acknowledged.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a walk without the device or an unknown walk, [`Error::Conflict`] if the allocation is not in
-/// this record or the subject withdrew consent.
+/// [`Error::Invalid`] for a walk without the device or an unknown walk, [`Error::Conflict`] if the session is closed, one
+/// of its gaits is not walkable, the allocation is not in this record, or the subject withdrew consent.
 pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, walk: u8) -> Result<GaitOfWalk, Error> {
-    let walk = checked_device_walk(walk)?;
     let session = still_shown(writer, id).await?;
+    gaits_to_walk_with(writer, &session, walk).await?;
     if !session.allocation.included {
         return Err(not_included());
     }
@@ -298,6 +299,8 @@ pub struct InTheLab {
     pub last_recorded: Option<Instant>,
     /// Number of the answer that is asked for. Absent before the last walk and after an answer.
     pub asks: Option<u32>,
+    /// Number of the answer that reports an unsafe walk. Absent before the first walk with the device and after an answer.
+    pub reports: Option<u32>,
     /// Current answer of the subject.
     pub answer: Option<AnswerView>,
     /// Whether that answer can be retracted here.
@@ -315,10 +318,11 @@ pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLa
     let closed = session.done(Act::Closed).is_some();
     Ok(InTheLab {
         session: id,
-        walk: next_walk(&session).filter(|_| !closed),
+        walk: next_walk(&session).filter(|_| !closed && session.answer().is_none()),
         walks: WALKS,
         last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(Act::Walk(walk))).map(|done| done.at),
         asks: asks(&session),
+        reports: takes_report(&session),
         answer: session.answer().map(|answer| AnswerView::of(&session, answer)),
         can_be_retracted: can_be_retracted(&session),
         closed,

@@ -1,0 +1,51 @@
+//! Records a report that one gait is unsafe. Takes effect at once: the gait, and every trial of the subject with the same
+//! motion, is neither recommended nor compared nor walked until staff have reviewed the report.
+
+use super::answer::attribution;
+use super::walkable::NotWalkable;
+use crate::access::Caller;
+use crate::error::Error;
+use gaitwright_store::feedback::Source;
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{SafetyReportId, TrialId, Writer, audit, consents, events, safety_reports, trials};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// A report that a gait is unsafe.
+#[derive(Debug, Clone, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(as = NewSafetyReport)]
+pub struct Report {
+    /// Who reports: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    #[serde(default)]
+    pub source: Option<Source>,
+    /// Name or pseudonym of the author. Defaults to the caller's name.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 80)]
+    pub author: Option<String>,
+    /// What happened, at most 2000 characters.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub note: String,
+}
+
+/// Records a report about the gait of a trial.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial has no converged gait or
+/// the subject withdrew consent.
+pub async fn give(writer: &mut Writer, caller: &Caller, id: TrialId, report: &Report) -> Result<SafetyReportId, Error> {
+    let trial = trials::get(writer, id).await?;
+    consents::may_be_shown(writer, trial.study_id).await?;
+    if trial.state != TrialState::Converged {
+        return Err(NotWalkable::NotConverged { number: trial.number, state: trial.state.as_str() }.into());
+    }
+    let attribution = attribution(caller, report.source, report.author.as_deref(), &report.note)?;
+    let made = safety_reports::insert(writer, id, attribution).await?;
+    let payload = json!({ "trial_id": id, "number": trial.number });
+    events::append(writer, trial.study_id, "reported_unsafe", &payload).await?;
+    let detail = json!({ "study": trial.study_id, "author": attribution.author });
+    audit::append(writer, &caller.actor, "gait.report_unsafe", &format!("trial {id}"), &detail).await?;
+    Ok(made)
+}

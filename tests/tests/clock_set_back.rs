@@ -1,0 +1,36 @@
+//! A clock that is set back changes no order: alone in its process, because the clock is that of the process.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright_store::set_machine_clock;
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::TrialState;
+use gaitwright_tests::service::Service;
+use gaitwright_tests::well_formed::WellFormed;
+use serde_json::json;
+
+#[tokio::test]
+async fn a_report_after_a_review_closes_the_gait_although_the_clock_was_set_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let service = Service::start(&database, WellFormed::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 6).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let trial = trials.iter().find(|trial| trial.state == TrialState::Converged).unwrap().id;
+    let report = format!("/api/v1/trials/{trial}/safety-reports");
+    let review = format!("/api/v1/trials/{trial}/safety-reviews");
+    let controller = format!("/api/v1/trials/{trial}/controller.json");
+    let walkable = json!({"verdict": "walkable", "reason": "seen again"});
+    set_machine_clock(3600);
+    assert_eq!(service.post(&report, &json!({})).await.status, StatusCode::CREATED);
+    assert_eq!(service.post(&review, &walkable).await.status, StatusCode::OK);
+    assert_eq!(service.fetch(&controller).await.status, StatusCode::OK);
+    set_machine_clock(0);
+    assert_eq!(service.post(&report, &json!({})).await.status, StatusCode::CREATED);
+    assert_eq!(service.fetch(&controller).await.status, StatusCode::CONFLICT);
+    let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
+    assert_eq!((&reports[0]["stands"], &reports[1]["stands"]), (&json!(false), &json!(true)), "{reports}");
+    service.stop().await;
+}

@@ -1,0 +1,186 @@
+//! A safety report closes a motion: for every trial of the subject that has it, from the moment it is acknowledged,
+//! whatever the clock says, and wherever it can be given.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright_service::access::{Caller, Right};
+use gaitwright_service::studies::lab;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{StudyId, TokenId};
+use gaitwright_tests::callers::FORM;
+use gaitwright_tests::service::Service;
+use gaitwright_tests::well_formed::WellFormed;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+async fn service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), WellFormed::default(), 1).await;
+    (folder, service)
+}
+
+async fn finished(service: &Service) -> (StudyId, Vec<Trial>) {
+    let study = service.study(|new| new.trial_budget = 12).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    (study, converged(service, study).await)
+}
+
+async fn converged(service: &Service, study: StudyId) -> Vec<Trial> {
+    let mut trials = service.trials(study).await;
+    trials.retain(|trial| trial.state == TrialState::Converged);
+    trials
+}
+
+async fn controller(service: &Service, trial: &Trial) -> StatusCode {
+    service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await.status
+}
+
+async fn report(service: &Service, trial: &Trial) -> Value {
+    let path = format!("/api/v1/trials/{}/safety-reports", trial.id);
+    let reported = service.post(&path, &json!({"note": "stumbled"})).await;
+    assert_eq!(reported.status, StatusCode::CREATED, "{}", reported.text);
+    reported.json()
+}
+
+async fn clear(service: &Service, trial: &Trial) -> StatusCode {
+    let path = format!("/api/v1/trials/{}/safety-reviews", trial.id);
+    service.post(&path, &json!({"verdict": "walkable", "reason": "seen again"})).await.status
+}
+
+#[tokio::test]
+async fn a_report_closes_every_trial_of_the_subject_with_the_same_motion() {
+    let (_folder, service) = service().await;
+    let (study, trials) = finished(&service).await;
+    let fork = service.post(&format!("/api/v1/studies/{study}/fork"), &json!({"start": true})).await.json();
+    let fork: StudyId = fork["id"].as_str().unwrap().parse().unwrap();
+    service.wait_for(fork, &[StudyState::Finished]).await;
+    let best = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json()["trial_id"].clone();
+    let best = trials.iter().find(|trial| json!(trial.id) == best).unwrap();
+    let twin = converged(&service, fork).await.into_iter().find(|trial| trial.action == best.action).unwrap();
+    assert_eq!((controller(&service, best).await, controller(&service, &twin).await), (StatusCode::OK, StatusCode::OK));
+    report(&service, &twin).await;
+    let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json", best.id)).await;
+    assert_eq!(refused.status, StatusCode::CONFLICT);
+    assert!(refused.text.contains("another study of this subject"), "{}", refused.text);
+    let recommended = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
+    assert_ne!(recommended["trial_id"], json!(best.id));
+    let other = trials.iter().find(|trial| trial.id != best.id).unwrap();
+    let plan = json!({"gait_one": best.id, "gait_two": other.id});
+    let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await;
+    assert_eq!(planned.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", planned.text);
+    let page = service.fetch(&format!("/trials/{}", best.id)).await.text;
+    assert!(page.contains("Do not walk with it") && !page.contains("controller.json"), "{page}");
+    // The report is reviewed where it was given.
+    let review = json!({"verdict": "walkable", "reason": "r"});
+    let there = service.post(&format!("/api/v1/trials/{}/safety-reviews", best.id), &review).await;
+    assert!(there.status == StatusCode::CONFLICT && there.text.contains("Review the report there"), "{}", there.text);
+    assert_eq!(clear(&service, &twin).await, StatusCode::OK);
+    assert_eq!(controller(&service, best).await, StatusCode::OK);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn one_gait_is_reported_without_another_to_compare_it_with() {
+    let (_folder, service) = service().await;
+    let (study, trials) = finished(&service).await;
+    let made = report(&service, &trials[0]).await;
+    assert_eq!((&made["trial_id"], &made["stands"]), (&json!(trials[0].id), &json!(true)));
+    assert_eq!(controller(&service, &trials[0]).await, StatusCode::CONFLICT);
+    let sent = service.post_text(&format!("/trials/{}/safety-report", trials[1].id), FORM, "author=K1&note=fell").await;
+    assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
+    assert_eq!(controller(&service, &trials[1]).await, StatusCode::CONFLICT);
+    let listed = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
+    assert_eq!(listed.as_array().unwrap().len(), 2);
+    // The learner hears nothing of it.
+    assert!(service.feedback(study).await.iter().all(|row| row.author != "K1"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn an_unsafe_walk_is_reported_before_the_next_one_and_ends_the_walks() {
+    let (_folder, service) = service().await;
+    let (study, trials) = finished(&service).await;
+    let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
+    let lab = format!("/api/v1/lab-sessions/{}", session["id"].as_str().unwrap());
+    let unsafe_first = json!({"number": 1, "answer": "unsafe_first"});
+    assert_eq!(
+        service.post(&format!("{lab}/answers"), &unsafe_first).await.status,
+        StatusCode::CONFLICT,
+        "no walk yet"
+    );
+    service.post(&format!("{lab}/walks"), &json!({"walk": 1})).await;
+    let better = service.post(&format!("{lab}/answers"), &json!({"number": 1, "answer": "first"})).await;
+    assert_eq!(better.status, StatusCode::CONFLICT, "only a report is taken before the last walk");
+    let page = service.fetch(&format!("/lab/{}", session["id"].as_str().unwrap())).await.text;
+    assert!(page.contains("A walk was unsafe"), "{page}");
+    let reported = service.post(&format!("{lab}/answers"), &unsafe_first).await;
+    assert_eq!(reported.status, StatusCode::OK, "{}", reported.text);
+    assert_eq!(reported.json()["walk"], Value::Null);
+    for walk in [2, 3] {
+        let file = service.fetch(&format!("{lab}/controller.json?walk={walk}")).await;
+        assert_eq!(file.status, StatusCode::CONFLICT, "{}", file.text);
+        let recorded = service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
+        assert_eq!(recorded.status, StatusCode::CONFLICT, "{}", recorded.text);
+    }
+    for trial in &trials[..2] {
+        assert_eq!(controller(&service, trial).await, StatusCode::CONFLICT, "either gait may be meant");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn no_file_is_released_after_a_report_was_acknowledged_or_the_session_closed() {
+    let (_folder, service) = service().await;
+    let (study, trials) = finished(&service).await;
+    let device = Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
+    for ends in ["closed", "reported"] {
+        let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+        let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
+        let id = session["id"].as_str().unwrap();
+        // As at the end of a request that computed its files before.
+        if ends == "closed" {
+            service.post(&format!("/api/v1/lab-sessions/{id}/close"), &json!({})).await;
+        } else {
+            report(&service, &trials[1]).await;
+        }
+        let mut writer = service.store.write().await.unwrap();
+        let refused = lab::for_device(&mut writer, &device, id.parse().unwrap(), 2).await;
+        assert!(refused.is_err(), "{ends}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_pair_is_no_longer_shown_to_its_rater_after_a_report() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
+    let token = pair["pair"]["token"].as_str().unwrap();
+    let motion = format!("/api/v1/blind-pairs/{token}/motions/first");
+    assert_eq!(service.fetch(&motion).await.status, StatusCode::OK);
+    for trial in converged(&service, study).await {
+        report(&service, &trial).await;
+    }
+    assert_eq!(service.fetch(&motion).await.status, StatusCode::CONFLICT);
+    assert_eq!(service.fetch(&format!("/rate/pair/{token}")).await.status, StatusCode::CONFLICT);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_safety_report_in_an_assessment_is_reviewed_and_not_retracted() {
+    let (_folder, service) = service().await;
+    let (study, trials) = finished(&service).await;
+    let body = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_first", "author": "K"});
+    let made = service.post(&format!("/api/v1/studies/{study}/assessments"), &body).await.json();
+    let retract = format!("/api/v1/assessments/{}/retract", made["id"].as_str().unwrap());
+    let refused = service.post(&retract, &json!({"reason": "a slip"})).await;
+    assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
+    assert_eq!(controller(&service, &trials[0]).await, StatusCode::CONFLICT);
+    assert_eq!(clear(&service, &trials[0]).await, StatusCode::OK);
+    assert_eq!(controller(&service, &trials[0]).await, StatusCode::OK);
+    service.stop().await;
+}
