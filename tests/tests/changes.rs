@@ -128,11 +128,13 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let given = scene.one(done, "post /studies/{id}/preferences", &give, answer).await;
     let retract = format!("{api}/preferences/{}/retract", text(&given["id"]));
     scene.one(done, "post /preferences/{id}/retract", &retract, json!({"reason": "r"})).await;
-    let unsafe_one = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_first"});
+    let unclear = json!({"first": trials[0].id, "second": trials[1].id, "answer": "cannot_tell"});
     let made = format!("{api}/studies/{finished}/assessments");
-    let made = scene.one(done, "post /studies/{id}/assessments", &made, unsafe_one).await;
+    let made = scene.one(done, "post /studies/{id}/assessments", &made, unclear).await;
     let retract = format!("{api}/assessments/{}/retract", text(&made["id"]));
     scene.one(done, "post /assessments/{id}/retract", &retract, json!({"reason": "r"})).await;
+    let report = format!("{api}/trials/{}/safety-reports", trials[0].id);
+    scene.one(done, "post /trials/{id}/safety-reports", &report, json!({"note": "stumbled"})).await;
     let again = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_both"});
     service.post(&format!("{api}/studies/{finished}/assessments"), &again).await;
     for (trial, verdict) in [(&trials[0], "walkable"), (&trials[1], "unsafe"), (&trials[1], "walkable")] {
@@ -144,7 +146,11 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let better = json!({"over": trials[0].id, "bounds": {"a6": elsewhere(&trials[0])}});
     let suggest = format!("{api}/studies/{finished}/suggestions");
     scene.one(done, "post /studies/{id}/suggestions", &suggest, better).await;
-    scene.one(done, "post /backups", &format!("{api}/backups"), json!({})).await;
+    // A job leaves one row for its request, and one when it is done.
+    let before = rows(service).await;
+    service.backed_up().await;
+    assert_eq!(rows(service).await, before + 2);
+    done.insert("post /backups".to_owned());
 
     let next = format!("{api}/studies/{human}/blind-pairs/next");
     let pair = scene.one(done, "post /studies/{id}/blind-pairs/next", &next, json!({})).await;

@@ -168,7 +168,7 @@ async fn the_table_of_a_gait_comes_back_as_the_same_curves() {
     let line = table.lines().nth(12).unwrap();
     let word = body_with(&body, &table.replacen(line, &line.replacen(",DS3_R,", ",DS3_R,x", 1), 1));
     let refused = service.post("/api/v1/reference-gaits", &word).await;
-    assert!(refused.text.contains("recording, line 13, column 3: px_m = "), "{}", refused.text);
+    assert!(refused.text.contains("recording, line 13, column 3: px_m is "), "{}", refused.text);
     service.stop().await;
 }
 

@@ -241,7 +241,7 @@ async fn a_request_with_two_idempotency_keys_is_refused() {
     let request = request.header("idempotency-key", "one").header("idempotency-key", "two");
     let refused = service.send(request.body(Body::from(body)).unwrap()).await;
     assert_eq!(refused.status, StatusCode::BAD_REQUEST, "{}", refused.text);
-    assert!(refused.text.contains("given more than once"), "{}", refused.text);
+    assert!(refused.text.contains("occurs more than once"), "{}", refused.text);
     service.stop().await;
 }
 
@@ -311,5 +311,39 @@ async fn forwarded_headers_of_strangers_change_nothing() {
     assert_eq!(send(from(PROXY, "GET", "/health", &host)).await.status, StatusCode::OK);
     let garbled = [("host", "gait.example"), ("x-forwarded-for", "somebody")];
     is_complete_problem(&send(from(PROXY, "GET", "/health", &garbled)).await, 400, "/problems/malformed");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn an_absent_body_replaces_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let muscles = format!("/api/v1/subjects/{}/muscles", service.subject().await);
+    let measured = service.put(&muscles, &json!({"sol": {"max_force_n": 4200.0}})).await;
+    assert_eq!(measured.status, StatusCode::OK, "{}", measured.text);
+    let request = Request::builder().method("PUT").uri(&muscles).body(Body::empty()).unwrap();
+    let refused = service.send(request).await;
+    assert_eq!(refused.status, StatusCode::BAD_REQUEST, "{}", refused.text);
+    assert_eq!(service.fetch(&muscles).await.json()["sol"]["max_force_n"], 4200.0);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn searches_and_keys_are_accepted_exactly_as_described() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    for list in ["audit", "access-log"] {
+        let search = async |text: &str| service.fetch(&format!("/api/v1/{list}?contains={text}")).await.status;
+        assert_eq!(search(&"x".repeat(200)).await, StatusCode::OK);
+        assert_eq!(search(&"x".repeat(201)).await, StatusCode::BAD_REQUEST);
+    }
+    let subject = json!({"pseudonym": "S", "height_m": 1.7, "body_mass_kg": 60.0}).to_string();
+    for (key, status) in [("a b", StatusCode::CREATED), ("a\tb", StatusCode::BAD_REQUEST)] {
+        let request =
+            Request::builder().method("POST").uri("/api/v1/subjects").header("content-type", "application/json");
+        let sent =
+            service.send(request.header("idempotency-key", key).body(Body::from(subject.clone())).unwrap()).await;
+        assert_eq!(sent.status, status, "{key:?}: {}", sent.text);
+    }
     service.stop().await;
 }

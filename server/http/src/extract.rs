@@ -4,15 +4,18 @@ use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::problem::Refusal;
 use axum::extract::{FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, Method, StatusCode, header};
 use gaitwright_service::document;
 use gaitwright_service::error::Error;
 use serde::de::DeserializeOwned;
 
 /// Reads a JSON body. Errors name the field.
-pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
-    // An absent body counts as an empty document.
+pub(crate) fn body<T: DeserializeOwned>(method: &Method, headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
+    // An absent body counts as an empty document, unless it would replace what is there.
     let absent = bytes.is_empty();
+    if absent && method != Method::POST {
+        return Err(Error::Malformed("The body is missing; it must be a JSON document.".to_owned()));
+    }
     let bytes = if absent { b"{}" } else { bytes };
     let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("");
     if !absent && !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {

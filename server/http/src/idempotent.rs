@@ -7,7 +7,7 @@ use super::extract::{body, unreadable};
 use crate::problem::Refusal;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Caller, Permission};
 use gaitwright_service::error::Error;
@@ -142,7 +142,8 @@ fn key_in(headers: &HeaderMap) -> Result<Option<String>, Error> {
     if all.next().is_some() {
         return Err(malformed("occurs more than once"));
     }
-    let key = value.to_str().ok().filter(|key| (1..=200).contains(&key.len()));
+    let printable = |key: &&str| (1..=200).contains(&key.len()) && !key.contains('\t');
+    let key = value.to_str().ok().filter(printable);
     Ok(Some(key.ok_or_else(|| malformed("must have 1 to 200 printable ASCII characters"))?.to_owned()))
 }
 
@@ -158,9 +159,9 @@ fn response(kept: &Kept) -> Response {
 async fn read<P: Permission, S: Send + Sync>(
     request: Request,
     state: &S,
-) -> Result<(Idempotent<P>, HeaderMap, Bytes), Error> {
+) -> Result<(Idempotent<P>, Method, HeaderMap, Bytes), Error> {
     let caller = permitted::<P>(request.extensions())?;
-    let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
+    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
     let headers = request.headers().clone();
     let study = request.extensions().get::<OfStudy>().and_then(|of| of.0);
     let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
@@ -168,11 +169,11 @@ async fn read<P: Permission, S: Send + Sync>(
         actor: caller.actor.clone(),
         caller,
         key: key_in(&headers)?,
-        request: fingerprint(&method, &path, &bytes),
+        request: fingerprint(method.as_str(), &path, &bytes),
         study,
         right: PhantomData,
     };
-    Ok((idempotent, headers, bytes))
+    Ok((idempotent, method, headers, bytes))
 }
 
 impl<P: Permission, S: Send + Sync> FromRequest<S> for Idempotent<P> {
@@ -187,7 +188,7 @@ impl<P: Permission, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Idem
     type Rejection = Refusal;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
-        let (idempotent, headers, bytes) = read(request, state).await?;
-        Ok(Self(idempotent, body(&headers, &bytes)?))
+        let (idempotent, method, headers, bytes) = read(request, state).await?;
+        Ok(Self(idempotent, body(&method, &headers, &bytes)?))
     }
 }

@@ -58,7 +58,7 @@ pub(super) fn value() -> Result<Value, serde_json::Error> {
     let schemas = value["components"]["schemas"].clone();
     for (_, item) in value["paths"].as_object_mut().into_iter().flatten() {
         for (method, operation) in item.as_object_mut().into_iter().flatten() {
-            complete(operation, method != "get", &schemas);
+            complete(operation, method, &schemas);
         }
     }
     Ok(value)
@@ -101,7 +101,8 @@ fn name_pages(value: Value) -> Value {
 }
 
 /// Adds the common responses and parameters of an operation.
-fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
+fn complete(operation: &mut Value, method: &str, schemas: &Value) {
+    let changes = method != "get";
     let shown_once = operation.get(SHOWN_ONCE).is_some();
     let is_page = operation
         .pointer("/responses/200/content/application~1json/schema/$ref")
@@ -128,6 +129,11 @@ fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
         }));
     }
     let body = operation.pointer("/requestBody/content/application~1json/schema");
+    let needs_fields = |schema: &Value| {
+        let name = schema["$ref"].as_str().and_then(|path| path.strip_prefix(openapi_rules::SCHEMAS));
+        name.is_none_or(|name| schemas[name].get("required").is_some())
+    };
+    let may_be_absent = method == "post" && body.is_some_and(|schema| !needs_fields(schema));
     let (has_body, has_rules) = (body.is_some(), body.is_some_and(|schema| openapi_rules::has_rules(schema, schemas)));
     let mut problems = vec![("500", "Internal error"), ("503", "Timed out or not ready")];
     if !parameters.is_empty() || changes {
@@ -158,6 +164,13 @@ fn complete(operation: &mut Value, changes: bool, schemas: &Value) {
     }
     if !parameters.is_empty() {
         operation["parameters"] = Value::Array(parameters);
+    }
+    if may_be_absent {
+        operation["requestBody"]["required"] = json!(false);
+    }
+    // No token can have the right to administer.
+    if let Some(ways) = operation["security"].as_array_mut() {
+        ways.retain(|way| way.get("token").is_none_or(|scopes| scopes != &json!(["administer"])));
     }
     let Some(responses) = operation["responses"].as_object_mut() else { return };
     for (status, description) in problems {

@@ -41,6 +41,33 @@ impl<T> Page<T> {
     }
 }
 
+/// A text that entries of a list contain, without surrounding spaces.
+#[derive(Debug, Default, Deserialize)]
+#[serde(try_from = "String")]
+pub(crate) struct SearchText(String);
+
+impl SearchText {
+    /// Maximum length in characters.
+    const LONGEST: usize = 200;
+
+    pub(crate) fn as_str(&self) -> &str {
+        self.0.trim()
+    }
+}
+
+impl TryFrom<String> for SearchText {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        match text.chars().count() {
+            length if length > Self::LONGEST => {
+                Err(format!("contains is {length} characters long; it must be at most {} long", Self::LONGEST))
+            }
+            _ => Ok(Self(text)),
+        }
+    }
+}
+
 /// The filter of a list that has none.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

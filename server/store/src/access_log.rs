@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 /// Kind of an access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = AccessKind)]
 pub enum Kind {
     /// The data was shown.
     View,

@@ -15,6 +15,7 @@ use utoipa::ToSchema;
 /// Why a pair is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = PresentationKind)]
 pub enum Kind {
     /// The pending comparison of the study.
     New,

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::paging::{Page, Paging};
+use crate::paging::{Page, Paging, SearchText};
 use crate::problem::Refusal;
 use axum::Json;
 use axum::extract::State;
@@ -16,7 +16,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
     #[serde(default)]
-    contains: String,
+    contains: SearchText,
     subject_id: Option<SubjectId>,
 }
 
@@ -43,6 +43,6 @@ pub(super) async fn list(
     app.access.log.write(app.store(), true).await?;
     let Filter { contains, subject_id } = &paging.filter;
     let mut reader = app.read().await?;
-    let rows = access_log::page(&mut reader, contains.trim(), *subject_id, paging.after, paging.to_read()).await?;
+    let rows = access_log::page(&mut reader, contains.as_str(), *subject_id, paging.after, paging.to_read()).await?;
     Ok(Json(paging.page(rows, |row| row.seq)?))
 }

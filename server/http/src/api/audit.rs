@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::paging::{Page, Paging};
+use crate::paging::{Page, Paging, SearchText};
 use crate::problem::Refusal;
 use axum::Json;
 use axum::extract::State;
@@ -15,7 +15,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
     #[serde(default)]
-    contains: String,
+    contains: SearchText,
 }
 
 /// List the audit trail
@@ -35,7 +35,7 @@ pub(super) async fn list(
     State(app): State<AppState>,
     paging: Paging<i64, Filter>,
 ) -> Result<Json<Page<AuditRow>>, Refusal> {
-    let contains = paging.filter.contains.trim();
+    let contains = paging.filter.contains.as_str();
     let rows = audit::page(&mut *app.read().await?, contains, paging.after, paging.to_read()).await?;
     Ok(Json(paging.page(rows, |row| row.seq)?))
 }

@@ -31,7 +31,7 @@ const BATCH: u32 = 200;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct From {
-    after: Option<i64>,
+    after: Option<u32>,
 }
 
 /// Follow the events of a study
@@ -44,7 +44,7 @@ pub(super) struct From {
     path = "/studies/{id}/events",
     operation_id = "follow_study_events",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Start after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "Last event that was received")),
+    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<u32>, Query, description = "Start after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "Last event that was received")),
     responses((status = 200, description = "Server-sent events", body = String, content_type = "text/event-stream"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -59,7 +59,7 @@ pub(super) async fn of_study(
     let study = studies::get(&mut reader, id).await?;
     let last = events::last(&mut reader, id).await?;
     // After a restore, a client may have seen larger numbers than the record has.
-    let after = last_seen(&headers)?.or(from.after).map_or(last, |seen| seen.min(last));
+    let after = last_seen(&headers)?.or(from.after.map(i64::from)).map_or(last, |seen| seen.min(last));
     drop(reader);
     let stands = json!({ "state": study.state, "reason": study.state_reason });
     let stands = Event::default().event("study_state").json_data(stands).map_err(|e| Error::Internal(e.to_string()))?;

@@ -63,7 +63,7 @@ pub(super) async fn of_study(
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
         ("other" = Option<TrialId>, Query, description = "Converged trial of the same study for comparison")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_trial(

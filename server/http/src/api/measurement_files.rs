@@ -70,7 +70,7 @@ pub(super) async fn get(
     operation_id = "get_measurement_file_content",
     tag = "lab",
     params(("id" = MeasurementFileId, Path, description = "The file")),
-    responses((status = 200, description = "CSV or OpenSim file", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "CSV or OpenSim file", content((String = "text/csv"), (String = "text/plain"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn content(

@@ -116,7 +116,7 @@ pub(super) async fn get(
     operation_id = "create_study",
     tag = "studies",
     request_body = NewStudy,
-    responses((status = 201, description = "Study", body = StudyView)),
+    responses((status = 201, description = "Study", body = StudyView), (status = 404, description = "No such subject, device or reference gait")),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
