@@ -42,7 +42,7 @@ fn documented_ranges_are_the_accepted_ranges() {
         }
         for outside in [low - margin, high + margin] {
             let refusal = with(field, &json!(outside)).unwrap_err();
-            assert!(refusal.contains(&format!("device.{field} = ")) && refusal.contains("allowed range"), "{refusal}");
+            assert!(refusal.contains(&format!("device.{field} is ")) && refusal.contains("; it must be "), "{refusal}");
         }
     }
 }

@@ -68,7 +68,7 @@ fn channels_without_muscle_signal_are_rejected() {
     };
     assert_eq!(
         refused(|samples| samples.fill(0.25)),
-        "channel TA: every sample is 0.25; check that the electrode was connected"
+        "channel TA: every sample is 0.25; check that the electrode was connected."
     );
     let artefact = refused(|samples| samples[700] = 1e6);
     assert!(

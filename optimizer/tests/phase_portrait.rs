@@ -107,12 +107,12 @@ fn recordings_without_walking_are_rejected() {
     let check = |text: &str| JointRecording::from_csv("walk.csv", text).unwrap().check_walking("walk.csv");
     let refused = |text: &str| check(text).unwrap_err().to_string();
     let still = refused(&table("torso_rad,ankle_R_rad", 300, 0.01, |time| vec![0.1, 0.024 * swing(time)]));
-    let expected = "walk.csv: no joint moves by more than 0.05 rad (the largest range is 0.048 rad); check the unit";
+    let expected = "walk.csv: no joint moves by more than 0.05 rad (the largest range is 0.048 rad); check the unit.";
     assert_eq!(still, expected);
     let backward = refused(&table("hip_R_rad,knee_R_rad", 300, 0.01, |time| vec![swing(time), -knee_at(time)]));
     assert_eq!(
         backward,
-        "walk.csv: knee_R ranges from -1.00 to -0.00 rad, but flexion must be positive; check the sign of the knee angle"
+        "walk.csv: knee_R ranges from -1.00 to -0.00 rad, but flexion must be positive; check the sign of the knee angle."
     );
     let stiff = refused(&table("hip_R_rad,knee_L_rad", 300, 0.01, |time| vec![swing(time), 0.04 * knee_at(time)]));
     assert_eq!(stiff, "walk.csv: knee_L moves by only 0.040 rad, less than 0.1 rad; check the unit");

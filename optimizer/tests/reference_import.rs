@@ -445,7 +445,7 @@ fn impossible_mean_strides_are_rejected() {
     ];
     for (change, expected) in cases {
         let said = said_of(&walk(0.0, change));
-        assert!(said == format!("refused: walk.csv: {expected}"), "{expected}: {said}");
+        assert!(said == format!("refused: walk.csv: {expected}."), "{expected}: {said}");
     }
 }
 
