@@ -115,10 +115,10 @@ fn recordings_without_walking_are_rejected() {
         "walk.csv: knee_R ranges from -1.00 to -0.00 rad, but flexion must be positive; check the sign of the knee angle."
     );
     let stiff = refused(&table("hip_R_rad,knee_L_rad", 300, 0.01, |time| vec![swing(time), 0.04 * knee_at(time)]));
-    assert_eq!(stiff, "walk.csv: knee_L moves by only 0.040 rad, less than 0.1 rad; check the unit");
+    assert_eq!(stiff, "walk.csv: knee_L moves by only 0.040 rad, less than 0.1 rad; check the unit.");
     let jump = |time: f64| if time > 1.5005 { 0.9 } else { 0.0 };
     let jumps = refused(&table("hip_R_rad,ankle_R_rad", 300, 0.01, |time| vec![swing(time), jump(time)]));
-    assert_eq!(jumps, "walk.csv: ankle_R jumps by 0.90 rad in 0.0100 s, 1.510 s after the first row");
+    assert_eq!(jumps, "walk.csv: ankle_R jumps by 0.90 rad in 0.0100 s, 1.510 s after the first row.");
     // Trunk and ankle may move little if other joints walk.
     assert_eq!(check(&table("torso_rad,hip_R_rad", 300, 0.01, |time| vec![0.1, swing(time)])), Ok(()));
 }
