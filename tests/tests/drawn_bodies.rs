@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use tempfile::TempDir;
 
 /// Bodies drawn for each operation.
-const DRAWS: usize = 15;
+const DRAWS: usize = 8;
 
 /// Operations that hardly ever succeed with a drawn body, because a value must be one of the record.
 const SELDOM_FIT: [&str; 1] = ["post /studies/{id}/suggestions"];
@@ -153,12 +153,20 @@ impl Scene {
         })
     }
 
-    async fn send(&mut self, method: &str, path: &str, body: &Value) -> Option<Answer> {
-        let target = self.target(path).await?;
-        let address = format!("/api/v1{}", path.replace("{id}", &target).replace("{token}", &target));
+    /// The answer to a body. A target that an operation refused to change serves the next body.
+    async fn send(&mut self, method: &str, path: &str, body: &Value, target: &mut Option<String>) -> Option<Answer> {
+        if target.is_none() {
+            *target = self.target(path).await;
+        }
+        let known = target.as_ref()?;
+        let address = format!("/api/v1{}", path.replace("{id}", known).replace("{token}", known));
         let request = Request::builder().method(method.to_uppercase().as_str()).uri(&address);
         let request = request.header(header::CONTENT_TYPE, "application/json");
-        Some(self.service.send(request.body(Body::from(body.to_string())).unwrap()).await)
+        let answer = self.service.send(request.body(Body::from(body.to_string())).unwrap()).await;
+        if answer.status.is_success() {
+            *target = None;
+        }
+        Some(answer)
     }
 }
 
@@ -243,10 +251,10 @@ async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
             }
             drawn.known = common.clone();
             drawn.known.extend(known_to(path, &scene.trials));
-            let before = accepted;
+            let (before, mut target) = (accepted, None);
             for _ in 0..DRAWS {
                 let body = drawn.body(schema);
-                let Some(answer) = scene.send(method, path, &body).await else { break };
+                let Some(answer) = scene.send(method, path, &body, &mut target).await else { break };
                 let state = [StatusCode::CONFLICT, StatusCode::NOT_FOUND].contains(&answer.status);
                 let field = serde_json::from_str::<Value>(&answer.text).unwrap_or_default()["field"].clone();
                 let in_words = answer.status == StatusCode::UNPROCESSABLE_ENTITY
@@ -261,7 +269,7 @@ async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
             }
             let mut statuses = Vec::new();
             for (why, body) in drawn.beyond(schema) {
-                let Some(answer) = scene.send(method, path, &body).await else { break };
+                let Some(answer) = scene.send(method, path, &body, &mut target).await else { break };
                 if [StatusCode::BAD_REQUEST, StatusCode::UNPROCESSABLE_ENTITY].contains(&answer.status) {
                     refused += 1;
                 } else {
@@ -278,6 +286,6 @@ async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
     never.retain(|operation| !SELDOM_FIT.contains(&operation.as_str()));
     assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
     assert!(never.is_empty(), "no drawn body was accepted by {never:?}");
-    assert!(accepted > 400 && refused > 150, "{accepted} accepted, {refused} refused");
+    assert!(accepted > 200 && refused > 150, "{accepted} accepted, {refused} refused");
     scene.service.stop().await;
 }

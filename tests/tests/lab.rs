@@ -442,7 +442,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
     let refused = service.post(&format!("{api}/emg-results"), &json!({"settings": {"band_high_hz": 500.0}})).await;
     assert_eq!(
         (refused.status, &refused.json()["field"]),
-        (StatusCode::UNPROCESSABLE_ENTITY, &json!("emg.band_high_hz"))
+        (StatusCode::UNPROCESSABLE_ENTITY, &json!("settings.band_high_hz"))
     );
     let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
     assert!(page.contains("EMG, left tibialis anterior") && page.contains("low-pass 3 Hz, order 2"), "{page}");

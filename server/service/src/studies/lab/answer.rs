@@ -54,6 +54,10 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
     let session = still_open(writer, id).await?;
+    let number = next_number(&session);
+    if !(1..=number).contains(&new.number) {
+        return Err(Error::invalid("number", new.number, &format!("1 to {number}")));
+    }
     if let Some(walk) = next_walk(&session) {
         return Err(Error::conflict(format!(
             "Walk {walk} is not recorded yet. Record all walks before you record the answer."
@@ -64,7 +68,6 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
         let other = "There is already an answer. To change it, retract it first.";
         return if same { in_the_lab(writer, id).await } else { Err(Error::conflict(other)) };
     }
-    let number = next_number(&session);
     if new.number != number {
         return Err(Error::conflict(format!(
             "Answer {} was retracted. The current answer has number {number}.",
