@@ -31,11 +31,12 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewAssessment", "second", GAIT_OF_STUDY),
     ("NewSession", "gait_one", GAIT),
     ("NewSession", "gait_two", GAIT),
-    ("Suggestion", "over", "A converged trial of this study."),
+    ("Suggestion", "over", "A trial of this study with a walkable gait."),
     (
         "Suggestion",
         "bounds",
-        "Dimensions of the study's search space, each with one of its values. At least one value differs from that of the trial.",
+        "Dimensions of the study's search space, each with one of its values. At least one value differs from that of the trial. \
+         A trial that had these bounds has a different gait, which is walkable.",
     ),
     ("NewStudy", "subject_id", EXISTS),
     ("NewStudy", "device_id", EXISTS),
