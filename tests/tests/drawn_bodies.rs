@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use axum::Router;
 use axum::body::Body;
 use axum::http::{Request, StatusCode, header};
 use gaitwright_http::openapi;
@@ -14,7 +15,9 @@ use gaitwright_tests::measured::{electromyogram, four_strides, motion};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::time::Duration;
 use tempfile::TempDir;
+use tower::ServiceExt;
 
 /// Bodies drawn for each operation.
 const DRAWS: usize = 8;
@@ -27,6 +30,8 @@ const MEMBER: &str = "a drawn member";
 
 struct Scene {
     service: Service,
+    /// One router for all requests: to build one takes longer than to answer.
+    router: Router,
     finished: StudyId,
     human: StudyId,
     script: StudyId,
@@ -45,13 +50,21 @@ impl Scene {
         let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 5000)).await;
         let converged = service.trials(finished).await.into_iter().filter(|trial| trial.gait_rmse_rad.is_some());
         let trials = converged.map(|trial| trial.id).collect();
-        (folder, Self { service, finished, human, script, trials, made: 0 })
+        let router = service.router();
+        (folder, Self { service, router, finished, human, script, trials, made: 0 })
     }
 
     async fn post(&self, path: &str, body: Value) -> Value {
-        let answer = self.service.post(&format!("/api/v1{path}"), &body).await;
+        let answer = self.request("post", path, &body).await;
         assert!(answer.status.is_success(), "{path}: {}", answer.text);
         answer.json()
+    }
+
+    async fn request(&self, method: &str, path: &str, body: &Value) -> Answer {
+        let request = Request::builder().method(method.to_uppercase().as_str()).uri(format!("/api/v1{path}"));
+        let request = request.header(header::CONTENT_TYPE, "application/json");
+        let request = request.body(Body::from(body.to_string())).unwrap();
+        Answer::of(self.router.clone().oneshot(request).await.unwrap()).await
     }
 
     async fn id_of(&self, path: &str, body: Value) -> String {
@@ -90,7 +103,7 @@ impl Scene {
         // An answer in an earlier session may have called either gait unsafe.
         for trial in &self.trials[..2] {
             let review = json!({"verdict": "walkable", "reason": "seen on the treadmill"});
-            let reviewed = self.service.post(&format!("/api/v1/trials/{trial}/safety-reviews"), &review).await;
+            let reviewed = self.request("post", &format!("/trials/{trial}/safety-reviews"), &review).await;
             assert!(reviewed.status.is_success() || reviewed.status == StatusCode::CONFLICT, "{}", reviewed.text);
         }
         let gaits = json!({"gait_one": self.trials[0], "gait_two": self.trials[1]});
@@ -105,9 +118,17 @@ impl Scene {
     async fn target(&mut self, path: &str) -> Option<String> {
         Some(match path {
             "/blind-pairs/{token}/answer" => {
-                self.service.wait_for(self.human, &[StudyState::Waiting, StudyState::Finished]).await;
-                let next = self.post(&format!("/studies/{}/blind-pairs/next", self.human), json!({})).await;
-                next["pair"]["token"].as_str()?.to_owned()
+                // After an answer, the study says that it waits until it has chosen the next comparison.
+                let mut token = None;
+                for _ in 0..100 {
+                    let next = self.post(&format!("/studies/{}/blind-pairs/next", self.human), json!({})).await;
+                    token = next["pair"]["token"].as_str().map(str::to_owned);
+                    if token.is_some() || self.service.get(self.human).await.state == StudyState::Finished {
+                        break;
+                    }
+                    tokio::time::sleep(Duration::from_millis(50)).await;
+                }
+                token?
             }
             "/studies/{id}/start" => self.study(false).await,
             "/studies/{id}/pause" | "/studies/{id}/stop" => self.study(true).await,
@@ -159,10 +180,8 @@ impl Scene {
             *target = self.target(path).await;
         }
         let known = target.as_ref()?;
-        let address = format!("/api/v1{}", path.replace("{id}", known).replace("{token}", known));
-        let request = Request::builder().method(method.to_uppercase().as_str()).uri(&address);
-        let request = request.header(header::CONTENT_TYPE, "application/json");
-        let answer = self.service.send(request.body(Body::from(body.to_string())).unwrap()).await;
+        let address = path.replace("{id}", known).replace("{token}", known);
+        let answer = self.request(method, &address, body).await;
         if answer.status.is_success() {
             *target = None;
         }

@@ -229,7 +229,8 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
     let answers = format!("{lab}/answers");
     for (body, status) in [
         (json!({"number": 1, "answer": "withdrawn"}), StatusCode::UNPROCESSABLE_ENTITY),
-        (json!({"number": 2, "answer": "first"}), StatusCode::CONFLICT),
+        (json!({"number": 0, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"number": 2, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 1, "answer": "first"}), StatusCode::OK),
         // Sent twice it counts once; another one does not replace it.
         (json!({"number": 1, "answer": "first"}), StatusCode::OK),
@@ -490,7 +491,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         (with_heel(4, &whole), "1, 2 or 3"),
         (json!({"walk": 1, "recording": whole}), "at least two times, or absent if heel_strike_column"),
         (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 0.2]}}), "none of the 1 strides"),
-        (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel strike (s) = 99"),
+        (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel strike (s) is 99"),
         (json!({"walk": 1, "recording": whole, "reading": {"channels": {"XX": "TA_L"}}}), "RF_L, TA_L, BF_L"),
         (json!({"walk": 1, "recording": whole, "reading": {"form": "opensim"}}), "endheader"),
         (json!({"walk": 1, "recording": whole, "reading": {"form": "c3d"}}), "form"),
