@@ -24,6 +24,11 @@ pub const CHANNELS: [&str; 6] = ["RF_L", "TA_L", "BF_L", "GAS_L", "RF_R", "BF_R"
 /// Number of points of a gait cycle: 0, 1, ..., 100 %.
 pub const CYCLE_POINTS: usize = 101;
 
+/// Highest lower edge of the band-pass, and highest edge of the envelope, Hz.
+const HIGHEST_LOW_HZ: f64 = 450.0;
+/// Highest upper edge of the band-pass, Hz: muscles have no activity above it.
+const HIGHEST_HZ: f64 = 1000.0;
+
 /// Settings of the filters. The order is that of one pass and edge; forward and backward pass together have twice the
 /// order.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -52,9 +57,10 @@ impl EmgSettings {
     /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self, rate_hz: f64) -> Result<(), ModelError> {
         let half = 0.5 * rate_hz;
-        ModelError::check_range("emg.band_low_hz", self.band_low_hz, 1.0, 0.9 * half)?;
-        ModelError::check_range("emg.band_high_hz", self.band_high_hz, self.band_low_hz + 1.0, 0.99 * half)?;
-        ModelError::check_range("emg.envelope_hz", self.envelope_hz, 0.5, 0.9 * half)?;
+        let (low, high) = ((0.9 * half).min(HIGHEST_LOW_HZ), (0.99 * half).min(HIGHEST_HZ));
+        ModelError::check_range("emg.band_low_hz", self.band_low_hz, 1.0, low)?;
+        ModelError::check_range("emg.band_high_hz", self.band_high_hz, self.band_low_hz + 1.0, high)?;
+        ModelError::check_range("emg.envelope_hz", self.envelope_hz, 0.5, low)?;
         ModelError::check_range("emg.order", self.order as f64, 2.0, 8.0)?;
         if self.order % 2 == 1 {
             return Err(ModelError::Unknown {

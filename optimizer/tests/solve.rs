@@ -186,7 +186,7 @@ fn warm_start_inconsistent_with_its_mesh_is_rejected_with_a_reason() {
     warm.mesh.ss1 += 1;
     let error = solve(&problem(""), Some(&warm), &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
     let message = error.unwrap_err().to_string();
-    assert!(message.contains(" variables, expected "), "{message}");
+    assert!(message.contains(" variables; the problem has "), "{message}");
 }
 
 #[test]

@@ -231,7 +231,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
     scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;
 
-    let no_gait = service.study(|new| (new.trial_budget, new.search_space) = (1, Some(without_gaits()))).await;
+    let no_gait = service.study(|new| (new.trial_budget, new.search_space) = (1, Some(without_gaits().into()))).await;
     service.wait_for(no_gait, &[StudyState::Finished]).await;
     let explain = format!("{api}/trials/{}/explanation", service.trials(no_gait).await[0].id);
     scene.one(done, "post /trials/{id}/explanation", &explain, json!({})).await;

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use axum::Router;
 use axum::body::Body;
 use axum::http::{Request, StatusCode, header};
 use gaitwright_http::openapi;
@@ -14,10 +15,12 @@ use gaitwright_tests::measured::{electromyogram, four_strides, motion};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::time::Duration;
 use tempfile::TempDir;
+use tower::ServiceExt;
 
 /// Bodies drawn for each operation.
-const DRAWS: usize = 15;
+const DRAWS: usize = 8;
 
 /// Operations that hardly ever succeed with a drawn body, because a value must be one of the record.
 const SELDOM_FIT: [&str; 1] = ["post /studies/{id}/suggestions"];
@@ -27,6 +30,8 @@ const MEMBER: &str = "a drawn member";
 
 struct Scene {
     service: Service,
+    /// One router for all requests: to build one takes longer than to answer.
+    router: Router,
     finished: StudyId,
     human: StudyId,
     script: StudyId,
@@ -45,13 +50,21 @@ impl Scene {
         let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 5000)).await;
         let converged = service.trials(finished).await.into_iter().filter(|trial| trial.gait_rmse_rad.is_some());
         let trials = converged.map(|trial| trial.id).collect();
-        (folder, Self { service, finished, human, script, trials, made: 0 })
+        let router = service.router();
+        (folder, Self { service, router, finished, human, script, trials, made: 0 })
     }
 
     async fn post(&self, path: &str, body: Value) -> Value {
-        let answer = self.service.post(&format!("/api/v1{path}"), &body).await;
+        let answer = self.request("post", path, &body).await;
         assert!(answer.status.is_success(), "{path}: {}", answer.text);
         answer.json()
+    }
+
+    async fn request(&self, method: &str, path: &str, body: &Value) -> Answer {
+        let request = Request::builder().method(method.to_uppercase().as_str()).uri(format!("/api/v1{path}"));
+        let request = request.header(header::CONTENT_TYPE, "application/json");
+        let request = request.body(Body::from(body.to_string())).unwrap();
+        Answer::of(self.router.clone().oneshot(request).await.unwrap()).await
     }
 
     async fn id_of(&self, path: &str, body: Value) -> String {
@@ -90,7 +103,7 @@ impl Scene {
         // An answer in an earlier session may have called either gait unsafe.
         for trial in &self.trials[..2] {
             let review = json!({"verdict": "walkable", "reason": "seen on the treadmill"});
-            let reviewed = self.service.post(&format!("/api/v1/trials/{trial}/safety-reviews"), &review).await;
+            let reviewed = self.request("post", &format!("/trials/{trial}/safety-reviews"), &review).await;
             assert!(reviewed.status.is_success() || reviewed.status == StatusCode::CONFLICT, "{}", reviewed.text);
         }
         let gaits = json!({"gait_one": self.trials[0], "gait_two": self.trials[1]});
@@ -105,9 +118,17 @@ impl Scene {
     async fn target(&mut self, path: &str) -> Option<String> {
         Some(match path {
             "/blind-pairs/{token}/answer" => {
-                self.service.wait_for(self.human, &[StudyState::Waiting, StudyState::Finished]).await;
-                let next = self.post(&format!("/studies/{}/blind-pairs/next", self.human), json!({})).await;
-                next["pair"]["token"].as_str()?.to_owned()
+                // After an answer, the study says that it waits until it has chosen the next comparison.
+                let mut token = None;
+                for _ in 0..100 {
+                    let next = self.post(&format!("/studies/{}/blind-pairs/next", self.human), json!({})).await;
+                    token = next["pair"]["token"].as_str().map(str::to_owned);
+                    if token.is_some() || self.service.get(self.human).await.state == StudyState::Finished {
+                        break;
+                    }
+                    tokio::time::sleep(Duration::from_millis(50)).await;
+                }
+                token?
             }
             "/studies/{id}/start" => self.study(false).await,
             "/studies/{id}/pause" | "/studies/{id}/stop" => self.study(true).await,
@@ -153,12 +174,18 @@ impl Scene {
         })
     }
 
-    async fn send(&mut self, method: &str, path: &str, body: &Value) -> Option<Answer> {
-        let target = self.target(path).await?;
-        let address = format!("/api/v1{}", path.replace("{id}", &target).replace("{token}", &target));
-        let request = Request::builder().method(method.to_uppercase().as_str()).uri(&address);
-        let request = request.header(header::CONTENT_TYPE, "application/json");
-        Some(self.service.send(request.body(Body::from(body.to_string())).unwrap()).await)
+    /// The answer to a body. A target that an operation refused to change serves the next body.
+    async fn send(&mut self, method: &str, path: &str, body: &Value, target: &mut Option<String>) -> Option<Answer> {
+        if target.is_none() {
+            *target = self.target(path).await;
+        }
+        let known = target.as_ref()?;
+        let address = path.replace("{id}", known).replace("{token}", known);
+        let answer = self.request(method, &address, body).await;
+        if answer.status.is_success() {
+            *target = None;
+        }
+        Some(answer)
     }
 }
 
@@ -243,10 +270,10 @@ async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
             }
             drawn.known = common.clone();
             drawn.known.extend(known_to(path, &scene.trials));
-            let before = accepted;
+            let (before, mut target) = (accepted, None);
             for _ in 0..DRAWS {
                 let body = drawn.body(schema);
-                let Some(answer) = scene.send(method, path, &body).await else { break };
+                let Some(answer) = scene.send(method, path, &body, &mut target).await else { break };
                 let state = [StatusCode::CONFLICT, StatusCode::NOT_FOUND].contains(&answer.status);
                 let field = serde_json::from_str::<Value>(&answer.text).unwrap_or_default()["field"].clone();
                 let in_words = answer.status == StatusCode::UNPROCESSABLE_ENTITY
@@ -261,7 +288,7 @@ async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
             }
             let mut statuses = Vec::new();
             for (why, body) in drawn.beyond(schema) {
-                let Some(answer) = scene.send(method, path, &body).await else { break };
+                let Some(answer) = scene.send(method, path, &body, &mut target).await else { break };
                 if [StatusCode::BAD_REQUEST, StatusCode::UNPROCESSABLE_ENTITY].contains(&answer.status) {
                     refused += 1;
                 } else {
@@ -278,6 +305,6 @@ async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
     never.retain(|operation| !SELDOM_FIT.contains(&operation.as_str()));
     assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
     assert!(never.is_empty(), "no drawn body was accepted by {never:?}");
-    assert!(accepted > 400 && refused > 150, "{accepted} accepted, {refused} refused");
+    assert!(accepted > 200 && refused > 150, "{accepted} accepted, {refused} refused");
     scene.service.stop().await;
 }

@@ -65,7 +65,7 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let explainer = Clearance::slow(Duration::from_millis(100));
     let service = Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (8, Some(with_few_gaits()))).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (8, Some(with_few_gaits().into()))).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = without_gait(&service, study).await;
     assert!(trials.len() > 2);
@@ -107,7 +107,7 @@ async fn an_explanation_is_made_once_for_whoever_asks() {
     let (explainer, solver) = (Clearance::default(), Analytic::slow(Duration::from_millis(20)));
     let counts = explainer.counts.clone();
     let service = Service::start_explaining(&folder.path().join("a.db"), solver, explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(with_few_gaits()))).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(with_few_gaits().into()))).await;
     until("a trial has no gait", async || !without_gait(&service, study).await.is_empty()).await;
     let trial = without_gait(&service, study).await[0].id;
     assert_eq!(service.fetch(&address(trial)).await.status, StatusCode::NOT_FOUND, "nobody asked");
@@ -169,7 +169,7 @@ async fn requested_explanation_is_made_after_a_restart() {
     let counts = explainer.counts.clone();
     let solver = Analytic::slow(Duration::from_millis(5));
     let service = Service::start_explaining(&database, solver, explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(without_gaits()))).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(without_gaits().into()))).await;
     service.wait_for_trials(study, 2).await;
     service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
     let trials = without_gait(&service, study).await;
@@ -197,7 +197,7 @@ async fn withdrawal_stops_explanations() {
     let explainer = Clearance::slow(FOR_EVER);
     let counts = explainer.counts.clone();
     let service = Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits()))).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits().into()))).await;
     until("one is begun", async || counts.begun.load(Ordering::SeqCst) == 1).await;
     let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
     assert_eq!(service.post(&withdraw, &json!({"reason": "moved away"})).await.status, StatusCode::OK);
@@ -218,7 +218,7 @@ async fn refused_explanation_states_its_reason_and_is_not_retried() {
     let explainer = Clearance { panics: true, ..Clearance::default() };
     let counts = explainer.counts.clone();
     let service = Service::start_explaining(&database, Analytic::default(), explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (2, Some(without_gaits()))).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (2, Some(without_gaits().into()))).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await[1].id;
     until("it is refused", async || service.fetch(&address(trial)).await.status == StatusCode::CONFLICT).await;

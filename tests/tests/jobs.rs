@@ -28,7 +28,7 @@ async fn service() -> (TempDir, Service, StudyId, Clearance) {
     let certifier = Verdicts { pause: Duration::from_millis(300), passes: |_: &Gait| true };
     let solver = Analytic::slow(Duration::from_millis(10));
     let service = Service::start_looking_back(&folder.path().join("a.db"), solver, certifier, explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits()))).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits().into()))).await;
     (folder, service, study, watched)
 }
 
@@ -106,7 +106,7 @@ async fn a_certificate_that_was_requested_is_made_after_a_restart_unless_it_was_
     let solver = || Analytic::slow(Duration::from_millis(10));
     let slow = certifier(Duration::from_mins(10));
     let service = Service::start_looking_back(&database, solver(), slow, Clearance::default()).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits()))).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits().into()))).await;
     let mut converged = Vec::new();
     while converged.len() < 2 {
         tokio::time::sleep(Duration::from_millis(5)).await;

@@ -229,7 +229,8 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
     let answers = format!("{lab}/answers");
     for (body, status) in [
         (json!({"number": 1, "answer": "withdrawn"}), StatusCode::UNPROCESSABLE_ENTITY),
-        (json!({"number": 2, "answer": "first"}), StatusCode::CONFLICT),
+        (json!({"number": 0, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"number": 2, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 1, "answer": "first"}), StatusCode::OK),
         // Sent twice it counts once; another one does not replace it.
         (json!({"number": 1, "answer": "first"}), StatusCode::OK),
@@ -442,7 +443,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
     let refused = service.post(&format!("{api}/emg-results"), &json!({"settings": {"band_high_hz": 500.0}})).await;
     assert_eq!(
         (refused.status, &refused.json()["field"]),
-        (StatusCode::UNPROCESSABLE_ENTITY, &json!("emg.band_high_hz"))
+        (StatusCode::UNPROCESSABLE_ENTITY, &json!("settings.band_high_hz"))
     );
     let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
     assert!(page.contains("EMG, left tibialis anterior") && page.contains("low-pass 3 Hz, order 2"), "{page}");

@@ -7,9 +7,10 @@
 
 use axum::http::StatusCode;
 use gaitwright_http::openapi;
+use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
-use gaitwright_store::{StudyId, TrialId, lab_sessions};
+use gaitwright_store::{StudyId, TrialId, lab_sessions, presentations};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::sources;
@@ -26,6 +27,8 @@ enum Door {
     Preference,
     /// A note that two gaits cannot be told apart: it skips the pair.
     Note,
+    /// Bounds that would have been better than a trial: a preference for the gait of these bounds.
+    Suggestion,
     /// A rater's answer to a pair that the service drew.
     RaterAnswer,
     /// Showing a rater a pair.
@@ -71,7 +74,7 @@ const RETRACTS: Door = Door::None("takes something back");
 const RUNS: Door = Door::None("runs solves or certifications; no person is asked");
 const SETS_UP: Door = Door::None("sets up subjects, devices, references, users or the service");
 
-/// Every operation that changes something or hands something to a device or a person. Reading is the default for GET.
+/// What an operation leads to. Nothing is the default: an operation that is not named here or in a file has no door.
 fn door_of(operation: &str) -> Option<Door> {
     Some(match operation {
         "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => Door::Preference,
@@ -86,9 +89,7 @@ fn door_of(operation: &str) -> Option<Door> {
         "get /api/v1/studies/{id}/recommendation" | "get /api/v1/studies/{id}/recommendation.csv" => {
             Door::Recommendation
         }
-        "post /api/v1/studies/{id}/suggestions" => {
-            Door::None("says which bounds would have been better than a trial: nobody is asked to walk with that one")
-        }
+        "post /api/v1/studies/{id}/suggestions" => Door::Suggestion,
         "post /api/v1/trials/{id}/safety-reports" | "post /trials/{id}/safety-report" => {
             Door::None("closes a gait; `safety_review.rs` holds its rules")
         }
@@ -104,7 +105,7 @@ fn door_of(operation: &str) -> Option<Door> {
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
             Door::None("the lab evaluates a trial by itself; figures, and no person's answer")
         }
-        _ if operation.starts_with("get ") => READS,
+        _ if operation.starts_with("get ") => return reads(operation),
         _ if [
             "/certif",
             "/explain",
@@ -122,6 +123,13 @@ fn door_of(operation: &str) -> Option<Door> {
         }
         _ => return set_up(operation),
     })
+}
+
+/// GETs that hand out nothing to walk with, each by name.
+const READ: &str = include_str!("one_door/reads.txt");
+
+fn reads(operation: &str) -> Option<Door> {
+    READ.lines().any(|line| line == operation).then_some(READS)
 }
 
 /// Operations that set something up, each by name.
@@ -266,6 +274,12 @@ async fn knock(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session
             let body = json!({"first": a, "second": b, "answer": "cannot_tell", "author": "K"});
             service.post(&format!("/api/v1/studies/{study}/assessments"), &body).await
         }
+        "post /api/v1/studies/{id}/suggestions" => {
+            let trials = service.trials(study).await;
+            let bounds = trials.iter().find(|trial| trial.id == b).unwrap().action;
+            let body = json!({"over": a, "bounds": bounds, "author": "K"});
+            service.post(&format!("/api/v1/studies/{study}/suggestions"), &body).await
+        }
         "post /api/v1/studies/{id}/lab-sessions" => {
             service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &json!({"gait_one": a, "gait_two": b})).await
         }
@@ -306,6 +320,21 @@ fn expected(door: Door, rule: Rule) -> Result<(), &'static str> {
 fn every_route_is_classified() {
     let unknown: Vec<String> = operations().into_iter().filter(|operation| door_of(operation).is_none()).collect();
     assert!(unknown.is_empty(), "say in tests/tests/one_door.rs what these lead to:\n{}", unknown.join("\n"));
+}
+
+#[test]
+fn unknown_get_is_a_door_until_it_is_classified() {
+    for new in ["get /api/v1/trials/{id}/controller.bin", "get /lab/{id}/walk.json", "get /api/v1/studies/{id}/best"] {
+        assert_eq!(door_of(new), None, "{new}");
+    }
+    let known = operations();
+    for line in READ.lines() {
+        assert!(known.iter().any(|operation| operation == line), "{line} is no operation");
+        assert!(
+            !line.contains("controller") && !line.contains("recommendation"),
+            "{line} hands out a gait to walk with"
+        );
+    }
 }
 
 /// What each command has to do with people and devices.
@@ -352,10 +381,19 @@ async fn every_door_is_closed_by_every_rule() {
         .into_iter()
         .filter_map(|operation| door_of(&operation).map(|door| (operation, door)))
         .filter(|(_, door)| {
-            matches!(door, Door::Preference | Door::Note | Door::Plan | Door::Walk | Door::DeviceFile | Door::WalkFile)
+            matches!(
+                door,
+                Door::Preference
+                    | Door::Note
+                    | Door::Suggestion
+                    | Door::Plan
+                    | Door::Walk
+                    | Door::DeviceFile
+                    | Door::WalkFile
+            )
         })
         .collect();
-    assert!(doors.len() >= 9, "{doors:?}");
+    assert!(doors.len() >= 10, "{doors:?}");
     let mut matrix = Vec::new();
     for (operation, door) in &doors {
         // Without a broken rule the door is open: a refusal for another reason proves nothing.
@@ -469,6 +507,53 @@ impl Rated {
             }
             other => panic!("{other:?} is not for raters"),
         }
+    }
+}
+
+#[tokio::test]
+async fn person_who_answered_a_pair_elsewhere_does_not_answer_it_blind_and_the_other_way_round() {
+    for blind_first in [true, false] {
+        let scene = Rated::new().await;
+        let token = scene.token().await;
+        let shown = presentations::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
+        let (a, b) = shown[0].pair();
+        let blind = format!("/api/v1/blind-pairs/{token}/answer");
+        let open = format!("/api/v1/studies/{}/preferences", scene.study);
+        let (said, chosen) = (json!({"answer": "first"}), json!({"trial_a": b, "trial_b": a, "answer": "a"}));
+        let (first, second) =
+            if blind_first { ((&blind, &said), (&open, &chosen)) } else { ((&open, &chosen), (&blind, &said)) };
+        let given = scene.service.post(first.0, first.1).await;
+        assert!(given.status.is_success(), "{}", given.text);
+        let heard = scene.service.feedback(scene.study).await.len();
+        let refused = scene.service.post(second.0, second.1).await;
+        assert_eq!(refused.status, StatusCode::CONFLICT, "{}: {}", second.0, refused.text);
+        assert!(refused.text.contains("has already answered this comparison"), "{}", refused.text);
+        // Nor through the form, nor as a note or a suggestion.
+        let form = format!(
+            "a={a}&b={b}&answer=b&source=clinician&author={}&note=&key=01890000-0000-7000-8000-000000000008",
+            shown[0].rater
+        );
+        let page = scene.service.post_text(&format!("/studies/{}/compare", scene.study), FORM, &form).await;
+        assert!(!page.status.is_server_error(), "{}", page.text);
+        let note = json!({"first": a, "second": b, "answer": "cannot_tell"});
+        let noted = scene.service.post(&format!("/api/v1/studies/{}/assessments", scene.study), &note).await;
+        assert_eq!(noted.status, StatusCode::CONFLICT, "{}", noted.text);
+        let bounds = scene.service.trials(scene.study).await.into_iter().find(|trial| trial.id == a).unwrap().action;
+        let suggested = json!({"over": b, "bounds": bounds});
+        let suggested = scene.service.post(&format!("/api/v1/studies/{}/suggestions", scene.study), &suggested).await;
+        assert_eq!(suggested.status, StatusCode::CONFLICT, "{}", suggested.text);
+        let rows = scene.service.feedback(scene.study).await;
+        let of_people = |from: usize| {
+            rows[from..]
+                .iter()
+                .filter(|row| row.source != Source::Convergence && row.source != Source::GaitRmse)
+                .count()
+        };
+        assert_eq!(of_people(heard), 0, "blind first: {blind_first}");
+        let next =
+            scene.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", scene.study), &json!({})).await.json();
+        assert_ne!(next["pair"]["token"], json!(token), "the pair is not shown again");
+        scene.service.stop().await;
     }
 }
 

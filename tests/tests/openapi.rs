@@ -243,7 +243,8 @@ impl Description {
                 let properties = part["properties"].as_object().into_iter().flatten();
                 let mut tags =
                     properties.filter(|(_, field)| field["enum"].as_array().is_some_and(|all| all.len() == 1));
-                tags.all(|(name, field)| field["enum"][0] == value[name])
+                let is_kind = part["type"].is_null() || (part["type"] == "object") == value.is_object();
+                is_kind && tags.all(|(name, field)| field["enum"][0] == value[name])
             };
             let rest: Vec<&Value> = parts.iter().filter(|part| !null(part)).filter(meant).collect();
             let [one] = rest[..] else { panic!("{place} can have several shapes: {rest:?}") };

@@ -41,7 +41,7 @@ async fn a_study_without_a_gait_has_no_best_trial() {
     let space = json!({"dimensions": [{"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0}]});
     let space: SearchSpace = serde_json::from_value(space).unwrap();
     let plan = |new: &mut NewStudy| {
-        (new.base_bounds, new.search_space, new.trial_budget) = (without_gait, Some(space.clone()), 2);
+        (new.base_bounds, new.search_space, new.trial_budget) = (without_gait, Some(space.clone().into()), 2);
     };
     let study = service.study(plan).await;
     service.wait_for(study, &[StudyState::Finished]).await;

@@ -6,6 +6,7 @@ use axum::http::StatusCode;
 use gait_learner::{ActionIndex, Feedback};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, backup, studies};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
@@ -62,6 +63,59 @@ async fn the_learner_hears_a_suggestion_until_it_is_taken_back() {
     assert_eq!(service.post(&retract, &json!({"reason": "mistyped"})).await.status, StatusCode::OK);
     assert_eq!(heard(&service, study).await, before);
     assert_eq!(service.fetch(&path).await.items()[0]["retraction"]["reason"], "mistyped");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn suggestion_counts_once_for_each_person_and_not_against_their_own_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let mut gaits = service.trials(study).await;
+    gaits.retain(|trial| trial.state.as_str() == "converged");
+    let (one, two, three) = (&gaits[0], &gaits[1], &gaits[2]);
+    let suggest = async |over: &Trial, bounds: &Trial, author: &str| {
+        let body = json!({"over": over.id, "bounds": bounds.action, "author": author});
+        service.post(&format!("/api/v1/studies/{study}/suggestions"), &body).await
+    };
+    let prefer = async |author: &str| {
+        let body = json!({"trial_a": one.id, "trial_b": two.id, "answer": "a", "author": author});
+        service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await
+    };
+    let (created, conflict) = (StatusCode::CREATED, StatusCode::CONFLICT);
+    let first = suggest(one, two, "ann").await;
+    assert_eq!(first.status, created, "{}", first.text);
+    assert_eq!(suggest(one, two, " Ann ").await.status, conflict, "the same again");
+    assert_eq!(suggest(two, one, "ann").await.status, conflict, "the contrary");
+    assert_eq!(prefer("ann").await.status, conflict, "the contrary as a preference");
+    assert_eq!(suggest(one, three, "ann").await.status, created, "another comparison");
+    assert_eq!(suggest(one, two, "ben").await.status, created, "another person");
+    let retract = format!("/api/v1/preferences/{}/retract", first.json()["id"].as_str().unwrap());
+    assert_eq!(service.post(&retract, &json!({"reason": "mistyped"})).await.status, StatusCode::OK);
+    assert_eq!(prefer("ann").await.status, created);
+    assert_eq!(suggest(one, two, "ann").await.status, conflict, "against the own preference");
+
+    // Bounds that no trial had.
+    let space = service.get(study).await.plan.search_space;
+    let untried =
+        (0..space.len()).map(ActionIndex).find(|action| gaits.iter().all(|trial| trial.action_index != *action));
+    let names = space.dimensions().iter().map(|dimension| dimension.name.clone());
+    let bounds: serde_json::Map<_, _> =
+        names.zip(space.values(untried.unwrap()).into_iter().map(|v| json!(v))).collect();
+    let untried = json!({"over": two.id, "bounds": bounds, "author": "ann"});
+    for status in [created, conflict] {
+        let given = service.post(&format!("/api/v1/studies/{study}/suggestions"), &untried).await;
+        assert_eq!(given.status, status, "{}", given.text);
+    }
+
+    let report = json!({"first": three.id, "second": two.id, "answer": "unsafe_first", "author": "S"});
+    assert_eq!(service.post(&format!("/api/v1/studies/{study}/assessments"), &report).await.status, created);
+    for (over, bounds) in [(three, two), (two, three)] {
+        let refused = suggest(over, bounds, "cleo").await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+        assert!(refused.text.contains("reported as unsafe"), "{}", refused.text);
+    }
     service.stop().await;
 }
 

@@ -297,7 +297,7 @@ async fn equal_gaits_are_never_offered_for_comparison() {
         .study(|new| {
             // A bound that changes nothing: every trial that starts from the first gait gives one and the same gait.
             let acceleration = Dimension { name: "a2".to_owned(), values: vec![70.0, 80.0, 90.0], lengthscale: 10.0 };
-            new.search_space = Some(SearchSpace::new(vec![acceleration]).unwrap());
+            new.search_space = Some(SearchSpace::new(vec![acceleration]).unwrap().into());
             new.learner = LearnerSettings { partner: Partner::Previous, buffer: 1, ..LearnerSettings::default() };
             (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human);
         })

@@ -7,8 +7,13 @@ const GAIT: &str = "A trial of this study with a walkable gait: converged, certi
                     a comparison have different gaits.";
 const GAIT_OF_STUDY: &str =
     "A converged trial of this study. For `cannot_tell`, its gait is walkable. The two trials have different gaits.";
-const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more. The values of a dimension increase, each within the range of its bound; \
-                      its lengthscale lies between a hundredth of their smallest step and 10,000 times their range.";
+const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more.";
+const SPACE: &str = "Each bound has one dimension or none. Its values increase, each within the range of the bound. Its lengthscale lies \
+                     between a hundredth of their smallest step and 10,000 times their range. The smallest a4 exceeds the largest \
+                     a3 by 0.001 or more.";
+const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noises and `tie_width` are 1e-3 to 1e3 times, and the threshold is \
+                       at most 10 times its square root. `additive_share` and `pairwise_share` add up to at most 1. \
+                       `expectation_propagation` needs the link `probit`.";
 const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
 const EMG_FILE: &str = "A file of the given form with the columns of the muscles, sampled at 100 Hz or more, with one whole stride or more. \
@@ -19,26 +24,27 @@ const REFERENCE_FILE: &str = "A file of the given form, with its columns, as opt
                               least one whole stride of a walking person. It has all columns and heel strikes that the request names.";
 
 /// Component, field, and the rule.
-const RULES: [(&str, &str, &str); 26] = [
+const RULES: [(&str, &str, &str); 27] = [
     ("NewPreference", "trial_a", GAIT),
     ("NewPreference", "trial_b", GAIT),
     ("NewAssessment", "first", GAIT_OF_STUDY),
     ("NewAssessment", "second", GAIT_OF_STUDY),
     ("NewSession", "gait_one", GAIT),
     ("NewSession", "gait_two", GAIT),
-    ("Suggestion", "over", "A converged trial of this study."),
+    ("Suggestion", "over", "A trial of this study with a walkable gait."),
     (
         "Suggestion",
         "bounds",
-        "Dimensions of the study's search space, each with one of its values. At least one value differs from that of the trial.",
+        "Dimensions of the study's search space, each with one of its values. At least one value differs from that of the trial. \
+         A trial that had these bounds has a different gait, which is walkable.",
     ),
     ("NewStudy", "subject_id", EXISTS),
     ("NewStudy", "device_id", EXISTS),
     ("NewStudy", "reference_gait_id", EXISTS),
     ("NewStudy", "base_bounds", BOUNDS),
-    ("NewStudy", "search_space", BOUNDS),
+    ("NewStudy", "search_space", SPACE),
     ("NewStudy", "gait_settings", LIMITS),
-    ("NewStudy", "learner", "One ordinal threshold fewer than there are categories; thresholds increase."),
+    ("NewStudy", "learner", LEARNER),
     (
         "Extend",
         "trial_budget",
@@ -57,7 +63,12 @@ const RULES: [(&str, &str, &str); 26] = [
     ("NewMotion", "recording", MOTION_FILE),
     ("NewMotion", "reading", "`cutoff_hz` is at most 0.45 of the sampling rate."),
     ("NewReferenceGait", "recording", REFERENCE_FILE),
-    ("Processing", "settings", "`band_low_hz` is smaller than `band_high_hz`; all are below half the sampling rate."),
+    (
+        "Processing",
+        "settings",
+        "`band_high_hz` exceeds `band_low_hz` by 1 or more. It is at most 0.495 times the sampling rate; the others, 0.45 times.",
+    ),
+    ("NewLabAnswer", "number", "At most the number of the current question."),
 ];
 
 /// Adds the rules to the fields.

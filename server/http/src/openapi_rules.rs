@@ -6,9 +6,9 @@
 
 use super::openapi_depends;
 use gait_learner::LearnerSettings;
-use gait_optimizer::emg::CHANNELS;
+use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
-use gait_optimizer::{Device, GaitSettings, SolveOptions, Subject, TunedBounds};
+use gait_optimizer::{BasinChoice, Device, GaitSettings, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::document;
 use gaitwright_service::error::Error;
@@ -103,12 +103,10 @@ pub(super) fn state(document: &mut Value) {
         for component in ["NewReferenceGait", "NewEmg", "NewMotion"] {
             add(schemas, component, "recording", &json!({ "minLength": 1 }));
         }
+        add(schemas, "NewReferenceGait", "form", &json!({ "default": "opensim" }));
         add(schemas, "EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
         add(schemas, "MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
-        for (field, least) in [("band_low_hz", 1.0), ("band_high_hz", 2.0), ("envelope_hz", 0.5)] {
-            add(schemas, "EmgSettings", field, &json!({ "minimum": least }));
-        }
-        add(schemas, "EmgSettings", "order", &json!({ "enum": [2, 4, 6, 8, null] }));
+        state_emg(schemas);
         let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });
         add(schemas, "Suggestion", "bounds", &bounds);
         for (field, (least, most)) in
@@ -123,25 +121,23 @@ pub(super) fn state(document: &mut Value) {
         add(schemas, "NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
         add(schemas, "NewStudy", "priority", &json!({ "minimum": -10, "maximum": 10 }));
         add(schemas, "NewStudy", "solve_seconds_budget", &json!({ "minimum": 1, "maximum": 1e8 }));
-        for (name, (least, most)) in TunedBounds::NAMES.iter().zip(TunedBounds::RANGES) {
-            add(schemas, "Bounds", name, &json!({ "minimum": least, "maximum": most }));
-        }
         add(schemas, "Dimension", "name", &json!({ "enum": TunedBounds::NAMES }));
-        add(schemas, "Dimension", "values", &json!({ "minItems": 1, "maxItems": 1000, "uniqueItems": true }));
-        if let Some(bounds) = schemas.get_mut("Bounds").and_then(Value::as_object_mut) {
-            bounds.insert("additionalProperties".to_owned(), json!(false));
-        }
+        let (least, most) =
+            TunedBounds::RANGES.iter().fold((f64::MAX, 0.0_f64), |all, own| (all.0.min(own.0), all.1.max(own.1)));
+        let item = json!({ "type": "number", "format": "double", "minimum": least, "maximum": most });
+        let values = json!({ "minItems": 1, "maxItems": 1000, "uniqueItems": true, "items": item });
+        add(schemas, "Dimension", "values", &values);
+        add(schemas, "Dimension", "lengthscale", &json!({ "minimum": 1e-15, "maximum": 1e15 }));
+        add(schemas, "SearchSpace", "dimensions", &json!({ "minItems": 1, "maxItems": TunedBounds::NAMES.len() }));
+        state_bounds(schemas);
         let mut gait = settings(GaitSettings::default(), |s: &GaitSettings| s.validate().err().map(Error::from));
         if let Some(muscles) = gait.pointer_mut("/properties/muscles") {
             *muscles = json!({ "$ref": format!("{SCHEMAS}MuscleParameters") });
         }
-        let solve = settings(SolveOptions::default(), |s: &SolveOptions| s.validate().err().map(Error::from));
-        let learner =
-            settings(LearnerSettings::default(), |s: &LearnerSettings| s.validate().err().map(Error::Learner));
         for (name, schema) in [
             ("GaitSettings", gait),
-            ("SolveOptions", solve),
-            ("LearnerSettings", learner),
+            ("SolveOptions", solve_options()),
+            ("LearnerSettings", learner()),
             ("MuscleParameters", muscles()),
             ("DeviceDefinition", device(&one_line)),
         ] {
@@ -158,6 +154,109 @@ pub(super) fn state(document: &mut Value) {
                 state_parameter(parameter);
             }
         }
+    }
+}
+
+/// The ranges of the bounds, and a second schema for requests, where each bound has a default.
+fn state_bounds(schemas: &mut Map<String, Value>) {
+    for (name, (least, most)) in TunedBounds::NAMES.iter().zip(TunedBounds::RANGES) {
+        add(schemas, "Bounds", name, &json!({ "minimum": least, "maximum": most }));
+    }
+    let Some(bounds) = schemas.get_mut("Bounds").and_then(Value::as_object_mut) else { return };
+    bounds.insert("additionalProperties".to_owned(), json!(false));
+    let mut given = bounds.clone();
+    given.remove("required");
+    given.insert("description".to_owned(), json!("Values of bounds. Absent bounds have their defaults."));
+    schemas.insert("BaseBounds".to_owned(), Value::Object(given));
+    for (name, usual) in TunedBounds::NAMES.iter().zip(TunedBounds::default().to_array()) {
+        add(schemas, "BaseBounds", name, &json!({ "default": usual }));
+    }
+    set(schemas, "NewStudy", "base_bounds", json!({ "$ref": format!("{SCHEMAS}BaseBounds") }));
+}
+
+/// The ranges of EMG settings at the highest sampling rate; that of a file can narrow them.
+fn state_emg(schemas: &mut Map<String, Value>) {
+    // The widest range of the upper edge belongs to the lowest lower edge.
+    let widest = EmgSettings { band_low_hz: 1.0, ..EmgSettings::default() };
+    let found = settings(widest, |s: &EmgSettings| s.validate(1e6).err().map(Error::from));
+    for (field, rule) in found["properties"].as_object().into_iter().flatten() {
+        add(schemas, "EmgSettings", field, rule);
+    }
+    for (field, usual) in
+        serde_json::to_value(EmgSettings::default()).unwrap_or_default().as_object().into_iter().flatten()
+    {
+        add(schemas, "EmgSettings", field, &json!({ "default": usual }));
+    }
+    set(schemas, "EmgSettings", "order", json!({ "type": "integer", "enum": [2, 4, 6, 8], "default": 4 }));
+    if let Some(settings) = schemas.get_mut("EmgSettings").and_then(Value::as_object_mut) {
+        settings.insert("additionalProperties".to_owned(), json!(false));
+    }
+}
+
+/// The schema of the options of a solve. The choice of a gait is a word, or an object with a percentage.
+fn solve_options() -> Value {
+    let of = |options: SolveOptions| settings(options, |s: &SolveOptions| s.validate().err().map(Error::from));
+    let mut schema = of(SolveOptions::default());
+    let nearest = BasinChoice::NearestToReference { within_percent: 0.0 };
+    let mut object =
+        of(SolveOptions { basin_choice: nearest, ..SolveOptions::default() })["properties"]["basin_choice"].take();
+    object["required"] = json!(["nearest_to_reference"]);
+    object["properties"]["nearest_to_reference"]["required"] = json!(["within_percent"]);
+    let word = json!({ "type": "string", "enum": [BasinChoice::LowestObjective] });
+    schema["properties"]["basin_choice"] = json!({ "oneOf": [word, object] });
+    schema
+}
+
+/// The schema of the settings of the learner. Noises and thresholds have ranges in proportion to the signal: stated are
+/// the widest ones, and `x-depends` has the rule.
+fn learner() -> Value {
+    let usual = LearnerSettings::default();
+    let with = |signal_variance: f64| {
+        let share = signal_variance / usual.signal_variance;
+        let deviation = share.sqrt();
+        let scaled = LearnerSettings {
+            signal_variance,
+            nugget: usual.nugget * share,
+            preference_noise: usual.preference_noise * deviation,
+            ordinal_noise: usual.ordinal_noise * deviation,
+            coactive_noise: usual.coactive_noise * deviation,
+            tie_noise: usual.tie_noise * deviation,
+            tie_width: usual.tie_width * deviation,
+            ordinal_thresholds: usual.ordinal_thresholds.iter().map(|threshold| threshold * deviation).collect(),
+            ..usual.clone()
+        };
+        settings(scaled, |s: &LearnerSettings| s.validate().err().map(Error::Learner))
+    };
+    let mut schema = with(usual.signal_variance);
+    let (least, most) = (
+        schema["properties"]["signal_variance"]["minimum"].as_f64(),
+        schema["properties"]["signal_variance"]["maximum"].as_f64(),
+    );
+    for end in [least, most].into_iter().flatten() {
+        widen(&mut schema, &with(end));
+    }
+    let thresholds = &mut schema["properties"]["ordinal_thresholds"];
+    (thresholds["minItems"], thresholds["maxItems"]) = (json!(1), json!(1));
+    schema
+}
+
+/// Widens every range of a schema to that of another one of the same shape.
+fn widen(schema: &mut Value, other: &Value) {
+    match (schema, other) {
+        (Value::Object(fields), Value::Object(others)) => {
+            for (name, other) in others {
+                let Some(own) = fields.get_mut(name) else { continue };
+                match (name.as_str(), own.as_f64(), other.as_f64()) {
+                    ("minimum", Some(least), Some(than)) if than < least => *own = other.clone(),
+                    ("maximum", Some(most), Some(than)) if than > most => *own = other.clone(),
+                    _ => widen(own, other),
+                }
+            }
+        }
+        (Value::Array(items), Value::Array(others)) => {
+            items.iter_mut().zip(others).for_each(|(own, other)| widen(own, other))
+        }
+        _ => {}
     }
 }
 
@@ -350,16 +449,16 @@ fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Val
     schema
 }
 
-/// The range in an error: `0.1 to 5` of a field, or `between 0.1 and 5` of a learner setting.
+/// The range in an error: `0.1 to 5` of a field, or `must be 0.1 to 5` of a learner setting.
 fn range_in(error: &Error) -> Option<(f64, f64)> {
     if let Error::Invalid(field) | Error::Unreadable(field) = error {
         let (least, most) = field.allowed.as_deref()?.split_once(" to ")?;
         return Some((least.trim().parse().ok()?, most.trim().parse().ok()?));
     }
     let text = error.to_string();
-    let (least, most) = text.split_once("between ")?.1.split_once(" and ")?;
+    let (least, most) = text.split_once("must be ")?.1.split_once(" to ")?;
     let most: String = most.chars().take_while(|c| c.is_ascii_digit() || "+-.e".contains(*c)).collect();
-    Some((least.trim().parse().ok()?, most.parse().ok()?))
+    Some((least.trim().parse().ok()?, most.trim_end_matches('.').parse().ok()?))
 }
 
 /// The allowed words in an error: `a, b, c` or `a or b`.

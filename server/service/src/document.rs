@@ -298,7 +298,7 @@ mod tests {
                 r#"{"limits": {"friction": 1e999}}"#,
                 "The field limits.friction is not JSON: number out of range (line 1, column 29).",
             ),
-            ("{} {}", "There is text after the JSON document: trailing characters at line 1 column 4"),
+            ("{} {}", "There is text after the JSON document: trailing characters at line 1 column 4."),
             ("{", "The text is not JSON: EOF while parsing an object (line 1, column 1)."),
             (r#"{"mesh": {"ds2": 3, "ds2": 4}}"#, "The field mesh.ds2 occurs twice (line 1, column 25)."),
             (

@@ -31,6 +31,34 @@ impl FieldError {
     }
 }
 
+impl FieldError {
+    /// The refusal with the path that the field has in a request: `to` in place of the prefix `from`.
+    #[must_use]
+    pub fn renamed(self, from: &str, to: &str) -> Self {
+        let Some(name) = self.field.strip_prefix(from) else { return self };
+        let field = format!("{to}{name}");
+        let message = self.message.strip_prefix(&self.field).map(|rest| format!("{field}{rest}"));
+        Self { message: message.unwrap_or_else(|| self.message.clone()), field, ..self }
+    }
+
+    /// The refusal of a field that is part of another one, with its whole path.
+    #[must_use]
+    pub fn within(self, part: &str) -> Self {
+        let field = format!("{part}.{}", self.field);
+        let message = match self.message.strip_prefix(&self.field) {
+            Some(rest) => format!("{field}{rest}"),
+            None => format!("{part}: {}", self.message),
+        };
+        Self { field, message, ..self }
+    }
+}
+
+impl From<FieldError> for Error {
+    fn from(error: FieldError) -> Self {
+        Self::Invalid(Box::new(error))
+    }
+}
+
 impl From<ModelError> for FieldError {
     fn from(error: ModelError) -> Self {
         let message = error.to_string();
@@ -41,7 +69,11 @@ impl From<ModelError> for FieldError {
             ModelError::Unknown { field, value, known } => {
                 Self { field, value: Some(value.into()), allowed: Some(known), message }
             }
-            ModelError::Malformed { what, .. } => Self { field: what, value: None, allowed: None, message },
+            ModelError::Malformed { what, .. } => {
+                // The message has line and column of a file; the field is that of the request.
+                let field = what.split_once(", line ").map_or(what.as_str(), |(field, _)| field).to_owned();
+                Self { field, value: None, allowed: None, message }
+            }
         }
     }
 }

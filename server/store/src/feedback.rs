@@ -330,6 +330,31 @@ pub async fn authors_of_pair(
     rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get("author")?))).collect()
 }
 
+/// The authors of suggestions that prefer one of two actions of a study to the other, newest first, without retracted
+/// ones.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn suggestions_between(
+    db: &mut Connection,
+    study: StudyId,
+    (one, other): (ActionIndex, ActionIndex),
+) -> StoreResult<Vec<(FeedbackId, String)>> {
+    let [one, other] = [one, other].map(|action| i64::try_from(action.0).unwrap_or(i64::MAX));
+    let rows = sqlx::query(
+        "select f.id, f.author from feedback f join trials t on t.id = f.trial_a \
+         where f.study_id = ?1 and f.kind = 'suggestion' \
+         and ((f.suggested = ?2 and t.action_index = ?3) or (f.suggested = ?3 and t.action_index = ?2)) \
+         and not exists (select 1 from retractions r where r.feedback_seq = f.seq) order by f.seq desc",
+    )
+    .bind(study)
+    .bind(one)
+    .bind(other)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get("author")?))).collect()
+}
+
 /// The version of the feedback log of a study, which changes with every entry and every retraction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LogVersion {

@@ -313,6 +313,17 @@ pub(super) const SELECT: &str = "select p.*, iif(r.presentation_id is null, a.an
                       left join presentation_answers a on a.presentation_id = p.id \
                       left join presentation_retractions r on r.presentation_id = p.id ";
 
+/// The presentations of two trials in either order, in the order of the draws.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_pair(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<Vec<Presentation>> {
+    let pair = "(p.shown_first = ?1 and p.shown_second = ?2) or (p.shown_first = ?2 and p.shown_second = ?1)";
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where {pair} order by p.id"));
+    let rows = sqlx::query(sql).bind(a).bind(b).fetch_all(db).await?;
+    rows.iter().map(Presentation::from_row).collect()
+}
+
 /// Every presentation of a study, in the order of the draws.
 ///
 /// # Errors

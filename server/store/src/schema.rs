@@ -517,11 +517,15 @@ pub struct ModelActivity {
 #[derive(Debug, ToSchema)]
 pub struct EmgSettings {
     /// Lower cut-off frequency of the band-pass filter, Hz.
-    pub band_low_hz: Option<f64>,
+    #[schema(required = false)]
+    pub band_low_hz: f64,
     /// Upper cut-off frequency of the band-pass filter, Hz; below half the sampling rate.
-    pub band_high_hz: Option<f64>,
+    #[schema(required = false)]
+    pub band_high_hz: f64,
     /// Cut-off frequency of the low-pass filter for the envelope, Hz.
-    pub envelope_hz: Option<f64>,
+    #[schema(required = false)]
+    pub envelope_hz: f64,
     /// Order of both filters: 2, 4, 6 or 8.
-    pub order: Option<u64>,
+    #[schema(required = false)]
+    pub order: u64,
 }

@@ -209,6 +209,19 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Tr
     page(db, study, 0, u32::MAX).await
 }
 
+/// The trials of a study with an action, by number.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_action(db: &mut Connection, study: StudyId, action: ActionIndex) -> StoreResult<Vec<Trial>> {
+    let rows = sqlx::query("select * from trials where study_id = ? and action_index = ? order by number")
+        .bind(study)
+        .bind(i64::try_from(action.0).unwrap_or(i64::MAX))
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// At most `limit` trials of a study with numbers above `after`, by number.
 ///
 /// # Errors

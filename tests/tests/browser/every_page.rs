@@ -51,7 +51,7 @@ async fn study_without_gaits(site: &Site) -> StudyId {
         .study(|new| {
             (new.base_bounds.a5, new.base_bounds.a6, new.trial_budget) = (0.039, 0.0, 2);
             let velocity = Dimension { name: "a1".to_owned(), values: vec![15.0, 20.0], lengthscale: 5.0 };
-            new.search_space = Some(SearchSpace::new(vec![velocity]).unwrap());
+            new.search_space = Some(SearchSpace::new(vec![velocity]).unwrap().into());
         })
         .await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
@@ -174,7 +174,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
 
 /// Trials without a gait: one that nobody explained, one that is being explained, and one that was.
 async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
-    let study = site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits()))).await;
+    let study =
+        site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits().into()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let trials = site.service.trials(study).await;
     let asked = site.service.post(&format!("/api/v1/trials/{}/explanation", trials[1].id), &json!({})).await;

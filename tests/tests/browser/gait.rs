@@ -91,7 +91,8 @@ async fn browser_shows_an_explanation_as_soon_as_it_is_made() {
     let Some(browser) = Chromium::launch().await else { return };
     let explainer = Clearance::slow(Duration::from_secs(2));
     let site = Site::start_explaining(Analytic::default(), explainer).await;
-    let study = site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits()))).await;
+    let study =
+        site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits().into()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let last = site.service.trials(study).await[2].id;
     let page = browser.open(&site.at(&format!("/trials/{last}"))).await;

@@ -164,6 +164,14 @@ pub(super) struct Processing {
     settings: EmgSettings,
 }
 
+/// Names a refused setting as the body does.
+fn of_settings(error: Error) -> Error {
+    match error {
+        Error::Invalid(refused) => refused.renamed("emg.", "settings.").into(),
+        other => other,
+    }
+}
+
 /// Process EMG recordings
 ///
 /// Filters, cuts and normalises the newest EMG recordings. Can be repeated with other settings.
@@ -185,7 +193,7 @@ pub(super) async fn process(
     if let Some(before) = request.answered_before(&app).await? {
         return Ok(before);
     }
-    let result = lab::compute(app.store_mut(), id, processing.settings).await?;
+    let result = lab::compute(app.store_mut(), id, processing.settings).await.map_err(of_settings)?;
     let view = lab::beside_model(app.store_mut(), id, result).await?;
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

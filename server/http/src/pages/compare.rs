@@ -430,9 +430,11 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
 async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitted) -> Result<Option<Recorded>, Error> {
     let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;
-    Ok(preference::standing_answer(db, study, pair, author).await?.map(|answer| match answer {
-        StandingAnswer::Preference(id) => Recorded::Preference(id),
-        StandingAnswer::Note(id) => Recorded::Assessment(id),
+    Ok(preference::standing_answer(db, study, pair, author).await?.and_then(|answer| match answer {
+        StandingAnswer::Preference(id) => Some(Recorded::Preference(id)),
+        StandingAnswer::Note(id) => Some(Recorded::Assessment(id)),
+        // The page shows no blinded answer, and no suggestion as an answer: the refusal says that there is one.
+        StandingAnswer::Blind(_) | StandingAnswer::Suggestion(_) => None,
     }))
 }
 

@@ -37,7 +37,7 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
     let study = studies::get(writer, id).await?;
     let name = match change.name.as_deref().map(str::trim) {
         None => study.plan.name.clone(),
-        Some(name) => printable::name("name", name, 120)?.to_owned(),
+        Some(name) => printable::name("name", name, plan::LONGEST_NAME)?.to_owned(),
     };
     let limits = Limits {
         name,
@@ -121,7 +121,7 @@ pub struct Fork {
 pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) -> Result<Study, Error> {
     let from = studies::get(writer, id).await?;
     let mut new = plan::NewStudy::like(&from.plan);
-    new.name = Some(fork.name.clone().unwrap_or_else(|| format!("{} (fork)", from.plan.name)));
+    new.name = Some(fork.name.clone().unwrap_or_else(|| fork_of(&from.plan.name)));
     new.seed = fork.seed.unwrap_or(new.seed);
     new.trial_budget = fork.trial_budget.unwrap_or(new.trial_budget);
     new.muscles = fork.muscles.unwrap_or(new.muscles);
@@ -131,6 +131,13 @@ pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) 
     // The set-up of a restricted study stays visible to its members only.
     members::inherit(writer, id, made.id, actor.as_str()).await?;
     Ok(made)
+}
+
+/// The default name of a fork: that of the study, shortened if it would be too long.
+fn fork_of(name: &str) -> String {
+    const MARK: &str = " (fork)";
+    let kept: String = name.chars().take(plan::LONGEST_NAME - MARK.len()).collect();
+    format!("{}{MARK}", kept.trim_end())
 }
 
 async fn changed(

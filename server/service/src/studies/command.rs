@@ -3,6 +3,7 @@
 use super::lifecycle::{self, Act};
 use super::trial_result;
 use crate::error::Error;
+use crate::printable;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
@@ -21,16 +22,10 @@ pub struct Done {
 /// Carries out a command, if the state of the study allows it.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long, [`Error::Conflict`] with the possible
+/// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long or does not print, [`Error::Conflict`] with the possible
 /// commands.
 pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reason: &str) -> Result<Done, Error> {
-    if reason.chars().count() > 2000 {
-        return Err(Error::invalid(
-            "reason",
-            format!("{} characters long", reason.chars().count()),
-            "at most 2000 characters long",
-        ));
-    }
+    printable::note("reason", reason, 2000)?;
     let study = studies::get(writer, id).await?;
     let cancelled = if act == Act::Stop {
         stop(writer, &study, reason).await?

@@ -1,12 +1,13 @@
 //! Checks and creates a study, for pages, REST and the command line.
 
+use super::search::{self, GivenSpace};
 use super::subject::{self, NewSubject};
-use super::{catalogue, membership, nearest_reference, search};
+use super::{catalogue, membership, nearest_reference};
 use crate::access::Caller;
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use crate::printable;
-use gait_learner::{LearnerSettings, SearchSpace};
-use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
+use gait_learner::{LearnerError, LearnerSettings};
+use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
 use gaitwright_store::{
@@ -51,7 +52,7 @@ pub struct NewStudy {
     /// Tuned bounds and their values. Table I of the paper by default.
     #[serde(default)]
     #[schema(value_type = Option<schema::SearchSpace>)]
-    pub search_space: Option<SearchSpace>,
+    pub search_space: Option<GivenSpace>,
     /// Settings of the learner. Absent settings have the recommended values of the method.
     #[serde(default)]
     #[schema(value_type = schema::LearnerSettings)]
@@ -149,7 +150,7 @@ impl NewStudy {
             gait_settings: plan.gait_settings.clone(),
             solve_options: plan.solve_options,
             base_bounds: plan.base_bounds,
-            search_space: Some(plan.search_space.clone()),
+            search_space: Some(plan.search_space.clone().into()),
             learner: plan.learner.clone(),
             feedback_mode: plan.feedback_mode,
             evaluation: plan.evaluation,
@@ -164,6 +165,9 @@ impl NewStudy {
         }
     }
 }
+
+/// Maximum length of a name, characters.
+pub(super) const LONGEST_NAME: usize = 120;
 
 /// The largest seed: many JSON readers keep only 53 bits of an integer.
 pub const LARGEST_SEED: u64 = (1 << 53) - 1;
@@ -262,11 +266,11 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     };
     let variant = if new.muscles { "with muscles" } else { "without muscles" };
     let name = match new.name.as_deref().map(str::trim) {
-        None | Some("") => format!("{}, {variant}, seed {}", pseudonym, new.seed),
-        Some(name) => printable::name("name", name, 120)?.to_owned(),
+        None => format!("{}, {variant}, seed {}", pseudonym, new.seed),
+        Some(name) => printable::name("name", name, LONGEST_NAME)?.to_owned(),
     };
     let search_space = match new.search_space {
-        Some(space) => space,
+        Some(given) => given.checked()?,
         None => search::table_i().map_err(Error::Learner)?,
     };
     let plan = StudyPlan {
@@ -299,7 +303,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
-    printable::name("name", &plan.name, 120)?;
+    printable::name("name", &plan.name, LONGEST_NAME)?;
     check_range("trial_budget", i64::from(plan.trial_budget), 1, 10_000)?;
     check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(plan.priority), -10, 10)?;
@@ -312,16 +316,34 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     if plan.seed > LARGEST_SEED {
         return Err(Error::invalid("seed", plan.seed, &format!("0 to {LARGEST_SEED}")));
     }
-    plan.gait_settings.validate()?;
-    plan.solve_options.validate()?;
-    plan.base_bounds.validate()?;
+    let within = |part: &'static str| move |error: ModelError| FieldError::from(error).within(part);
+    plan.gait_settings.validate().map_err(within("gait_settings"))?;
+    plan.solve_options.validate().map_err(within("solve_options"))?;
+    plan.base_bounds.validate().map_err(within("base_bounds"))?;
     search::validate(&plan.search_space, plan.base_bounds)?;
-    plan.learner.validate().map_err(Error::Learner)?;
+    check_learner(&plan.learner)?;
     if plan.learner.categories() != 2 {
         let allowed = "one threshold, because a trial is either converged or not converged";
         return Err(Error::invalid("learner.ordinal_thresholds", json!(plan.learner.ordinal_thresholds), allowed));
     }
     Ok(())
+}
+
+/// Checks the settings of the learner.
+///
+/// # Errors
+/// [`Error::Invalid`] with the path of the field.
+fn check_learner(settings: &LearnerSettings) -> Result<(), Error> {
+    let (setting, reason) = match settings.validate() {
+        Ok(()) => return Ok(()),
+        Err(LearnerError::InvalidSetting { setting, reason }) => (setting, reason),
+        Err(other) => return Err(Error::Learner(other)),
+    };
+    let field = format!("learner.{setting}");
+    let message = format!("{field} {reason}.");
+    let value = json!(settings).get(setting).cloned();
+    let allowed = reason.rsplit_once("must be ").map_or(reason.as_str(), |(_, allowed)| allowed).to_owned();
+    Err(FieldError { field, value, allowed: Some(allowed), message }.into())
 }
 
 pub(super) fn check_range(field: &str, value: i64, minimum: i64, maximum: i64) -> Result<(), Error> {

@@ -2,14 +2,15 @@
 //! ends here. A test fails if another module writes the table.
 
 use super::motion::is_same_gait;
-use super::walkable::{self, Grounds, NotWalkable, WalkablePair, trial_of_study};
+use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
 use crate::error::Error;
 use crate::printable;
 use gait_learner::ActionIndex;
 use gaitwright_store::feedback::{self, Attribution, FeedbackContent, Source};
-use gaitwright_store::presentations::Judgement;
+use gaitwright_store::presentations::{self, Judgement, Presentation};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, FeedbackId, StudyId, TrialId, Writer, assessments, consents};
+use gaitwright_store::{Connection, FeedbackId, PresentationId, StudyId, TrialId, Writer, assessments, trials};
+use serde_json::Value;
 
 /// The author of computed answers.
 pub(super) const PROGRAM: &str = concat!("gaitwright ", env!("CARGO_PKG_VERSION"));
@@ -63,7 +64,8 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
     }
     let pair = walkable::admit_pair(writer, study, fields, pair).await?;
     if again == Again::Refused {
-        refuse_second_answer(writer, study, &pair, attribution.author).await?;
+        let before = standing_answer(writer, study, pair.trials(), attribution.author).await?;
+        before.map_or(Ok(()), |_| Err(answered_before(attribution.author)))?;
     }
     match said.heard(pair.trials()) {
         Some(said) => Ok(Some(feedback::append(writer, study, &said, attribution).await?)),
@@ -103,11 +105,15 @@ async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId
 pub enum StandingAnswer {
     /// A preference or a tie.
     Preference(FeedbackId),
-    /// The assessment that the person cannot tell.
+    /// An assessment: the person cannot tell, or reported a gait as unsafe.
     Note(gaitwright_store::AssessmentId),
+    /// A rater's answer to a blinded pair.
+    Blind(PresentationId),
+    /// A suggestion whose bounds are those of the other gait.
+    Suggestion(FeedbackId),
 }
 
-/// The newest answer of a person to a comparison, without retracted and blinded answers.
+/// The newest answer of a person to a comparison, through whichever door it came, without retracted answers.
 ///
 /// # Errors
 /// Errors of the database.
@@ -117,48 +123,93 @@ pub async fn standing_answer(
     (a, b): (TrialId, TrialId),
     author: &str,
 ) -> Result<Option<StandingAnswer>, Error> {
+    let is_own = |other: &str| printable::is_same_name(other, author);
     let of_pair = |pair: (TrialId, TrialId)| pair == (a, b) || pair == (b, a);
     let noted = assessments::of_study(db, study).await?;
-    let noted = noted
-        .iter()
-        .rfind(|r| r.retraction.is_none() && printable::is_same_name(&r.author, author) && of_pair(r.pair()));
+    let noted = noted.iter().rfind(|r| r.retraction.is_none() && is_own(&r.author) && of_pair(r.pair()));
     if let Some(noted) = noted {
         return Ok(Some(StandingAnswer::Note(noted.id)));
     }
     let given = feedback::authors_of_pair(db, (a, b)).await?;
-    let own = given.into_iter().find(|(_, other)| printable::is_same_name(other, author));
-    Ok(own.map(|(id, _)| StandingAnswer::Preference(id)))
+    if let Some((id, _)) = given.into_iter().find(|(_, other)| is_own(other)) {
+        return Ok(Some(StandingAnswer::Preference(id)));
+    }
+    for shown in presentations::of_pair(db, (a, b)).await? {
+        if is_own(&shown.rater) && stands(db, &shown).await? {
+            return Ok(Some(StandingAnswer::Blind(shown.id)));
+        }
+    }
+    let (one, other) = (trials::get(db, a).await?.action_index, trials::get(db, b).await?.action_index);
+    standing_suggestion(db, study, (one, other), author).await
 }
 
-async fn refuse_second_answer(
+/// Whether a rater's answer counts: staff can retract what the learner heard of it.
+async fn stands(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
+    if shown.answer.is_none_or(|said| said == Judgement::Withdrawn) {
+        return Ok(false);
+    }
+    Ok(match presentations::heard_of(db, shown.id).await? {
+        Some(heard) => feedback::get(db, heard).await?.retraction.is_none(),
+        None => true,
+    })
+}
+
+/// The suggestion of a person that compares two actions, in either direction.
+async fn standing_suggestion(
     db: &mut Connection,
     study: StudyId,
-    pair: &WalkablePair,
+    (one, other): (ActionIndex, ActionIndex),
     author: &str,
-) -> Result<(), Error> {
-    if standing_answer(db, study, pair.trials(), author).await?.is_some() {
-        let why =
-            format!("{author} has already answered this comparison. Retract that answer first, then answer again.");
-        return Err(Error::conflict(why));
-    }
-    Ok(())
+) -> Result<Option<StandingAnswer>, Error> {
+    let found = feedback::suggestions_between(db, study, (one, other)).await?;
+    let own = found.into_iter().find(|(_, name)| printable::is_same_name(name, author));
+    Ok(own.map(|(id, _)| StandingAnswer::Suggestion(id)))
 }
 
-/// Tells the learner that an action would have been better than a trial. The gait of the trial need not be walkable.
+fn answered_before(author: &str) -> Error {
+    Error::conflict(format!(
+        "{author} has already answered this comparison. Retract that answer first, then answer again."
+    ))
+}
+
+/// Tells the learner that an action would have been better than a trial: a preference for the gait of these bounds. A
+/// trial that had them is subject to the rules of a comparison; without one, those of the other gait apply.
 ///
 /// # Errors
-/// [`Error::Conflict`] after withdrawal of consent; errors of the database.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a second answer.
 pub(super) async fn suggest(
     writer: &mut Writer,
     over: &Trial,
-    suggested: ActionIndex,
+    (suggested, bounds): (ActionIndex, &Value),
     attribution: Attribution<'_>,
 ) -> Result<FeedbackId, Error> {
-    if consents::is_withdrawn(writer, over.study_id).await? {
+    let study = over.study_id;
+    let tried = trials::of_action(writer, study, suggested).await?;
+    let ids: Vec<TrialId> = tried.iter().chain([over]).map(|trial| trial.id).collect();
+    let grounds = Grounds::read_for(writer, study, &ids).await?;
+    if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
+    grounds.admit(over).map_err(|reason| reason.of_field("over", over.id))?;
+    for trial in tried.iter().filter(|trial| trial.state.is_result()) {
+        let refuse = |allowed: String| Error::invalid("bounds", bounds.clone(), &allowed);
+        grounds.admit(trial).map_err(|reason| refuse(format!("the bounds of a walkable gait. {reason}")))?;
+        if is_same_gait(trial, over) {
+            return Err(refuse(format!(
+                "those of a different gait: trial {} has them, and the same gait",
+                trial.number
+            )));
+        }
+        if standing_answer(writer, study, (trial.id, over.id), attribution.author).await?.is_some() {
+            return Err(answered_before(attribution.author));
+        }
+    }
+    // Without a trial of these bounds, only another suggestion can be about them.
+    if standing_suggestion(writer, study, (suggested, over.action_index), attribution.author).await?.is_some() {
+        return Err(answered_before(attribution.author));
+    }
     let said = FeedbackContent::Suggestion { suggested, over: over.id };
-    Ok(feedback::append(writer, over.study_id, &said, attribution).await?)
+    Ok(feedback::append(writer, study, &said, attribution).await?)
 }
 
 /// Tells the learner the result of a trial, and the preferences that Gait RMSE implies.

@@ -1,7 +1,10 @@
 //! Search spaces: grids over the bounds a1 to a8, and the bounds of each action.
 
+use crate::error::{Error, FieldError};
 use gait_learner::{ActionIndex, Dimension, LearnerError, SearchSpace};
 use gait_optimizer::{ModelError, TunedBounds};
+use serde::Deserialize;
+use serde_json::json;
 
 /// Values and lengthscale of each bound in Table I of the paper: 11,664 actions.
 pub const TABLE_I: [(&str, &[f64], f64); 8] = [
@@ -14,6 +17,45 @@ pub const TABLE_I: [(&str, &[f64], f64); 8] = [
     ("a7", &[20.0, 35.0, 50.0], 15.0),
     ("a8", &[20.0, 30.0, 40.0], 10.0),
 ];
+
+/// A search space as a request states it.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GivenSpace {
+    /// One dimension for each tuned bound.
+    pub dimensions: Vec<Dimension>,
+}
+
+impl From<SearchSpace> for GivenSpace {
+    fn from(space: SearchSpace) -> Self {
+        Self { dimensions: space.dimensions().to_vec() }
+    }
+}
+
+impl GivenSpace {
+    /// The search space.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the path of the field.
+    pub fn checked(self) -> Result<SearchSpace, Error> {
+        const FIELD: &str = "search_space.dimensions";
+        let at = |name: &str| self.dimensions.iter().position(|dimension| dimension.name == name).unwrap_or_default();
+        match SearchSpace::new(self.dimensions.clone()) {
+            Ok(space) => Ok(space),
+            Err(LearnerError::NoDimension) => Err(Error::invalid(FIELD, json!([]), "one dimension or more")),
+            Err(LearnerError::InvalidDimension { dimension, reason }) => {
+                let at = at(&dimension);
+                let values = self.dimensions.get(at).map(|dimension| json!(dimension.values)).unwrap_or_default();
+                Err(Error::invalid(&format!("{FIELD}[{at}].values"), values, &format!("increasing values ({reason})")))
+            }
+            Err(LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest }) => {
+                let field = format!("{FIELD}[{}].lengthscale", at(&dimension));
+                Err(Error::invalid(&field, lengthscale, &format!("{shortest} to {longest}")))
+            }
+            Err(other) => Err(Error::invalid(FIELD, self.dimensions.len(), &format!("a smaller grid: {other}"))),
+        }
+    }
+}
 
 /// The search space of Table I.
 ///
@@ -45,24 +87,22 @@ pub fn bounds_of(space: &SearchSpace, base: TunedBounds, action: ActionIndex) ->
     Ok(bounds)
 }
 
-/// Attributes an unknown bound to the field `search_space`.
-fn in_search_space(error: ModelError) -> ModelError {
-    match error {
-        ModelError::Unknown { value, known, .. } => {
-            ModelError::Unknown { field: "search_space".to_owned(), value, known }
-        }
-        other => other,
-    }
-}
-
 /// Checks that every dimension is a bound and that every combination of values makes valid bounds.
 ///
 /// # Errors
-/// [`ModelError`] naming the bound.
-pub fn validate(space: &SearchSpace, base: TunedBounds) -> Result<(), ModelError> {
-    for dimension in space.dimensions() {
+/// [`FieldError`] with the path of the field.
+pub fn validate(space: &SearchSpace, base: TunedBounds) -> Result<(), FieldError> {
+    for (at, dimension) in space.dimensions().iter().enumerate() {
+        let within = |error: ModelError| {
+            let part = format!("search_space.dimensions[{at}]");
+            let unknown = matches!(error, ModelError::Unknown { .. });
+            let refused = FieldError::from(error);
+            let field = if unknown { "name" } else { "values" };
+            let message = refused.message.strip_prefix(&refused.field).map(|rest| format!("{field}{rest}"));
+            FieldError { field: field.to_owned(), message: message.unwrap_or(refused.message), ..refused }.within(&part)
+        };
         for &value in &dimension.values {
-            base.clone().set(&dimension.name, value).map_err(in_search_space)?;
+            base.clone().set(&dimension.name, value).map_err(within)?;
         }
     }
     // Only a3 < a4 couples bounds, so the largest a3 with the smallest a4 is the critical combination.
@@ -71,7 +111,7 @@ pub fn validate(space: &SearchSpace, base: TunedBounds) -> Result<(), ModelError
         let chosen = if dimension.name == "a3" { dimension.values.last() } else { dimension.values.first() };
         tightest.set(&dimension.name, chosen.copied().unwrap_or_default())?;
     }
-    tightest.validate()
+    tightest.validate().map_err(|error| FieldError::from(error).within("search_space"))
 }
 
 #[cfg(test)]

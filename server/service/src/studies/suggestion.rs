@@ -39,13 +39,13 @@ pub struct Suggestion {
 /// Records a suggestion.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] for a second answer of the same person.
 pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Suggestion) -> Result<FeedbackId, Error> {
     let study = studies::get(writer, study).await?;
     let trial = comparable(writer, study.id, "over", new.over).await?;
     let suggested = action(&study, &trial, &new.bounds)?;
     let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
-    let id = preference::suggest(writer, &trial, suggested, attribution).await?;
+    let id = preference::suggest(writer, &trial, (suggested, &json!(new.bounds)), attribution).await?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": attribution.author });
     audit::append(writer, &caller.actor, "suggestion.give", &format!("preference {id}"), &detail).await?;

@@ -1,4 +1,8 @@
-//! Draws of allocations: permuted blocks for lab sessions and fair coins for pairs, as pure functions of a random lot.
+//! Draws of allocations: biased coins for lab sessions (Efron 1971) and fair coins for pairs, as pure functions of a
+//! random lot.
+//!
+//! Only unblinded allocations bias the coin of a session. A concealed one thus says nothing about any other, and nobody
+//! who sees everything else guesses it with a probability above [`BIAS`], whatever the order of planning and unblinding.
 
 use crate::{StoreError, StoreResult};
 
@@ -9,16 +13,10 @@ pub struct Lot {
     nonce: [u8; 32],
 }
 
-/// A place in a block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Place {
-    /// Whether gait one comes first.
-    pub(super) one_first: bool,
-    /// Size of the block, 2 or 4.
-    pub(super) size: u8,
-    /// Position in the block, from 1.
-    pub(super) position: u8,
-}
+/// The lead of one order over the other from which the coin is biased.
+const TOLERANCE: u64 = 3;
+/// Of 4 biased draws, those that even out the lead.
+const BIAS: u64 = 3;
 
 impl Lot {
     /// Draws a lot.
@@ -49,16 +47,14 @@ impl Lot {
         hex::encode(self.nonce)
     }
 
-    /// The next place after the taken ones of the open block. Without any, a new block of two or four begins. Every
-    /// balanced order of a block is equally likely.
-    pub(super) fn place(self, taken: &[Place]) -> Place {
-        let size = taken.first().map_or(if self.coin() { 2 } else { 4 }, |first| first.size);
-        let ones = taken.iter().filter(|place| place.one_first).count() as u64;
-        let (used, half) = (taken.len() as u64, u64::from(size) / 2);
-        let left = u64::from(size).saturating_sub(used).max(1);
-        // The lowest bit is used by the coin.
-        let one_first = (self.number >> 1) % left < half.saturating_sub(ones);
-        Place { one_first, size, position: u8::try_from(used + 1).unwrap_or(size) }
+    /// Whether gait one comes first, if gait one came first in so many unblinded sessions more than gait two. The coin is
+    /// fair up to a lead of two; from three on, the rarer order has a probability of three quarters.
+    pub(super) fn one_first(self, lead: i64) -> bool {
+        if lead.unsigned_abs() < TOLERANCE {
+            return self.coin();
+        }
+        let evens_out = self.number % 4 < BIAS;
+        evens_out == (lead < 0)
     }
 }
 
@@ -80,61 +76,75 @@ mod tests {
         2.0 * (count as f64 - half).powi(2) / half
     }
 
-    /// The places of consecutive sessions.
-    fn drawn(sessions: u64) -> Vec<Place> {
-        let (mut all, mut open): (Vec<Place>, Vec<Place>) = (Vec::new(), Vec::new());
-        for counter in 0..sessions {
-            let place = lot(counter).place(&open);
-            open.push(place);
-            all.push(place);
-            if place.position == place.size {
-                open.clear();
+    /// What the best guesser of a draw knows: the probability of the likelier order.
+    fn best_guess(lead: i64) -> f64 {
+        if lead.unsigned_abs() < TOLERANCE { 0.5 } else { 0.75 }
+    }
+
+    /// Sessions one after the other, each unblinded before the next is planned: the leads before each draw, and the orders.
+    fn in_order(sessions: u64) -> Vec<(i64, bool)> {
+        let mut lead = 0;
+        let next = |counter| {
+            let one_first = lot(counter).one_first(lead);
+            let drawn = (lead, one_first);
+            lead += if one_first { 1 } else { -1 };
+            drawn
+        };
+        (0..sessions).map(next).collect()
+    }
+
+    #[test]
+    fn sessions_unblinded_one_by_one_stay_balanced() {
+        let leads: Vec<u64> = in_order(100_000).iter().map(|(lead, _)| lead.unsigned_abs()).collect();
+        let share = |least: u64| leads.iter().filter(|lead| **lead >= least).count() as f64 / leads.len() as f64;
+        // Exact: 2/7 from three on, then a third for each further one.
+        for (least, exact) in [(3, 2.0 / 7.0), (4, 2.0 / 21.0), (5, 2.0 / 63.0), (6, 2.0 / 189.0)] {
+            assert!((share(least) - exact).abs() < 0.1 * exact, "a lead of {least}: {} for {exact}", share(least));
+        }
+        assert!(leads.iter().all(|lead| *lead <= 14), "{:?}", leads.iter().max());
+    }
+
+    #[test]
+    fn best_guesser_is_right_in_four_of_seven_and_never_surer_than_three_of_four() {
+        let drawn = in_order(100_000);
+        let (mut right, mut at_bias) = (0_u32, (0_u32, 0_u32));
+        for (lead, one_first) in &drawn {
+            let guess = *lead < 0;
+            right += u32::from(guess == *one_first);
+            if lead.unsigned_abs() >= TOLERANCE {
+                at_bias = (at_bias.0 + u32::from(guess == *one_first), at_bias.1 + 1);
             }
         }
-        all
+        let share = f64::from(right) / drawn.len() as f64;
+        assert!((share - 4.0 / 7.0).abs() < 0.006, "{share}");
+        let biased = f64::from(at_bias.0) / f64::from(at_bias.1);
+        assert!((biased - 0.75).abs() < 0.01, "{biased}");
     }
 
+    /// Sessions are planned and unblinded in any order. The guesser sees every unblinded allocation, also of sessions that
+    /// were planned later, and knows the rule.
     #[test]
-    fn blocks_are_balanced_and_sizes_two_and_four_are_equally_frequent() {
-        let all = drawn(30_000);
-        let mut sizes = [0_usize; 2];
-        let mut rest = &all[..];
-        while let Some(first) = rest.first() {
-            let Some((block, after)) = rest.split_at_checked(usize::from(first.size)) else { break };
-            assert_eq!(block.iter().filter(|place| place.one_first).count() * 2, block.len(), "{block:?}");
-            sizes[usize::from(first.size == 4)] += 1;
-            rest = after;
-        }
-        assert!(chi_squared(sizes[0], sizes[0] + sizes[1]) < CRITICAL, "{sizes:?}");
-    }
-
-    #[test]
-    fn allocations_of_10_000_sessions_are_balanced_at_every_place() {
-        let all = drawn(10_000);
-        for (size, place) in [(2, 1), (2, 2), (4, 1), (4, 2), (4, 3), (4, 4)] {
-            let here: Vec<_> = all.iter().filter(|drawn| (drawn.size, drawn.position) == (size, place)).collect();
-            let ones = here.iter().filter(|drawn| drawn.one_first).count();
-            assert!(chi_squared(ones, here.len()) < CRITICAL, "place {place} of {size}: {ones} of {}", here.len());
-        }
-        let firsts: Vec<bool> = (0..10_000).map(|counter| lot(counter).place(&[]).one_first).collect();
-        let ones = firsts.iter().filter(|one| **one).count();
-        assert!(chi_squared(ones, firsts.len()) < CRITICAL, "first sessions of 10,000 studies: {ones}");
-    }
-
-    #[test]
-    fn every_order_of_a_block_of_four_is_equally_likely() {
-        let mut counts = std::collections::BTreeMap::<Vec<bool>, u32>::new();
-        for block in 0..6000 {
-            let mut open = vec![Place { one_first: lot(4 * block).coin(), size: 4, position: 1 }];
-            for step in 1..4 {
-                open.push(lot(4 * block + step).place(&open));
+    fn best_guesser_gains_nothing_from_sessions_planned_or_unblinded_meanwhile() {
+        let (mut lead, mut concealed) = (0_i64, Vec::new());
+        let (mut expected, mut right, mut of) = (0.0, 0_u32, 0_u32);
+        for counter in 0..200_000_u64 {
+            let Lot { number: choice, .. } = lot(1_000_000 + counter);
+            if concealed.len() < 2 || (concealed.len() < 6 && choice % 2 == 0) {
+                concealed.push((lead, lot(counter).one_first(lead)));
+                continue;
             }
-            *counts.entry(open.iter().map(|place| place.one_first).collect()).or_default() += 1;
+            let at = usize::try_from(choice >> 1).unwrap_or(usize::MAX) % concealed.len();
+            let (lead_then, one_first) = concealed.swap_remove(at);
+            // The rarer order when it was planned; at a fair coin, what would even out the present lead.
+            let guess = if lead_then.unsigned_abs() >= TOLERANCE { lead_then < 0 } else { lead < 0 };
+            expected += best_guess(lead_then);
+            right += u32::from(guess == one_first);
+            of += 1;
+            lead += if one_first { 1 } else { -1 };
         }
-        assert_eq!(counts.len(), 6, "{counts:?}");
-        let chi: f64 = counts.values().map(|count| (f64::from(*count) - 1000.0).powi(2) / 1000.0).sum();
-        // The 99.9th percentile with five degrees of freedom.
-        assert!(chi < 20.52, "{chi}: {counts:?}");
+        let deviation = 0.5 * f64::from(of).sqrt();
+        assert!((f64::from(right) - expected).abs() < 4.0 * deviation, "{right} of {of}, expected {expected}");
+        assert!(f64::from(right) / f64::from(of) < 0.62, "{right} of {of}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! No other module reads these tables. Every statement that returns an allocation states in its `where` why it may be
 //! known: the session or the rater is unblinded, the pair belongs to the rater, or the device fetches its file, which
-//! is recorded. Only the draw reads the state of a block.
+//! is recorded. The draw reads unblinded ones.
 
 mod lot;
 
@@ -11,66 +11,38 @@ pub use lot::Lot;
 use super::audit::Actor;
 use super::presentations::{Judgement, Presentation, SELECT};
 use super::{Connection, Instant, LabDeviceFileId, LabSessionId, PresentationId, StoreResult, StudyId, TrialId, now};
-use lot::Place;
 use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use utoipa::ToSchema;
 
-/// SQL condition that the allocation of session `l.id` is revealed: the session is unblinded, or a reader has its file.
-const REVEALED: &str = "(exists (select 1 from lab_acts t where t.session_id = l.id and t.act = 'unblinded') \
-                        or exists (select 1 from lab_device_files f where f.session_id = l.id and f.to_device = 0))";
-/// Size of the largest block.
-const LARGEST_BLOCK: u32 = 4;
-
-/// Draws which gait walk 2 of a session uses. Sessions with the same number form a stratum across subjects.
+/// Draws which gait walk 2 of a session uses, balanced over the sessions with the same number of all subjects.
 ///
 /// # Errors
 /// A violated constraint if the session has an allocation; errors of the database.
 pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32, lot: Lot) -> StoreResult<()> {
-    let drawn = lot.place(&open_block(db, number).await?);
-    sqlx::query(
-        "insert into lab_allocations (session_id, gait_one_first, stratum, block_size, place, nonce, created_at) \
-         values (?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(session)
-    .bind(drawn.one_first)
-    .bind(number)
-    .bind(drawn.size)
-    .bind(drawn.position)
-    .bind(lot.nonce())
-    .bind(now())
-    .execute(db)
-    .await?;
+    let one_first = lot.one_first(lead(db, number).await?);
+    sqlx::query("insert into lab_allocations (session_id, gait_one_first, nonce, created_at) values (?, ?, ?, ?)")
+        .bind(session)
+        .bind(one_first)
+        .bind(lot.nonce())
+        .bind(now())
+        .execute(db)
+        .await?;
     Ok(())
 }
 
-/// The taken places of the open block, in order. A block also ends when one of its allocations is revealed, so that the
-/// next one cannot be derived from it.
-async fn open_block(db: &mut Connection, number: u32) -> StoreResult<Vec<Place>> {
-    let sql = format!(
-        "select a.gait_one_first, a.block_size, a.place, {REVEALED} as revealed \
-         from lab_allocations a join lab_sessions l on l.id = a.session_id \
-         where a.stratum = ? order by a.rowid desc limit {LARGEST_BLOCK}"
+/// In how many unblinded sessions of this number gait one came first, less those in which gait two did. A concealed
+/// allocation does not count: the next ones would tell it once they are unblinded. Nor does an imported one, which
+/// another service balanced.
+async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
+    let row = sqlx::query(
+        "select coalesce(sum(2 * a.gait_one_first - 1), 0) from lab_sessions l \
+         join lab_acts t on t.session_id = l.id and t.act = 'unblinded' \
+         join lab_allocations a on a.session_id = l.id \
+         where l.number = ? and l.study_id not in (select study_id from imports)",
     );
-    let rows = sqlx::query(AssertSqlSafe(sql)).bind(number).fetch_all(db).await?;
-    let mut taken = Vec::new();
-    for row in &rows {
-        let place = Place {
-            one_first: row.try_get("gait_one_first")?,
-            size: row.try_get("block_size")?,
-            position: row.try_get("place")?,
-        };
-        if row.try_get("revealed")? {
-            return Ok(Vec::new());
-        }
-        taken.push(place);
-        if place.position == 1 {
-            break;
-        }
-    }
-    taken.reverse();
-    Ok(if taken.last().is_some_and(|last| last.position == last.size) { Vec::new() } else { taken })
+    Ok(row.bind(number).fetch_one(db).await?.try_get(0)?)
 }
 
 /// What may be known of the allocation of a session.
@@ -168,8 +140,8 @@ pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> Sto
     Ok(row.bind(study).bind(actor.as_str()).bind(is_token).bind(of_tokens).fetch_optional(db).await?.is_some())
 }
 
-/// Draws which gait of a pair is shown first, by a fair coin. Blocks would not do: answers in the study reveal earlier
-/// allocations to readers who know what the rater said. A pair that is shown `again` after a retraction keeps its
+/// Draws which gait of a pair is shown first, by a fair coin. A biased one would not do: answers in the study reveal
+/// earlier allocations to readers who know what the rater said. A pair that is shown `again` after a retraction keeps its
 /// sides.
 ///
 /// # Errors

@@ -304,9 +304,12 @@ pub(super) async fn check(
 /// Converts an error about a field into a refusal; other errors pass.
 fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
     match error {
-        Error::Invalid(field) => {
-            let said = field.message.strip_prefix(&field.field).map(|said| format!("{}{said}", label(&field.field)));
-            Ok(FieldError { message: said.unwrap_or(field.message), ..*field })
+        Error::Invalid(refused) => {
+            // A bound has one row in the table, whatever part of the study refuses it.
+            let last = refused.field.rsplit('.').next().filter(|last| TunedBounds::NAMES.contains(last));
+            let field = last.unwrap_or(&refused.field).to_owned();
+            let said = refused.message.strip_prefix(&refused.field).map(|said| format!("{}{said}", label(&field)));
+            Ok(FieldError { field, message: said.unwrap_or(refused.message), ..*refused })
         }
         Error::Conflict(message) => Ok(FieldError {
             field: "pseudonym".to_owned(),
@@ -375,7 +378,7 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
     let (search_space, base_bounds) = editor.read()?;
     let learners = LEARNERS.map(|(name, ..)| name).join(", ");
     Ok(NewStudy {
-        name: Some(fields.name.clone()),
+        name: Some(fields.name.trim().to_owned()).filter(|name| !name.is_empty()),
         device_id: optional("device", &fields.device, "a device from the list")?,
         reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait from the list")?,
         muscles: match fields.muscles.as_str() {
@@ -383,7 +386,7 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
             "off" => false,
             other => return Err(Error::invalid("muscles", other, "on or off")),
         },
-        search_space: Some(search_space),
+        search_space: Some(search_space.into()),
         base_bounds,
         feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
             .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human or mixed"))?,

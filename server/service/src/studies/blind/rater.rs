@@ -84,7 +84,9 @@ pub async fn next<'a>(
     let closed = closed_among(&mut writer, &safety_reports, own.iter().map(Presentation::pair)).await?;
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
         // An imported study does not have the sides of pairs that were still blinded.
-        if walkable::are_walkable(&mut writer, open.pair()).await?
+        let settled = open.kind == Kind::New && is_answered(&mut writer, study, open.pair(), &caller.name).await?;
+        if !settled
+            && walkable::are_walkable(&mut writer, open.pair()).await?
             && allocations::is_included(&mut writer, open.id).await?
         {
             note(&mut writer, caller, open, "presentation.show").await?;
@@ -94,7 +96,8 @@ pub async fn next<'a>(
         withdraw(&mut writer, open).await?;
     }
     let Some(pair) = question.filter(|pair| !safety_reports.is_skipped(*pair)) else { return Ok((writer, None)) };
-    if !walkable::are_walkable(&mut writer, pair).await? {
+    // The study may go on asking others; this person has answered, here or elsewhere.
+    if !walkable::are_walkable(&mut writer, pair).await? || is_answered(&mut writer, study, pair, &caller.name).await? {
         return Ok((writer, None));
     }
     let lot = Lot::draw()?;
@@ -130,6 +133,15 @@ async fn closed_among(
         }
     }
     Ok(closed)
+}
+
+async fn is_answered(
+    db: &mut Connection,
+    study: StudyId,
+    pair: (TrialId, TrialId),
+    rater: &str,
+) -> Result<bool, Error> {
+    Ok(preference::standing_answer(db, study, pair, rater).await?.is_some())
 }
 
 async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
@@ -183,8 +195,8 @@ pub async fn answer(
     } else {
         let fields = ("first", "second");
         let (study, pair) = (shown.study_id, shown.pair());
-        // The server chose the pair, so a repetition is intended.
-        let statement = GivenJudgement { study, pair, fields, said, attribution, again: Again::Meant };
+        let again = if shown.kind == Kind::Repeat { Again::Meant } else { Again::Refused };
+        let statement = GivenJudgement { study, pair, fields, said, attribution, again };
         preference::hear(writer, statement).await.map_err(without_gaits)?
     };
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;

@@ -54,6 +54,10 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
     let session = still_open(writer, id).await?;
+    let number = next_number(&session);
+    if !(1..=number).contains(&new.number) {
+        return Err(Error::invalid("number", new.number, &format!("1 to {number}")));
+    }
     // Nobody walks on to report that a walk was unsafe.
     if let Some(walk) = next_walk(&session).filter(|walk| *walk == 1 || !new.answer.is_about_safety()) {
         return Err(Error::conflict(format!(
@@ -65,7 +69,6 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
         let other = "There is already an answer. To change it, retract it first.";
         return if same { in_the_lab(writer, id).await } else { Err(Error::conflict(other)) };
     }
-    let number = next_number(&session);
     if new.number != number {
         return Err(Error::conflict(format!(
             "Answer {} was retracted. The current answer has number {number}.",
