@@ -153,8 +153,8 @@ impl Store {
     /// # Errors
     /// [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
     /// [`StoreError::NewerSchema`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
-    /// if the record contradicts an anchor, [`StoreError::Unsealed`] if another program wrote a row; errors of the
-    /// database.
+    /// if the record contradicts an anchor, [`StoreError::Unsealed`] and [`StoreError::Damaged`] if another program
+    /// added, changed or deleted a row or changed the schema; errors of the database.
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {
         file_kind::check(path)?;
         let anchors: Vec<PathBuf> =
@@ -200,6 +200,7 @@ impl Store {
                 anchor::check(&mut *only.acquire().await?, path, anchor).await?;
             }
         }
+        let version = writing::data_version(&mut *only.acquire().await?).await?;
         migrations::apply(&only, path).await?;
         let mut connection = only.acquire().await?.detach();
         seals::watch(&mut connection).await?;
@@ -207,7 +208,7 @@ impl Store {
         sqlx::query("pragma wal_autocheckpoint = 0").execute(&mut connection).await?;
         let files = Arc::new(Files::of(path)?);
         let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
-        let writing = Arc::new(Writing::new(connection, space::Space::of(path), outside));
+        let writing = Arc::new(Writing::new(connection, Some(version), space::Space::of(path), outside));
         let readers = SqlitePoolOptions::new()
             .max_connections(4)
             .idle_timeout(None)

@@ -31,25 +31,11 @@ pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
 }
 
 async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
-    let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     backup::check_open(pool).await?;
     let version = schema_versions::check_version(pool, record).await?;
     // One consistent state for all comparisons.
     let mut db = pool.begin().await?;
-    schema(&mut db, version).await?;
-    let audit = match audit::verify(&mut db).await? {
-        audit::ChainCheck::Whole { rows, last } => (rows, last),
-        audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
-    };
-    let seals = match seals::verify(&mut db).await? {
-        seals::SealCheck::Whole { seals, last } => Some((seals, last)),
-        seals::SealCheck::None => None,
-        seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
-        seals::SealCheck::Touched { table, key } => {
-            return Err(damaged(format!("row {key} of {table} was changed, added or deleted outside the program")));
-        }
-    };
-    sequences(&mut db).await?;
+    let (audit, seals) = rows(&mut db, version).await?;
     let mut seen = Vec::new();
     for anchor in std::iter::once(anchor::beside_record(record)).chain(anchors.iter().cloned()) {
         match anchor::check(&mut db, record, &anchor).await? {
@@ -61,6 +47,31 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
         }
     }
     Ok(Whole { audit, seals, anchors: seen })
+}
+
+/// Number of links of a chain, and the hash of the last one.
+type Chain = (u64, String);
+
+/// Verifies schema, chains, and every row of a record of this version. Returns the audit trail and the seals.
+///
+/// # Errors
+/// [`StoreError::Damaged`], or [`StoreError::Unsealed`] for a row that was added outside the program.
+pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chain, Option<Chain>)> {
+    let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
+    schema(db, version).await?;
+    let audit = match audit::verify(db).await? {
+        audit::ChainCheck::Whole { rows, last } => (rows, last),
+        audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
+    };
+    let seals = match seals::verify(db).await? {
+        seals::SealCheck::Whole { seals, last } => Some((seals, last)),
+        seals::SealCheck::None => None,
+        seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
+        seals::SealCheck::Unsealed { table, key } => return Err(StoreError::Unsealed { table, key }),
+        seals::SealCheck::Touched { table, key } => return Err(seals::touched(&table, &key)),
+    };
+    sequences(db).await?;
+    Ok((audit, seals))
 }
 
 /// Checks that tables, indices, triggers and views match the schema_versions, because a missing trigger protects nothing.
