@@ -16,6 +16,7 @@ pub mod archived_allocations;
 pub mod assessments;
 pub mod audit;
 pub mod backup;
+pub mod backup_folder;
 pub mod certificates;
 pub mod clock;
 pub mod consents;
@@ -152,15 +153,17 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
-    /// [`StoreError::NewerSchema`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
+    /// [`StoreError::NewerSchema`], [`StoreError::WrongAnchor`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
     /// if the record contradicts an anchor, [`StoreError::Unsealed`] and [`StoreError::Damaged`] if another program
     /// added, changed or deleted a row or changed the schema; errors of the database.
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {
+        anchor::refuse_wrong(elsewhere, path, None)?;
         file_kind::check(path)?;
         let anchors: Vec<PathBuf> =
             [Some(anchor::beside_record(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
         let mut owner = Ownership::take(path)?;
         let checked = async {
+            restore::finish_interrupted(path)?;
             refuse_unchanged(path).await?;
             refuse_empty_in_place_of_record(path, &anchors)?;
             owner.make_database(path)

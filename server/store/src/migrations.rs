@@ -34,7 +34,7 @@ async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResu
     }
     let name = beside(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
-    let copy = backup::whole_copy(pool, &name, path).await?;
+    let copy = backup::whole_copy(pool, path, &name, path).await?;
     match free_name(&name, copy.part()).map_err(cannot_write)? {
         Some(free) => copy.keep_as(&free).map_err(cannot_write),
         None => Ok(()),

@@ -62,8 +62,7 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
         return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });
     }
     let applied = "select version from _sqlx_migrations where success order by version";
-    let applied: Vec<i64> =
-        if found == 0 { Vec::new() } else { sqlx::query_scalar(applied).fetch_all(pool).await? };
+    let applied: Vec<i64> = if found == 0 { Vec::new() } else { sqlx::query_scalar(applied).fetch_all(pool).await? };
     match FILES.iter().map(|file| file.0).take_while(|version| *version <= found).find(|v| !applied.contains(v)) {
         None => Ok(found),
         Some(missing) => {

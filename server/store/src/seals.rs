@@ -157,21 +157,23 @@ impl Sealed {
             Some(_) => (name, self.known_hash(&key)),
             None => (Event::MIGRATED, "null".to_owned()),
         };
-        let mut acts =
-            format!("insert into unsealed (evidence, key, event, known) values ('{table}', {key}, '{noted}', {known});");
+        let note = "insert into unsealed (evidence, key, event, known)";
+        let mut acts = vec![format!("{note} values ('{table}', {key}, '{noted}', {known});")];
         if let Some(columns) = keep.filter(|_| event != Event::Insert) {
             let old: Vec<String> = columns.iter().map(|column| format!("old.\"{column}\"")).collect();
             let place = "(select max(place) from unsealed)";
-            acts += &format!("insert into {} values ({place}, {});", self.old_rows(), old.join(", "));
+            acts.push(format!("insert into {} values ({place}, {});", self.old_rows(), old.join(", ")));
         }
         if event != Event::Insert && self.is_checked() {
-            acts += &format!("delete from checksums where evidence = '{table}' and key = {};", self.key_of("old."));
+            let old = self.key_of("old.");
+            acts.push(format!("delete from checksums where evidence = '{table}' and key = {old};"));
         }
+        let acts = acts.join(" ");
         format!("create temp trigger if not exists {table}_after_{name} after {name} on main.{table} begin {acts} end")
     }
 
-    /// Whether the old rows match the hashes that the record had of them. Only the first note of a row in a change
-    /// counts, because later ones have rows that this program wrote.
+    /// The key of an old row that differs from the hash that the record had of it. Only the first note of a row in a
+    /// change counts, because later ones have rows that this program wrote.
     async fn old_row_unlike(&self, db: &mut Connection, firsts: &HashSet<i64>) -> StoreResult<Option<String>> {
         let sql = format!(
             "select o.*, n.known as \"{JOINT}known\", n.key as \"{JOINT}key\" from {} o \
@@ -218,11 +220,8 @@ pub(super) async fn watch(db: &mut Connection) -> StoreResult<()> {
         let columns: Vec<String> = sqlx::query_scalar(columns).bind(sealed.table).fetch_all(&mut *db).await?;
         let names: Vec<String> = columns.iter().map(|column| format!("\"{column}\"")).collect();
         // Columns without a type keep every value as it is.
-        let old_rows = format!(
-            "create temp table if not exists {} (\"{JOINT}place\", {})",
-            sealed.old_rows(),
-            names.join(", ")
-        );
+        let old_rows =
+            format!("create temp table if not exists {} (\"{JOINT}place\", {})", sealed.old_rows(), names.join(", "));
         sqlx::query(AssertSqlSafe(old_rows)).execute(&mut *db).await?;
         install(db, sealed, Some(&columns)).await?;
     }
@@ -325,7 +324,11 @@ pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
             rows.push(Noted { table, key, event, known: row.try_get(4)? });
         }
         // What became of a row at last.
-        if event == Event::Delete.name() { deleted.insert(at) } else { deleted.remove(&at) };
+        if event == Event::Delete.name() {
+            deleted.insert(at)
+        } else {
+            deleted.remove(&at)
+        };
     }
     refuse_touched(db, &rows, &old_rows).await?;
     for (at, Noted { table, key, .. }) in rows.iter().enumerate() {
@@ -424,7 +427,11 @@ pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
     for sealed in &known {
         if let Some((key, without_seal)) = unlike(db, *sealed).await? {
             let table = sealed.table.to_owned();
-            return Ok(if without_seal { SealCheck::Unsealed { table, key } } else { SealCheck::Touched { table, key } });
+            return Ok(if without_seal {
+                SealCheck::Unsealed { table, key }
+            } else {
+                SealCheck::Touched { table, key }
+            });
         }
     }
     Ok(match of_no_table(db, &known).await? {
