@@ -42,7 +42,7 @@ async fn damaged_record_is_not_backed_up_and_a_damaged_backup_is_not_restored() 
         ("update users set role = 'admin'", "of users"),
         ("update sessions set by_link = 1 - by_link", "of sessions"),
         ("drop trigger users_no_delete", "trigger users_no_delete"),
-        ("create table more (x) strict", "table more"),
+        ("create table more (x)", "table more"),
     ] {
         let damaged = folder.path().join("damaged.db");
         std::fs::copy(folder.path().join("good.db"), &damaged).unwrap();

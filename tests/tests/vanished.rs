@@ -88,7 +88,7 @@ async fn record_that_another_program_writes_to_accepts_no_further_changes() {
     let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'admin', '')";
     let trigger = "create trigger evil after insert on remarks begin \
                    update remarks set note = 'x' where id = new.id; end";
-    for sql in [user, trigger, "update users set role = 'admin'", "create table more (x)"] {
+    for sql in [user, trigger, "update subjects set notes = 'forged'", "create table more (x)"] {
         let (_folder, database, service) = service().await;
         assert_eq!(add_subjects(&service, "before", 5).await, (5, 0));
         let options = sqlx::sqlite::SqliteConnectOptions::new().filename(&database);
@@ -101,9 +101,7 @@ async fn record_that_another_program_writes_to_accepts_no_further_changes() {
         assert_eq!(service.fetch("/ready").await.status, StatusCode::SERVICE_UNAVAILABLE);
         other.close().await.unwrap();
         service.abandon().await;
-        if !sql.starts_with("update") {
-            assert!(Store::open(&database).await.is_err(), "{sql}");
-        }
+        assert!(Store::open(&database).await.is_err(), "{sql}");
     }
 }
 
