@@ -195,7 +195,9 @@ impl Store {
             .busy_timeout(Duration::from_secs(10))
             // Each table has its own statements for seals.
             .statement_cache_capacity(400);
-        let only = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
+        // Few rows ahead, because the verification reads rows that contain whole measurement files.
+        let one = options.clone().row_buffer_size(quarantine::ROWS_AHEAD);
+        let only = SqlitePoolOptions::new().max_connections(1).connect_with(one).await?;
         if schema_versions::check_version(&only, path).await? == 0 {
             refuse_to_begin_anew(path, &anchors)?;
         } else {
