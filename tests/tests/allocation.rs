@@ -399,23 +399,22 @@ async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Answer {
     send(service, who, &Method::POST, path, JSON, &body.to_string()).await
 }
 
-/// Exchanges every order of the record, and nothing else.
+/// Exchanges every order of the record, and nothing else. The program does it, so that the rows are sealed.
 async fn exchange_orders(database: &Path) {
-    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(database);
-    let pool = sqlx::sqlite::SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
-    for sql in [
-        "drop trigger lab_allocations_no_update",
-        "drop trigger presentation_allocations_no_update",
-        "update lab_allocations set gait_one_first = 1 - gait_one_first",
-        "update presentation_allocations set swapped = 1 - swapped",
-        "create trigger lab_allocations_no_update before update on lab_allocations \
-         begin select raise(abort, 'allocations are append-only'); end",
-        "create trigger presentation_allocations_no_update before update on presentation_allocations \
-         begin select raise(abort, 'allocations are append-only'); end",
+    let store = Store::open(database).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    for (trigger, sql) in [
+        ("lab_allocations_no_update", "update lab_allocations set gait_one_first = 1 - gait_one_first"),
+        ("presentation_allocations_no_update", "update presentation_allocations set swapped = 1 - swapped"),
     ] {
-        sqlx::query(sql).execute(&pool).await.unwrap();
+        let text = sqlx::query_scalar("select sql from sqlite_master where name = ?").bind(trigger);
+        let text: String = text.fetch_one(&mut **writer).await.unwrap();
+        for sql in [format!("drop trigger {trigger}"), sql.to_owned(), text] {
+            sqlx::query(sqlx::AssertSqlSafe(sql)).execute(&mut **writer).await.unwrap();
+        }
     }
-    pool.close().await;
+    gaitwright_store::commit(writer).await.unwrap();
+    store.close().await;
 }
 
 /// Everything that a reader, a rater, an administrator or nobody can fetch of these, but what the rater is shown on a

@@ -2,15 +2,19 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gaitwright_store::Store;
 use gaitwright_tests::large::{self, TRIALS};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(1);
+/// Without optimisation; a release needs a fraction of it.
+const LONGEST_START: Duration = Duration::from_secs(20);
 
 #[tokio::test]
 async fn ten_thousand_trials_slow_no_page_and_no_list() {
     let folder = tempfile::tempdir().unwrap();
-    let (service, study, trial) = large::service(&folder.path().join("a.db")).await;
+    let database = folder.path().join("a.db");
+    let (service, study, trial) = large::service(&database).await;
     let times = large::times(&service, study, trial).await;
     for (path, time) in &times {
         println!("{:>6.1} ms  {path}", time.as_secs_f64() * 1e3);
@@ -30,4 +34,11 @@ async fn ten_thousand_trials_slow_no_page_and_no_list() {
     }
     assert_eq!(seen, TRIALS as usize);
     service.stop().await;
+    // Opening verifies every row.
+    let begun = Instant::now();
+    let store = Store::open(&database).await.unwrap();
+    let time = begun.elapsed();
+    println!("{:>6.1} ms  opening the record", time.as_secs_f64() * 1e3);
+    store.close().await;
+    assert!(time < LONGEST_START, "{time:?}");
 }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_store::seals::{self, SealCheck};
-use gaitwright_store::{Store, StoreError, audit, backup, verify as store_verify};
+use gaitwright_store::{Store, StoreError, audit, backup, commit, verify as store_verify};
 use gaitwright_tests::every_table::filled;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection, Row};
@@ -67,7 +67,10 @@ async fn a_row_that_another_hand_changed_added_or_took_away_is_found() {
         ),
     ] {
         let found = verify(&touched(&database, sql).await).await;
-        assert!(matches!(&found, SealCheck::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
+        let (SealCheck::Touched { table: named, .. } | SealCheck::Unsealed { table: named, .. }) = &found else {
+            panic!("{sql}: {found:?}")
+        };
+        assert_eq!(named, table, "{sql}");
     }
 }
 
@@ -141,6 +144,156 @@ async fn a_forged_row_of_any_table_keeps_the_record_from_opening() {
         found += 1;
     }
     println!("{found} of {tables} forged rows found at open and by audit verify");
+}
+
+#[tokio::test]
+async fn a_changed_or_deleted_row_and_a_changed_schema_keep_the_record_from_opening() {
+    let (_folder, database) = filled().await;
+    let mut statements = vec![
+        "delete from audit where seq = 2".to_owned(),
+        "delete from audit where seq = (select max(seq) from audit)".to_owned(),
+        "update audit set actor = 'x' where seq = 1".to_owned(),
+        "delete from seals where seq = (select max(seq) from seals)".to_owned(),
+        "delete from checksums where evidence = 'jobs'".to_owned(),
+    ];
+    for sealed in seals::TABLES.iter().chain(seals::CHECKED) {
+        let table = sealed.table;
+        let rows: i64 = sqlx::query_scalar(AssertSqlSafe(format!("select count(*) from {table}")))
+            .fetch_one(&mut open(&database).await)
+            .await
+            .unwrap();
+        if rows == 0 || table == "_sqlx_migrations" {
+            continue;
+        }
+        let columns = "select name from pragma_table_info(?) where not pk order by cid limit 1";
+        let column = sqlx::query_scalar(columns).bind(table).fetch_optional(&mut open(&database).await).await.unwrap();
+        let column: String = column.unwrap_or_else(|| sealed.key[0].to_owned());
+        statements.push(format!("update {table} set {column} = {column} || '1' where {column} is not null"));
+        statements.push(format!("delete from {table}"));
+    }
+    for sql in &statements {
+        let copy = touched(&database, sql).await;
+        let before = std::fs::read(&copy).unwrap();
+        let refused = Store::open(&copy).await;
+        let known = matches!(&refused, Err(StoreError::Damaged { .. } | StoreError::Unsealed { .. }));
+        assert!(known, "{sql}: {:?}", refused.err());
+        assert_eq!(std::fs::read(&copy).unwrap(), before, "{sql}: nothing was changed");
+    }
+    println!("{} changed or deleted rows keep the record from opening", statements.len());
+    for sql in [
+        "drop trigger users_no_delete",
+        "drop trigger feedback_no_update",
+        "create trigger evil after insert on remarks begin delete from events; end",
+        "create table more (x)",
+        "create view v as select 1",
+        "create index i on users (role)",
+    ] {
+        let copy = database.with_file_name("schema.db");
+        std::fs::copy(&database, &copy).unwrap();
+        let mut connection = open(&copy).await;
+        sqlx::query(sql).execute(&mut connection).await.unwrap();
+        connection.close().await.unwrap();
+        let refused = Store::open(&copy).await;
+        assert!(matches!(&refused, Err(StoreError::Damaged { .. })), "{sql}: {:?}", refused.err());
+    }
+}
+
+/// Writes without a seal through the writing connection, as if another program had done it unnoticed.
+async fn unnoticed(store: &Store, table: &str, sql: &str) {
+    let mut writer = store.write().await.unwrap();
+    let triggers = "select name, sql from sqlite_temp_master where type = 'trigger' and tbl_name = ?";
+    let triggers: Vec<(String, String)> = sqlx::query_as(triggers).bind(table).fetch_all(&mut **writer).await.unwrap();
+    assert_eq!(triggers.len(), 3, "{table}");
+    for (name, _) in &triggers {
+        sqlx::query(AssertSqlSafe(format!("drop trigger temp.{name}"))).execute(&mut **writer).await.unwrap();
+    }
+    let done = sqlx::query(AssertSqlSafe(sql.to_owned())).execute(&mut **writer).await.unwrap();
+    assert!(done.rows_affected() > 0, "{sql}");
+    for (_, text) in &triggers {
+        let text = text.replacen("CREATE TRIGGER", "create temp trigger", 1);
+        sqlx::query(AssertSqlSafe(text)).execute(&mut **writer).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_row_that_another_program_wrote_is_not_sealed_by_a_later_change() {
+    let (folder, database) = filled().await;
+    let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'admin', '')";
+    for (table, sql, change) in [
+        ("users", user, "update users set password = 'x' where id = 'mallory'"),
+        ("users", "update users set role = 'admin'", "update users set password = 'x'"),
+        ("studies", "update studies set created_at = '2000'", "update studies set name = name || '2'"),
+        ("studies", "update studies set created_at = '2000'", "update studies set created_at = created_at"),
+        ("tokens", "update tokens set scopes = '[\"administer\"]'", "update tokens set revoked_at = '2000'"),
+        ("sessions", "update sessions set by_link = 1 - by_link", "update sessions set seen_at = '2000'"),
+        ("sessions", "update sessions set by_link = 1 - by_link", "delete from sessions"),
+        ("sign_in_links", "update sign_in_links set expires_at = '9999'", "update sign_in_links set used_at = '2000'"),
+        ("sign_in_links", "update sign_in_links set expires_at = '9999'", "delete from sign_in_links"),
+        ("jobs", "update jobs set failures = failures + 1", "update jobs set state = state"),
+        ("idempotency_keys", "update idempotency_keys set body = 'x'", "delete from idempotency_keys"),
+    ] {
+        let copy = folder.path().join("copy.db");
+        for ending in ["", "-wal", "-shm", ".anchor"] {
+            let _ = std::fs::remove_file(folder.path().join(format!("copy.db{ending}")));
+        }
+        std::fs::copy(&database, &copy).unwrap();
+        let store = Store::open(&copy).await.unwrap();
+        // Whatever the rows, the program may change them as long as they are its own.
+        if sql != user {
+            let mut writer = store.write().await.unwrap();
+            let done = sqlx::query(AssertSqlSafe(change)).execute(&mut **writer).await.unwrap();
+            if done.rows_affected() == 0 {
+                println!("no rows for {change}");
+                drop(writer);
+                store.close().await;
+                continue;
+            }
+            if change.starts_with("update") {
+                commit(writer).await.unwrap();
+            }
+        }
+
+        unnoticed(&store, table, sql).await;
+        let mut writer = store.write().await.unwrap();
+        sqlx::query(AssertSqlSafe(change)).execute(&mut **writer).await.unwrap();
+        let refused = commit(writer).await;
+        let text = format!("{refused:?}");
+        assert!(matches!(refused, Err(StoreError::Damaged { .. })) && text.contains(table), "{sql}, {change}: {text}");
+        let found = seals::verify(&mut store.read().await.unwrap()).await.unwrap();
+        assert!(!matches!(found, SealCheck::Whole { .. }), "{sql}, {change}: the forged row was sealed");
+        // Other changes are still possible.
+        commit(store.write().await.unwrap()).await.unwrap();
+        store.close().await;
+    }
+}
+
+#[tokio::test]
+async fn a_row_can_be_added_changed_and_deleted_several_times_in_one_change() {
+    let (_folder, database) = filled().await;
+    let store = Store::open(&database).await.unwrap();
+    let link = "insert into sign_in_links (hash, user_id, created_at, expires_at) \
+                select substr(hex(zeroblob(32)), 1, 63) || 'a', id, '2000', '2001' from users limit 1";
+    let mut writer = store.write().await.unwrap();
+    for sql in [
+        link,
+        "update sign_in_links set used_at = '2000'",
+        "update sign_in_links set used_at = '2001'",
+        "delete from sign_in_links",
+        link,
+        "update studies set name = name || '2'",
+        "update studies set name = name || '3'",
+    ] {
+        sqlx::query(sql).execute(&mut **writer).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    for sql in ["delete from sign_in_links", "update studies set name = name || '4'"] {
+        sqlx::query(sql).execute(&mut **writer).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+    store.close().await;
+    store_verify::file(&database, &[]).await.unwrap();
 }
 
 #[tokio::test]

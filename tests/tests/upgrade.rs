@@ -226,3 +226,28 @@ async fn a_row_forged_in_an_old_record_is_not_sealed_by_the_upgrade() {
     assert!(refused.contains("of consents"), "{refused}");
     assert_eq!(versions(&database).await, [1], "the record is as it was");
 }
+
+#[tokio::test]
+async fn record_with_a_gap_in_its_list_of_migrations_is_refused() {
+    let (_, newest) = RECORDS[RECORDS.len() - 1];
+    for missing in 1..=FORM {
+        let (_folder, database) = unpacked(newest);
+        let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(&database)).await.unwrap();
+        let forget = "delete from _sqlx_migrations where version = ?";
+        sqlx::query(forget).bind(missing).execute(&pool).await.unwrap();
+        for sql in [
+            "insert into sign_in_links (hash, user_id, created_at, expires_at) \
+             select substr(hex(zeroblob(32)), 1, 63) || 'f', id, '2000', '2999' from users limit 1",
+            "drop table if exists checksums",
+        ] {
+            sqlx::query(sql).execute(&pool).await.unwrap();
+        }
+        pool.close().await;
+        let before = std::fs::read(&database).unwrap();
+        let refused = Store::open(&database).await.unwrap_err().to_string();
+        let found = format!("migration {missing} is missing");
+        // Without the first or the last one, it is a record of another program or of an earlier version.
+        assert!(refused.contains(&found) || missing == 1 || missing == FORM, "{missing}: {refused}");
+        assert_eq!(std::fs::read(&database).unwrap(), before, "{missing}: nothing was changed");
+    }
+}

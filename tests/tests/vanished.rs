@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gaitwright_store::backup_folder::BackupFolder;
 use gaitwright_store::{Store, StoreError, anchor, verify};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::skipped::skipped;
 use serde_json::json;
+use sqlx::Connection;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
@@ -80,6 +82,28 @@ async fn writes_are_refused_when_the_log_or_the_file_was_cut() {
 
 const SUBJECT: &str =
     "insert into subjects (id, pseudonym, height_m, body_mass_kg, created_at) values ('S', 'S', 1.8, 70, '')";
+
+#[tokio::test]
+async fn record_that_another_program_writes_to_accepts_no_further_changes() {
+    let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'admin', '')";
+    let trigger = "create trigger evil after insert on remarks begin \
+                   update remarks set note = 'x' where id = new.id; end";
+    for sql in [user, trigger, "update subjects set notes = 'forged'", "create table more (x)"] {
+        let (_folder, database, service) = service().await;
+        assert_eq!(add_subjects(&service, "before", 5).await, (5, 0));
+        let options = sqlx::sqlite::SqliteConnectOptions::new().filename(&database);
+        let mut other = sqlx::SqliteConnection::connect_with(&options).await.unwrap();
+        // A program that only reads is no reason to refuse changes.
+        sqlx::query("select * from users").fetch_all(&mut other).await.unwrap();
+        assert_eq!(add_subjects(&service, "between", 2).await, (2, 0));
+        sqlx::query(sqlx::AssertSqlSafe(sql)).execute(&mut other).await.unwrap();
+        assert_eq!(add_subjects(&service, "after", 5).await, (0, 5), "{sql}");
+        assert_eq!(service.fetch("/ready").await.status, StatusCode::SERVICE_UNAVAILABLE);
+        other.close().await.unwrap();
+        service.abandon().await;
+        assert!(Store::open(&database).await.is_err(), "{sql}");
+    }
+}
 
 #[tokio::test]
 async fn log_that_is_cut_within_a_commit_is_noticed_and_never_reaches_the_file() {
@@ -342,22 +366,24 @@ async fn a_backup_is_finished_without_its_requester_and_refused_when_it_cannot_b
 
 #[tokio::test]
 async fn scheduled_copies_are_made_checked_and_the_oldest_removed() {
-    let (_folder, database, service) = service().await;
+    let (_folder, _database, service) = service().await;
     let out = tempfile::tempdir().unwrap();
     std::fs::write(out.path().join("a.db.backup-by-hand"), "").unwrap();
     std::fs::write(out.path().join(".a.db.scheduled-1.9999999-0.copying"), "of a killed process").unwrap();
     let mut made = Vec::new();
+    let claimed = BackupFolder::claim(&service.store, out.path()).unwrap();
     for _ in 0..4 {
-        let (file, bytes) = gaitwright_store::backup::into_folder(&service.store, out.path(), 2).await.unwrap();
+        let (file, bytes) = claimed.add(&service.store, 2).await.unwrap();
         assert!(bytes > 0);
         gaitwright_store::backup::check(&file).await.unwrap();
         made.push(file.file_name().unwrap().to_str().unwrap().to_owned());
         tokio::time::sleep(std::time::Duration::from_millis(20)).await;
     }
-    let mut expected = vec!["a.db.backup-by-hand".to_owned(), made[2].clone(), made[3].clone()];
+    let mut expected =
+        vec!["a.db.backup-by-hand".to_owned(), "a.db.owner".to_owned(), made[2].clone(), made[3].clone()];
     expected.sort();
     assert_eq!(cli::files(out.path()), expected);
-    let kept = gaitwright_store::backup::scheduled(&database, out.path()).unwrap();
+    let kept = claimed.backups().unwrap();
     assert!(kept[0].0.ends_with(&made[3]), "{kept:?}");
     service.stop().await;
 }

@@ -210,8 +210,9 @@ impl Kind {
                 "/problems/record-vanished",
                 StatusCode::SERVICE_UNAVAILABLE,
                 "The record accepts no changes",
-                "The database file or its write-ahead log was deleted, replaced or truncated while the service was running. \
-                 The service refuses changes, because they could be lost.",
+                "The database file or its write-ahead log was deleted, replaced or truncated, or another program wrote to it, \
+                 while the service was running. The service refuses changes, because they could be lost or rest on forged \
+                 rows.",
                 "Tell the administrator to stop the service, run `gaitwright audit verify`, and restore a backup if it reports \
                  damage.",
             ),

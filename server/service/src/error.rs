@@ -186,7 +186,7 @@ impl From<StoreError> for Error {
             StoreError::Missing { what, id } => Self::NotFound { what: what.to_owned(), id },
             withdrawn if withdrawn.is_withdrawal() => Self::Conflict(StoreError::Withdrawn.to_string()),
             full if full.is_full() => Self::StorageFull(match full {
-                StoreError::NearlyFull { .. } => full.to_string(),
+                StoreError::NearlyFull { .. } | StoreError::CopyFull { .. } => full.to_string(),
                 _ => "The disk of the record is full. Nothing was changed. Free some space and try again.".to_owned(),
             }),
             closed if closed.is_unwritable() => {

@@ -24,7 +24,7 @@ impl Backup {
         }
         backup::of_file(&self.database, &self.to).await?;
         note_export(&self.database, "backup", "the whole record", Vec::new());
-        tell("backup written and checked");
+        tell("backup written and verified");
         data(&self.to.display().to_string())
     }
 }

@@ -3,9 +3,11 @@
 use gaitwright_service::error::Error;
 use gaitwright_service::supervise::Task;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::{Store, backup, commit};
+use gaitwright_store::backup_folder::BackupFolder;
+use gaitwright_store::{Store, commit};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 /// Delay after a failed backup.
@@ -19,12 +21,28 @@ pub(super) struct BackupPlan {
     pub(super) keep: usize,
 }
 
+/// A plan whose folder this process has claimed.
+#[derive(Debug, Clone)]
+pub(super) struct ClaimedPlan {
+    folder: Arc<BackupFolder>,
+    every: Duration,
+    keep: usize,
+}
+
 impl BackupPlan {
+    /// Claims the folder for the backups of a record.
+    pub(super) fn claim(self, store: &Store) -> Result<ClaimedPlan, Error> {
+        let folder = Arc::new(BackupFolder::claim(store, &self.folder)?);
+        Ok(ClaimedPlan { folder, every: self.every, keep: self.keep })
+    }
+}
+
+impl ClaimedPlan {
     /// Makes backups as long as the task runs. Failures are logged and retried.
     pub(super) async fn follow(self, store: Store, task: Task) -> Result<(), Error> {
         loop {
             task.works();
-            let wait = match self.due_in(&store) {
+            let wait = match self.due_in() {
                 Ok(Duration::ZERO) => match self.copy(&store).await {
                     Ok(()) => continue,
                     Err(error) => self.failed(&error),
@@ -37,24 +55,24 @@ impl BackupPlan {
     }
 
     /// Time until the next backup, counted from the newest one, so that a restart neither adds nor skips a backup.
-    fn due_in(&self, store: &Store) -> std::io::Result<Duration> {
-        let copies = backup::scheduled(store.path(), &self.folder)?;
+    fn due_in(&self) -> std::io::Result<Duration> {
+        let copies = self.folder.backups()?;
         let age = |made: SystemTime| SystemTime::now().duration_since(made).unwrap_or_default();
         Ok(copies.first().map_or(Duration::ZERO, |(_, made)| self.every.saturating_sub(age(*made))))
     }
 
     async fn copy(&self, store: &Store) -> Result<(), Error> {
-        let (file, bytes) = backup::into_folder(store, &self.folder, self.keep).await?;
+        let (file, bytes) = self.folder.add(store, self.keep).await?;
         let mut writer = store.write().await?;
         let (object, detail) = (format!("file {}", file.display()), json!({ "bytes": bytes, "scheduled": true }));
         audit::append(&mut writer, &Actor::program(), "record.backup", &object, &detail).await?;
         commit(writer).await?;
-        tracing::info!(file = %file.display(), bytes, "the record was backed up and the backup checked");
+        tracing::info!(file = %file.display(), bytes, "the record was backed up and the backup verified");
         Ok(())
     }
 
     fn failed(&self, error: &Error) -> Duration {
-        tracing::error!(folder = %self.folder.display(), %error, "the record was not backed up; retrying in ten minutes");
+        tracing::error!(folder = %self.folder.path().display(), %error, "the record was not backed up; retrying in ten minutes");
         RETRY
     }
 }

@@ -2,7 +2,7 @@
 
 use super::config::{Flags, Settings};
 use super::output::tell;
-use super::scheduled_backups::BackupPlan;
+use super::scheduled_backups::ClaimedPlan;
 use axum_server::tls_rustls::{RustlsAcceptor, RustlsConfig};
 use axum_server::{Handle, Server};
 use clap::Args;
@@ -75,6 +75,7 @@ impl Serve {
         listener.set_nonblocking(true).map_err(cannot_listen)?;
         let address = listener.local_addr().map_err(cannot_listen)?;
         let store = Store::open_anchored(&database, settings.anchor().as_deref()).await?;
+        let backups = backups.map(|plan| plan.claim(&store)).transpose()?;
         store.set_reserve(reserve);
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
@@ -210,7 +211,7 @@ pub(super) async fn interrupted() {
 
 /// Runs the housekeeping tasks until the scheduler stops: deletes expired data and makes backups. Failures are logged
 /// and retried. A task that panics is restarted, and `/ready` reports it.
-async fn keep_house(scheduler: Scheduler, store: Store, access_log_days: Option<u32>, backups: Option<BackupPlan>) {
+async fn keep_house(scheduler: Scheduler, store: Store, access_log_days: Option<u32>, backups: Option<ClaimedPlan>) {
     let dropping = scheduler.keep("deleting expired data", |task| retention::keep_dropping(store.clone(), task));
     let pruning = async {
         if let Some(days) = access_log_days {

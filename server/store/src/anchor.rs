@@ -6,7 +6,7 @@
 
 use super::audit::ORIGIN;
 use super::files::FileId;
-use super::whole_file::WholeFile;
+use super::whole_file::{WholeFile, folder_of};
 use super::{Connection, Instant, StoreError, StoreResult, beside, json, now};
 use serde::{Deserialize, Serialize};
 use sqlx::{AssertSqlSafe, Row};
@@ -137,6 +137,35 @@ pub(super) fn has_seen_rows(anchor: &Path) -> StoreResult<bool> {
     Ok(read(anchor)?.is_some_and(|ends| ends.audit.seq > 0 || ends.seals.seq > 0))
 }
 
+/// Endings of the files of a record.
+const OWN_FILES: [&str; 7] = ["", "-wal", "-shm", ".lock", ".anchor", ".access", ".restoring"];
+
+/// Refuses a second anchor that is another file: one of the record, one of the backup that is being restored, or any
+/// file that is not an anchor.
+pub(super) fn refuse_wrong(elsewhere: Option<&Path>, record: &Path, backup: Option<&Path>) -> StoreResult<()> {
+    let Some(anchor) = elsewhere else { return Ok(()) };
+    let wrong = |what| Err(StoreError::WrongAnchor { path: anchor.to_owned(), what });
+    let place = resolved(anchor);
+    let is_of = |file: &Path| OWN_FILES.iter().any(|ending| resolved(&beside(file, ending)) == place);
+    if is_of(record) {
+        return wrong("a file of the record");
+    }
+    if backup.is_some_and(is_of) {
+        return wrong("a file of the backup");
+    }
+    match read(anchor) {
+        Err(StoreError::Damaged { .. }) => wrong("not an anchor, or a damaged one"),
+        Err(error) => Err(error),
+        Ok(_) => Ok(()),
+    }
+}
+
+/// The path without links, also of a file that does not exist yet.
+fn resolved(path: &Path) -> PathBuf {
+    let of_folder = || Some(folder_of(path).canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(of_folder).unwrap_or_else(|| path.to_owned())
+}
+
 /// Replaces an anchor durably.
 pub(super) fn put(anchor: &Path, ends: &Ends) -> StoreResult<()> {
     let place = Place::new(1, ends.clone())?.bytes()?;
@@ -216,6 +245,8 @@ impl Anchor {
             let offset = (self.turn % 2) * PLACE_BYTES as u64;
             return file.seek(SeekFrom::Start(offset)).and_then(|_| file.write_all(&place)).map_err(cannot);
         }
+        // A file that was put in its place is not overwritten, unless it is an anchor.
+        read(&self.path)?;
         let made = make(&self.path, &place).and_then(|()| OpenOptions::new().write(true).open(&self.path));
         let opened = made.and_then(|file| Ok((FileId::of(&file.metadata()?), file)));
         let (id, file) = opened.map_err(cannot)?;

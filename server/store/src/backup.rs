@@ -1,15 +1,16 @@
-//! Backups of the record: consistent while the service is running, and checked.
+//! Backups of the record: consistent while the service is running, and verified.
 
 use super::whole_file::{WholeFile, folder_of};
-use super::{Store, StoreError, StoreResult, beside, file_kind, free_name, schema_versions};
+use super::{Store, StoreError, StoreResult, beside, file_kind, free_name, restore, schema_versions, verify};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Writes a compact backup of an open record to a new file and checks it.
+/// Writes a compact backup of an open record to a new file and verifies it.
 ///
 /// # Errors
-/// If the file exists or cannot be written, or the backup is damaged.
+/// If the file exists or cannot be written, and [`StoreError::Unverified`] if the record is damaged.
 pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
     into_file(&store.readers, to, store.path()).await
 }
@@ -34,45 +35,6 @@ pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
 /// [`StoreError::NearlyFull`].
 pub fn room(store: &Store) -> StoreResult<()> {
     store.room_for_copy(store.path())
-}
-
-/// Prefix of the names of scheduled backups.
-const SCHEDULED: &str = "scheduled";
-
-/// Writes a scheduled backup to a folder (`gaitwright.db.scheduled-20260501T101500`), checks it, and removes the oldest
-/// ones beyond `keep`. Returns the new file and its size.
-///
-/// # Errors
-/// As [`of_store`], [`StoreError::NearlyFull`], and when an old copy cannot be removed.
-pub async fn into_folder(store: &Store, folder: &Path, keep: usize) -> StoreResult<(PathBuf, u64)> {
-    let _turn = store.copying.lock().await;
-    let name = store.path().file_name().unwrap_or_default();
-    let to = free_name(&folder.join(name), SCHEDULED);
-    store.room_for_copy(&to)?;
-    of_store(store, &to).await?;
-    let cannot = |source| StoreError::Open { path: folder.to_owned(), source };
-    let size = std::fs::metadata(&to).map_err(cannot)?.len();
-    for (old, _) in scheduled(store.path(), folder).map_err(cannot)?.into_iter().skip(keep) {
-        std::fs::remove_file(&old).map_err(|source| StoreError::Open { path: old, source })?;
-    }
-    Ok((to, size))
-}
-
-/// The scheduled backups of a record in a folder, newest first, with their times.
-///
-/// # Errors
-/// If the folder cannot be read.
-pub fn scheduled(record: &Path, folder: &Path) -> std::io::Result<Vec<(PathBuf, std::time::SystemTime)>> {
-    let start = format!("{}.{SCHEDULED}-", record.file_name().unwrap_or_default().to_string_lossy());
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
-        let entry = entry?;
-        if entry.file_name().to_string_lossy().starts_with(&start) {
-            found.push((entry.metadata()?.modified()?, entry.path()));
-        }
-    }
-    found.sort();
-    Ok(found.into_iter().rev().map(|(made, path)| (path, made)).collect())
 }
 
 /// The backups next to the record, newest first, with their names and sizes.
@@ -127,6 +89,7 @@ pub async fn check(file: &Path) -> StoreResult<()> {
 /// # Errors
 /// [`StoreError::Open`], [`StoreError::NotADatabase`], [`StoreError::NewerSchema`].
 pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
+    restore::refuse_interrupted(file)?;
     file_kind::check(file)?;
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
     // Small, because a row may contain a whole measurement file.
@@ -178,22 +141,40 @@ fn private_folder() -> std::io::Result<PathBuf> {
     Ok(folder)
 }
 
-/// Writes a compact backup to a new file, checks it, and gives it its name.
+/// Writes a compact backup to a new file, verifies it, and gives it its name.
 async fn into_file(pool: &SqlitePool, to: &Path, record: &Path) -> StoreResult<()> {
-    let cannot_write = |source| StoreError::Open { path: to.to_owned(), source };
     if to.exists() {
-        return Err(cannot_write(std::io::ErrorKind::AlreadyExists.into()));
+        return Err(cannot_write(to, ErrorKind::AlreadyExists.into()));
     }
-    whole_copy(pool, to, record).await?.keep_as(to).map_err(cannot_write)
+    whole_copy(pool, record, to, record).await?.keep_as(to).map_err(|error| cannot_write(to, error))
 }
 
-/// Writes and checks a compact copy that has no final name yet.
-pub(super) async fn whole_copy(pool: &SqlitePool, to: &Path, record: &Path) -> StoreResult<WholeFile> {
-    let family = record.file_name().unwrap_or_default().to_string_lossy();
-    let copy = WholeFile::begin(to, &family).map_err(|source| StoreError::Open { path: to.to_owned(), source })?;
-    sqlx::query("vacuum into ?").bind(copy.part().to_string_lossy().into_owned()).execute(pool).await?;
-    check(copy.part()).await?;
-    Ok(copy)
+/// Writes a compact copy of the record or backup `from` that has no final name yet, and verifies its rows, seals and
+/// chains. `family` is the record whose leftovers in the same folder are deleted.
+pub(super) async fn whole_copy(pool: &SqlitePool, from: &Path, to: &Path, family: &Path) -> StoreResult<WholeFile> {
+    let family = family.file_name().unwrap_or_default().to_string_lossy();
+    let copy = WholeFile::begin(to, &family).map_err(|error| cannot_write(to, error))?;
+    let written = sqlx::query("vacuum into ?").bind(copy.part().to_string_lossy().into_owned()).execute(pool).await;
+    written.map_err(|error| match StoreError::from(error) {
+        full if full.is_full() => StoreError::CopyFull { path: to.to_owned() },
+        other => other,
+    })?;
+    match verify::file(copy.part(), &[]).await {
+        Ok(_) => Ok(copy),
+        Err(error @ (StoreError::Damaged { .. } | StoreError::Unsealed { .. })) => {
+            Err(StoreError::Unverified { path: from.to_owned(), reason: error.to_string() })
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// The error for a copy that cannot be written.
+pub(super) fn cannot_write(to: &Path, source: std::io::Error) -> StoreError {
+    let path = to.to_owned();
+    match source.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => StoreError::CopyFull { path },
+        _ => StoreError::Open { path, source },
+    }
 }
 
 pub(super) async fn check_open(pool: &SqlitePool) -> StoreResult<()> {

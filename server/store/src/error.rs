@@ -128,6 +128,55 @@ pub enum StoreError {
         /// The primary key of the row.
         key: String,
     },
+    /// A second anchor is another file.
+    #[error("The anchor {} is {what}; it must be a new file, or an anchor of this record.", path.display())]
+    WrongAnchor {
+        /// The path of the anchor.
+        path: PathBuf,
+        /// Which file it is.
+        what: &'static str,
+    },
+    /// A folder has the scheduled backups of another record.
+    #[error(
+        "The backup folder {} belongs to the record {record}; each record must have a folder of its own. If the record was \
+         moved from there, delete {}.",
+        folder.display(), claim.display()
+    )]
+    FolderOfOther {
+        /// The folder.
+        folder: PathBuf,
+        /// The path of the other record.
+        record: String,
+        /// The file that says so.
+        claim: PathBuf,
+    },
+    /// A record or a backup is damaged, so it was not copied.
+    #[error(
+        "{} does not verify, so it was not copied and nothing was changed. {reason} Use a record or a backup that \
+         `gaitwright audit verify` finds intact.",
+        path.display()
+    )]
+    Unverified {
+        /// The record or the backup.
+        path: PathBuf,
+        /// What was found.
+        reason: String,
+    },
+    /// A restore was killed before it was complete.
+    #[error(
+        "A restore of {} was interrupted. Start the service or run `gaitwright restore` again, which finishes or undoes it.",
+        path.display()
+    )]
+    RestoreInterrupted {
+        /// The record.
+        path: PathBuf,
+    },
+    /// The disk of a copy is full.
+    #[error("The disk of {} is full, so the copy was not written. Free some space there or choose another folder.", path.display())]
+    CopyFull {
+        /// The copy.
+        path: PathBuf,
+    },
     /// A migration failed.
     #[error("Cannot migrate the database: {0}.")]
     Migrate(#[from] sqlx::migrate::MigrateError),
@@ -188,7 +237,7 @@ impl StoreError {
     pub fn is_full(&self) -> bool {
         let says_so = |text: &str| text.contains("database or disk is full");
         match self {
-            Self::NearlyFull { .. } => true,
+            Self::NearlyFull { .. } | Self::CopyFull { .. } => true,
             Self::NotDurable(reason) => says_so(reason),
             Self::Database(sqlx::Error::Database(found)) => says_so(found.message()),
             _ => false,

@@ -89,6 +89,11 @@ impl Files {
         }
     }
 
+    /// Refuses all further changes, because another program wrote to the record.
+    pub(super) fn refuse_second_writer(&self) -> StoreError {
+        self.refuse("another program wrote to it".to_owned())
+    }
+
     fn log(&self) -> MutexGuard<'_, Log> {
         self.log.lock().unwrap_or_else(PoisonError::into_inner)
     }

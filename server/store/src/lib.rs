@@ -16,6 +16,7 @@ pub mod archived_allocations;
 pub mod assessments;
 pub mod audit;
 pub mod backup;
+pub mod backup_folder;
 pub mod certificates;
 pub mod clock;
 pub mod consents;
@@ -154,15 +155,17 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
-    /// [`StoreError::NewerSchema`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
-    /// if the record contradicts an anchor, [`StoreError::Unsealed`] if another program wrote a row; errors of the
-    /// database.
+    /// [`StoreError::NewerSchema`], [`StoreError::WrongAnchor`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
+    /// if the record contradicts an anchor, [`StoreError::Unsealed`] and [`StoreError::Damaged`] if another program
+    /// added, changed or deleted a row or changed the schema; errors of the database.
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {
+        anchor::refuse_wrong(elsewhere, path, None)?;
         file_kind::check(path)?;
         let anchors: Vec<PathBuf> =
             [Some(anchor::beside_record(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
         let mut owner = Ownership::take(path)?;
         let checked = async {
+            restore::finish_interrupted(path)?;
             refuse_unchanged(path).await?;
             refuse_empty_in_place_of_record(path, &anchors)?;
             owner.make_database(path)
@@ -194,7 +197,9 @@ impl Store {
             .busy_timeout(Duration::from_secs(10))
             // Each table has its own statements for seals.
             .statement_cache_capacity(400);
-        let only = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
+        // Few rows ahead, because the verification reads rows that contain whole measurement files.
+        let one = options.clone().row_buffer_size(quarantine::ROWS_AHEAD);
+        let only = SqlitePoolOptions::new().max_connections(1).connect_with(one).await?;
         if schema_versions::check_version(&only, path).await? == 0 {
             refuse_to_begin_anew(path, &anchors)?;
         } else {
@@ -202,6 +207,7 @@ impl Store {
                 anchor::check(&mut *only.acquire().await?, path, anchor).await?;
             }
         }
+        let version = writing::data_version(&mut *only.acquire().await?).await?;
         migrations::apply(&only, path).await?;
         if let Some(newest) = audit::newest(&mut *only.acquire().await?).await? {
             time::never_before(newest);
@@ -212,7 +218,7 @@ impl Store {
         sqlx::query("pragma wal_autocheckpoint = 0").execute(&mut connection).await?;
         let files = Arc::new(Files::of(path)?);
         let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
-        let writing = Arc::new(Writing::new(connection, space::Space::of(path), outside));
+        let writing = Arc::new(Writing::new(connection, Some(version), space::Space::of(path), outside));
         let readers = SqlitePoolOptions::new()
             .max_connections(4)
             .idle_timeout(None)

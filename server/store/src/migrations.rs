@@ -1,24 +1,29 @@
 //! Migrates a record at start, in one transaction, after a backup.
 
 use super::schema_versions::{FORM, check_version, up_to};
-use super::{StoreError, StoreResult, backup, beside, seals};
+use super::{StoreError, StoreResult, backup, beside, seals, verify};
 use sqlx::SqlitePool;
 use std::path::{Path, PathBuf};
 
 /// Length of the header of an SQLite file.
 const SQLITE_HEADER_BYTES: usize = 100;
 
-/// Migrates a record and seals the rows that the migrations wrote, in one transaction. Refuses a record with a row that
-/// this program did not write, and leaves it unchanged.
+/// Verifies a record, migrates it, and seals the rows that the migrations wrote, in one transaction. Refuses a record
+/// that another program changed, and leaves it unchanged.
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     let found = check_version(pool, path).await?;
     back_up_before(pool, path, found).await?;
     let mut change = pool.begin().await?;
-    let before = seals::present(&mut change).await?;
-    seals::watch(&mut change).await?;
-    up_to(FORM).run_direct(None, &mut *change, false).await?;
-    seals::adopt(&mut change, &before).await?;
-    seals::refuse_unsealed(&mut change).await?;
+    if found > 0 {
+        verify::rows(&mut change, found).await?;
+    }
+    if found < FORM {
+        let before = seals::present(&mut change).await?;
+        seals::watch_migrations(&mut change).await?;
+        up_to(FORM).run_direct(None, &mut *change, false).await?;
+        seals::adopt(&mut change, &before).await?;
+        seals::end_watch(&mut change).await?;
+    }
     Ok(change.commit().await?)
 }
 
@@ -29,7 +34,7 @@ async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResu
     }
     let name = beside(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
-    let copy = backup::whole_copy(pool, &name, path).await?;
+    let copy = backup::whole_copy(pool, path, &name, path).await?;
     match free_name(&name, copy.part()).map_err(cannot_write)? {
         Some(free) => copy.keep_as(&free).map_err(cannot_write),
         None => Ok(()),

@@ -1,65 +1,186 @@
 //! Replaces a record with a backup. The old record may be damaged or of a newer version, so it is never opened.
+//!
+//! The backup takes the name of the record in one step, but the log and the anchor of the old record must go as well. A
+//! marker beside the record says so. If the process is killed, the next owner of the record finishes the restore if the
+//! backup has the name already, and otherwise leaves the old record with its log as it is.
 
+use super::anchor::{self, Ends};
 use super::ownership::Ownership;
 use super::whole_file::{WholeFile, sync_folder};
-use super::{StoreError, StoreResult, anchor, backup, beside, free_name};
+use super::{StoreError, StoreResult, backup, beside, free_name, json};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 use std::fs::File;
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// SQLite's companion files.
 const COMPANIONS: [&str; 2] = ["-wal", "-shm"];
 
+/// A restore that has begun to replace a record.
+#[derive(Debug, Serialize, Deserialize)]
+struct Marker {
+    /// Hash of the backup, which tells whether it has the name of the record.
+    sha256: String,
+    /// The last rows of its chains, for the anchors.
+    ends: Ends,
+    /// The second anchor.
+    elsewhere: Option<PathBuf>,
+}
+
+/// A step of a restore that is on the disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    OldRecordKept,
+    Marked,
+    Renamed,
+    LogRemoved,
+    Anchored,
+}
+
 /// Replaces a record with a backup, and updates the anchors to it. Returns where the old record is kept.
 ///
 /// # Errors
-/// [`StoreError::InUse`] while a process owns the record, errors of [`backup::check`] for the backup, or a file that
-/// cannot be written. The record is unchanged then.
+/// [`StoreError::InUse`] while a process owns the record, errors of [`backup::check`] for the backup,
+/// [`StoreError::Unverified`], [`StoreError::WrongAnchor`], or a file that cannot be written. The record is unchanged
+/// then, or the next start finishes the restore.
 pub async fn from_file(from: &Path, to: &Path, elsewhere: Option<&Path>) -> StoreResult<Option<PathBuf>> {
+    replace(from, to, elsewhere, &|_| {}).await
+}
+
+async fn replace(
+    from: &Path,
+    to: &Path,
+    elsewhere: Option<&Path>,
+    reached: &(dyn Fn(Step) + Sync),
+) -> StoreResult<Option<PathBuf>> {
+    anchor::refuse_wrong(elsewhere, to, Some(from))?;
     backup::check(from).await?;
     let _owner = Ownership::take(to)?;
+    finish_interrupted(to)?;
     let cannot_write = |source| StoreError::Open { path: to.to_owned(), source };
     // Copy through SQLite, because part of the backup may be in its log.
     let pool = backup::open_read_only(from).await?;
     let copied = async {
         let ends = anchor::ends(&mut *pool.acquire().await?).await?;
-        Ok::<_, StoreError>((ends, backup::whole_copy(&pool, to, to).await?))
+        Ok::<_, StoreError>((ends, backup::whole_copy(&pool, from, to, to).await?))
     };
     let copied = copied.await;
     pool.close().await;
     let (ends, copy) = copied?;
     let kept = to.exists().then(|| free_name(to, "before"));
-    let beside_record = anchor::beside_record(to);
-    put(copy, to, kept.as_deref(), &beside_record).map_err(cannot_write)?;
-    for anchor in std::iter::once(beside_record.as_path()).chain(elsewhere) {
-        anchor::put(anchor, &ends)?;
+    if let Some(kept) = &kept {
+        keep(to, kept).map_err(|error| backup::cannot_write(kept, error))?;
+        like(to, copy.part());
     }
+    reached(Step::OldRecordKept);
+    let sha256 = hash_of(copy.part()).map_err(cannot_write)?;
+    let elsewhere = elsewhere.map(std::path::absolute).transpose().map_err(cannot_write)?;
+    let marker = Marker { sha256, ends, elsewhere };
+    mark(to, &marker)?;
+    reached(Step::Marked);
+    if let Err(error) = copy.replace(to) {
+        finish_interrupted(to)?;
+        return Err(cannot_write(error));
+    }
+    reached(Step::Renamed);
+    finish(to, &marker, reached)?;
     Ok(kept)
 }
 
-fn put(copy: WholeFile, to: &Path, kept: Option<&Path>, anchor: &Path) -> std::io::Result<()> {
-    // If the process is killed before the last step, the old record is still in place.
-    if let Some(kept) = kept {
-        let family = to.file_name().unwrap_or_default().to_string_lossy();
-        for ending in ["", COMPANIONS[0], ".anchor"] {
-            let present = beside(to, ending);
-            if present.exists() {
-                let target = beside(kept, ending);
-                let mut whole = WholeFile::begin(&target, &family)?;
-                std::io::copy(&mut File::open(&present)?, whole.file())?;
-                whole.keep_as(&target)?;
-            }
-        }
-        like(to, copy.part());
-    }
-    // The log and the anchor of the old record must not be used with the backup.
-    let others = COMPANIONS.map(|ending| beside(to, ending));
-    for present in others.iter().map(PathBuf::as_path).chain([anchor]) {
+/// Copies the old record with its log and its anchor.
+fn keep(to: &Path, kept: &Path) -> io::Result<()> {
+    let family = to.file_name().unwrap_or_default().to_string_lossy();
+    for ending in ["", COMPANIONS[0], ".anchor"] {
+        let present = beside(to, ending);
         if present.exists() {
-            std::fs::remove_file(present)?;
+            let target = beside(kept, ending);
+            let mut whole = WholeFile::begin(&target, &family)?;
+            io::copy(&mut File::open(&present)?, whole.file())?;
+            whole.keep_as(&target)?;
         }
     }
-    sync_folder(to)?;
-    copy.replace(to)
+    Ok(())
+}
+
+/// The path of the marker beside a record.
+fn marker_of(record: &Path) -> PathBuf {
+    beside(record, ".restoring")
+}
+
+fn mark(record: &Path, marker: &Marker) -> StoreResult<()> {
+    let (path, text) = (marker_of(record), json::to_text("restore", marker)?);
+    let family = record.file_name().unwrap_or_default().to_string_lossy();
+    let written = WholeFile::begin(&path, &family).and_then(|mut whole| {
+        whole.file().write_all(text.as_bytes())?;
+        whole.replace(&path)
+    });
+    written.map_err(|source| StoreError::Open { path, source })
+}
+
+/// Refuses to read a record that a killed restore left half replaced.
+pub(super) fn refuse_interrupted(record: &Path) -> StoreResult<()> {
+    if marker_of(record).exists() {
+        return Err(StoreError::RestoreInterrupted { path: record.to_owned() });
+    }
+    Ok(())
+}
+
+/// Finishes the restore of a killed process if the backup has the name of the record, and forgets it otherwise. To be
+/// called by the owner of the record, before the record is opened.
+pub(super) fn finish_interrupted(record: &Path) -> StoreResult<()> {
+    let path = marker_of(record);
+    let cannot_read = |source| StoreError::Open { path: path.clone(), source };
+    let text = match std::fs::read_to_string(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        other => other.map_err(cannot_read)?,
+    };
+    let marker: Marker = json::from_text("restore", &text)?;
+    let is_renamed = match hash_of(record) {
+        Err(error) if error.kind() == ErrorKind::NotFound => false,
+        hash => hash.map_err(cannot_read)? == marker.sha256,
+    };
+    if is_renamed {
+        finish(record, &marker, &|_| {})?;
+        tracing::warn!(record = %record.display(), "an interrupted restore was finished: the record is the backup");
+    } else {
+        unmark(record)?;
+        tracing::warn!(record = %record.display(), "an interrupted restore was undone: the record is as it was before");
+    }
+    Ok(())
+}
+
+/// Removes the log of the old record, which must not be used with the backup, and updates the anchors.
+fn finish(record: &Path, marker: &Marker, reached: &dyn Fn(Step)) -> StoreResult<()> {
+    let others = COMPANIONS.map(|ending| beside(record, ending));
+    for path in others.into_iter().filter(|path| path.exists()) {
+        std::fs::remove_file(&path).map_err(|source| StoreError::Open { path, source })?;
+    }
+    sync_folder(record).map_err(|source| StoreError::Open { path: record.to_owned(), source })?;
+    reached(Step::LogRemoved);
+    let beside_record = anchor::beside_record(record);
+    for anchor in std::iter::once(&beside_record).chain(&marker.elsewhere) {
+        anchor::put(anchor, &marker.ends)?;
+    }
+    reached(Step::Anchored);
+    unmark(record)
+}
+
+/// Removes the marker durably: with a later change in the log, it would cost that change.
+fn unmark(record: &Path) -> StoreResult<()> {
+    let path = marker_of(record);
+    let removed = std::fs::remove_file(&path).and_then(|()| sync_folder(record));
+    removed.map_err(|source| StoreError::Open { path, source })
+}
+
+fn hash_of(file: &Path) -> io::Result<String> {
+    let (mut file, mut hash, mut bytes) = (File::open(file)?, Sha256::new(), vec![0; 1 << 20]);
+    loop {
+        match file.read(&mut bytes)? {
+            0 => return Ok(hex::encode(hash.finalize())),
+            read => hash.update(bytes.get(..read).unwrap_or_default()),
+        }
+    }
 }
 
 /// Gives the backup the owner and the permissions of the old record.
@@ -72,4 +193,90 @@ fn like(present: &Path, copy: &Path) {
     }
     #[cfg(not(unix))]
     let _ = (present, copy);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Store, commit, verify};
+    use std::process::Command;
+
+    /// Step, backup and record of the process that is killed.
+    const VARIABLE: &str = "GAITWRIGHT_TEST_KILLED_RESTORE";
+    const STEPS: [Step; 5] = [Step::OldRecordKept, Step::Marked, Step::Renamed, Step::LogRemoved, Step::Anchored];
+
+    async fn add(store: &Store, name: &str) {
+        let sql = "insert into subjects (id, pseudonym, height_m, body_mass_kg, created_at) values (?, ?, 1.8, 70, '')";
+        let mut writer = store.write().await.unwrap();
+        sqlx::query(sql).bind(name).bind(name).execute(&mut **writer).await.unwrap();
+        commit(writer).await.unwrap();
+    }
+
+    async fn subjects(store: &Store) -> Vec<String> {
+        let mut reader = store.read().await.unwrap();
+        sqlx::query_scalar("select id from subjects order by id").fetch_all(&mut **reader).await.unwrap()
+    }
+
+    /// The process that [`killed_restore_is_finished_or_undone_and_loses_no_acknowledged_change`] starts.
+    #[tokio::test]
+    async fn restore_that_is_killed_at_a_step() {
+        let Ok(text) = std::env::var(VARIABLE) else { return };
+        let parts: Vec<&str> = text.split('|').collect();
+        let die = |step: Step| {
+            if format!("{step:?}") == parts[0] {
+                std::process::abort();
+            }
+        };
+        replace(Path::new(parts[1]), Path::new(parts[2]), Some(Path::new(parts[3])), &die).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn killed_restore_is_finished_or_undone_and_loses_no_acknowledged_change() {
+        for step in STEPS {
+            let folder = tempfile::tempdir().unwrap();
+            let path = |name: &str| folder.path().join(name);
+            let (live, record, copy, elsewhere) =
+                (path("live.db"), path("a.db"), path("copy.db"), path("elsewhere.anchor"));
+            let store = Store::open(&live).await.unwrap();
+            add(&store, "before").await;
+            backup::of_store(&store, &copy).await.unwrap();
+            add(&store, "after").await;
+            // As a killed service leaves them: the last change is in the log.
+            for ending in ["", "-wal", ".anchor"] {
+                std::fs::copy(beside(&live, ending), beside(&record, ending)).unwrap();
+            }
+            std::fs::copy(anchor::beside_record(&live), &elsewhere).unwrap();
+            store.close().await;
+
+            let [copy, record_text, second] = [&copy, &record, &elsewhere].map(|path| path.to_str().unwrap());
+            let killed = Command::new(std::env::current_exe().unwrap())
+                .args(["--exact", "restore::tests::restore_that_is_killed_at_a_step"])
+                .env(VARIABLE, format!("{step:?}|{copy}|{record_text}|{second}"))
+                .output()
+                .unwrap();
+            assert!(!killed.status.success(), "{step:?}: {killed:?}");
+
+            let is_renamed = !matches!(step, Step::OldRecordKept | Step::Marked);
+            if step != Step::OldRecordKept {
+                let refused = verify::file(&record, &[]).await;
+                assert!(matches!(refused, Err(StoreError::RestoreInterrupted { .. })), "{step:?}: {refused:?}");
+            }
+            let store = Store::open_anchored(&record, Some(&elsewhere)).await.unwrap();
+            let expected: &[&str] = if is_renamed { &["before"] } else { &["after", "before"] };
+            assert_eq!(subjects(&store).await, expected, "{step:?}");
+            add(&store, "later").await;
+            store.close().await;
+            verify::file(&record, std::slice::from_ref(&elsewhere)).await.unwrap();
+
+            // The record that was replaced is whole, with the change in its log.
+            let names = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+            let kept = names.into_iter().find(|name| {
+                let name = name.file_name().unwrap().to_str().unwrap();
+                name.starts_with("a.db.before-") && !name.ends_with("-wal") && !name.ends_with(".anchor")
+            });
+            let store = Store::open(&kept.unwrap()).await.unwrap();
+            assert_eq!(subjects(&store).await, ["after", "before"], "{step:?}");
+            store.close().await;
+        }
+    }
 }

@@ -40,7 +40,8 @@ pub(super) fn up_to(newest: i64) -> Migrator {
     Migrator::with_migrations(migrations)
 }
 
-/// The schema version of a file. Refuses files of other programs and of newer versions.
+/// The schema version of a file. Refuses files of other programs and of newer versions, and a list of migrations with a
+/// gap, because the missing migrations would be applied again and their rows sealed.
 pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult<i64> {
     let known = FILES[FILES.len() - 1].0;
     let found = version(pool).await?;
@@ -61,7 +62,15 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
     if found > known {
         return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });
     }
-    Ok(found)
+    let applied = "select version from _sqlx_migrations where success order by version";
+    let applied: Vec<i64> = if found == 0 { Vec::new() } else { sqlx::query_scalar(applied).fetch_all(pool).await? };
+    match FILES.iter().map(|file| file.0).take_while(|version| *version <= found).find(|v| !applied.contains(v)) {
+        None => Ok(found),
+        Some(missing) => {
+            let reason = format!("its schema has version {found}, but migration {missing} is missing from its list");
+            Err(StoreError::Damaged { what: "evidence", reason })
+        }
+    }
 }
 
 /// The newest applied migration; 0 for a new file.

@@ -2,7 +2,8 @@
 //! change often, such as leases, have a replaceable checksum instead, so that the chain does not grow with them.
 //!
 //! Temporary triggers of the writing connection note which rows a change writes, and the rows are sealed before the
-//! commit. So no code can forget a seal, and writes of other programs get none.
+//! commit. So no code can forget a seal, and writes of other programs get none. The triggers also keep the old row of
+//! an update or a deletion: it must match its seal, so that the program never seals what another program wrote.
 
 use super::audit::ORIGIN;
 use super::{Connection, StoreError, StoreResult, json};
@@ -10,6 +11,7 @@ use futures_util::TryStreamExt;
 use sha2::{Digest, Sha256};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Number of seals read at a time during verification.
 const BATCH: i64 = 1000;
@@ -95,6 +97,28 @@ pub const NOT_SEALED: &[&str] = &["audit", "seals", "checksums"];
 /// The table of applied migrations.
 const MIGRATIONS: &str = "_sqlx_migrations";
 
+/// What a trigger saw of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Event {
+    Insert,
+    Update,
+    Delete,
+}
+
+impl Event {
+    const ALL: [Self; 3] = [Self::Insert, Self::Update, Self::Delete];
+    /// A row that a migration wrote. The record was verified in the same transaction, before the migrations.
+    const MIGRATED: &str = "migrated";
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Insert => "insert",
+            Self::Update => "update",
+            Self::Delete => "delete",
+        }
+    }
+}
+
 impl Sealed {
     /// SQL for the key of a row as text; `row` is `new.`, `old.`, or the table and a dot.
     fn key_of(&self, row: &str) -> String {
@@ -107,20 +131,66 @@ impl Sealed {
         CHECKED.iter().any(|checked| checked.table == self.table)
     }
 
-    /// SQL of the trigger that notes rows touched by `event` (such as `after insert`). Deleting a row deletes its
-    /// checksum immediately, because many rows are pruned together.
-    fn trigger(&self, event: &str) -> String {
-        let (table, old, new) = (self.table, self.key_of("old."), self.key_of("new."));
-        let forget = format!("delete from checksums where evidence = '{table}' and key = {old};");
-        let note = |key: &str| format!("insert into unsealed (evidence, key) values ('{table}', {key});");
-        let act = match event {
-            "after delete" if self.is_checked() => forget,
-            "after update" if self.is_checked() => forget + &note(&new),
-            "after delete" => note(&old),
-            _ => note(&new),
+    /// The temporary table of the old rows of one change.
+    fn old_rows(&self) -> String {
+        format!("old_{}", self.table)
+    }
+
+    /// SQL for the hash that the record has of a row: its newest seal or its checksum.
+    fn known_hash(&self, key: &str) -> String {
+        let table = self.table;
+        if self.is_checked() {
+            format!("(select c.sha256 from checksums c where c.evidence = '{table}' and c.key = cast({key} as text))")
+        } else {
+            format!(
+                "(select s.sha256 from seals s where s.evidence = '{table}' and s.key = cast({key} as text) \
+                 order by s.seq desc limit 1)"
+            )
+        }
+    }
+
+    /// SQL of the trigger that notes rows touched by `event`, and keeps the old ones in these columns. Deleting a row
+    /// deletes its checksum immediately, because many rows are pruned together.
+    fn trigger(&self, event: Event, keep: Option<&[String]>) -> String {
+        let (table, name) = (self.table, event.name());
+        let key = self.key_of(if event == Event::Delete { "old." } else { "new." });
+        let (noted, known) = match keep {
+            Some(_) => (name, self.known_hash(&key)),
+            None => (Event::MIGRATED, "null".to_owned()),
         };
-        let name = format!("{table}_{}", event.replace(' ', "_"));
-        format!("create temp trigger if not exists {name} {event} on main.{table} begin {act} end")
+        let note = "insert into unsealed (evidence, key, event, known)";
+        let mut acts = vec![format!("{note} values ('{table}', {key}, '{noted}', {known});")];
+        if let Some(columns) = keep.filter(|_| event != Event::Insert) {
+            let old: Vec<String> = columns.iter().map(|column| format!("old.\"{column}\"")).collect();
+            let place = "(select max(place) from unsealed)";
+            acts.push(format!("insert into {} values ({place}, {});", self.old_rows(), old.join(", ")));
+        }
+        if event != Event::Insert && self.is_checked() {
+            let old = self.key_of("old.");
+            acts.push(format!("delete from checksums where evidence = '{table}' and key = {old};"));
+        }
+        let acts = acts.join(" ");
+        format!("create temp trigger if not exists {table}_after_{name} after {name} on main.{table} begin {acts} end")
+    }
+
+    /// The key of an old row that differs from the hash that the record had of it. Only the first note of a row in a
+    /// change counts, because later ones have rows that this program wrote.
+    async fn old_row_unlike(&self, db: &mut Connection, firsts: &HashSet<i64>) -> StoreResult<Option<String>> {
+        let sql = format!(
+            "select o.*, n.known as \"{JOINT}known\", n.key as \"{JOINT}key\" from {} o \
+             join unsealed n on n.place = o.\"{JOINT}place\"",
+            self.old_rows()
+        );
+        let mut rows = sqlx::query(AssertSqlSafe(sql)).fetch(&mut *db);
+        while let Some(row) = rows.try_next().await? {
+            let known: Option<&str> = row.try_get(format!("{JOINT}known").as_str())?;
+            if firsts.contains(&row.try_get::<i64, _>(0)?) && known != Some(hash_of_row(&row)?.as_str()) {
+                return Ok(Some(row.try_get(format!("{JOINT}key").as_str())?));
+            }
+        }
+        drop(rows);
+        sqlx::query(AssertSqlSafe(format!("delete from {}", self.old_rows()))).execute(db).await?;
+        Ok(None)
     }
 
     /// The hash of the current row; empty if it was deleted.
@@ -140,23 +210,50 @@ impl Sealed {
 /// SQL for the hash in the newest seal of a row; `None` if the table has no seals.
 pub(super) fn newest_of(table: &str) -> Option<String> {
     let sealed = TABLES.iter().find(|sealed| sealed.table == table)?;
-    let key = sealed.key_of(&format!("{table}."));
-    Some(format!(
-        "(select s.sha256 from seals s where s.evidence = '{table}' and s.key = cast({key} as text) \
-         order by s.seq desc limit 1)"
-    ))
+    Some(sealed.known_hash(&sealed.key_of(&format!("{table}."))))
 }
 
 /// Installs the triggers on a connection.
 pub(super) async fn watch(db: &mut Connection) -> StoreResult<()> {
-    // Seals follow the order of writing.
-    let notes = "create temp table if not exists unsealed \
-                 (place integer primary key, evidence text not null, key text not null)";
-    sqlx::query(notes).execute(&mut *db).await?;
     for sealed in present(db).await? {
-        for event in ["after insert", "after update", "after delete"] {
-            sqlx::query(AssertSqlSafe(sealed.trigger(event))).execute(&mut *db).await?;
-        }
+        // As `select *`, which has hidden columns neither.
+        let columns = "select name from pragma_table_xinfo(?) where hidden <> 1 order by cid";
+        let columns: Vec<String> = sqlx::query_scalar(columns).bind(sealed.table).fetch_all(&mut *db).await?;
+        let names: Vec<String> = columns.iter().map(|column| format!("\"{column}\"")).collect();
+        // Columns without a type keep every value as it is.
+        let old_rows =
+            format!("create temp table if not exists {} (\"{JOINT}place\", {})", sealed.old_rows(), names.join(", "));
+        sqlx::query(AssertSqlSafe(old_rows)).execute(&mut *db).await?;
+        install(db, sealed, Some(&columns)).await?;
+    }
+    Ok(())
+}
+
+/// Installs triggers that keep no old rows, because migrations change their columns.
+pub(super) async fn watch_migrations(db: &mut Connection) -> StoreResult<()> {
+    for sealed in present(db).await? {
+        install(db, sealed, None).await?;
+    }
+    Ok(())
+}
+
+/// Removes the triggers of [`watch_migrations`].
+pub(super) async fn end_watch(db: &mut Connection) -> StoreResult<()> {
+    let names = "select name from sqlite_temp_master where type = 'trigger'";
+    let names: Vec<String> = sqlx::query_scalar(names).fetch_all(&mut *db).await?;
+    for name in names {
+        sqlx::query(AssertSqlSafe(format!("drop trigger temp.{name}"))).execute(&mut *db).await?;
+    }
+    Ok(())
+}
+
+async fn install(db: &mut Connection, sealed: Sealed, keep: Option<&[String]>) -> StoreResult<()> {
+    // Seals follow the order of writing. `known` is the hash that the record has of the row at that time.
+    let notes = "create temp table if not exists unsealed (place integer primary key, evidence text not null, \
+                 key text not null, event text not null default 'migrated', known text)";
+    sqlx::query(notes).execute(&mut *db).await?;
+    for event in Event::ALL {
+        sqlx::query(AssertSqlSafe(sealed.trigger(event, keep))).execute(&mut *db).await?;
     }
     Ok(())
 }
@@ -173,7 +270,7 @@ pub(super) async fn present(db: &mut Connection) -> StoreResult<Vec<Sealed>> {
 /// Seals the rows of tables that did not exist `before` the migrations of the current transaction. Existing rows are
 /// sealed nowhere else.
 pub(super) async fn adopt(db: &mut Connection, before: &[Sealed]) -> StoreResult<()> {
-    watch(db).await?;
+    watch_migrations(db).await?;
     let added = present(db).await?.into_iter().filter(|sealed| !before.iter().any(|known| known.table == sealed.table));
     for sealed in added {
         let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
@@ -183,28 +280,61 @@ pub(super) async fn adopt(db: &mut Connection, before: &[Sealed]) -> StoreResult
     seal(db).await
 }
 
-/// Refuses a record with a row that has neither a seal nor a checksum, because this program did not write it.
-pub(super) async fn refuse_unsealed(db: &mut Connection) -> StoreResult<()> {
-    for sealed in present(db).await? {
-        if let Some(key) = without_seal(db, sealed).await? {
-            return Err(StoreError::Unsealed { table: sealed.table.to_owned(), key });
-        }
-    }
-    Ok(())
+/// The error for a row that differs from its seal or its checksum, or that has none, or that is missing.
+pub(super) fn touched(table: &str, key: &str) -> StoreError {
+    let reason = format!("row {key} of {table} was changed, added or deleted outside the program");
+    StoreError::Damaged { what: "evidence", reason }
+}
+
+/// A row that a change touched, as it was first noted.
+struct Noted {
+    table: String,
+    key: String,
+    event: String,
+    known: Option<String>,
 }
 
 /// Seals the noted rows.
+///
+/// # Errors
+/// [`StoreError::Damaged`] if another program had changed, added or deleted one of these rows before.
 pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
     // A single query, because every change waits for it.
-    let noted = "select evidence, key, (select hash from seals order by seq desc limit 1) from unsealed \
-                 group by evidence, key order by min(place)";
+    let noted = "select place, evidence, key, event, known, (select hash from seals order by seq desc limit 1) \
+                 from unsealed order by place";
     let noted = sqlx::query(noted).fetch_all(&mut *db).await?;
     let Some(first) = noted.first() else { return Ok(()) };
-    let mut previous: String = first.try_get::<Option<String>, _>(2)?.unwrap_or_else(|| ORIGIN.to_owned());
+    let mut previous: String = first.try_get::<Option<String>, _>(5)?.unwrap_or_else(|| ORIGIN.to_owned());
+    let mut rows: Vec<Noted> = Vec::new();
+    let mut places = HashMap::<(&str, &str), usize>::new();
+    let mut deleted = HashSet::new();
+    // The tables with old rows, each with the places of those that another change wrote.
+    let mut old_rows = BTreeMap::<String, HashSet<i64>>::new();
     for row in &noted {
-        let (table, key): (&str, &str) = (row.try_get(0)?, row.try_get(1)?);
+        let (table, key, event): (&str, &str, &str) = (row.try_get(1)?, row.try_get(2)?, row.try_get(3)?);
+        let has_old_row = event == Event::Update.name() || event == Event::Delete.name();
+        let at = *places.entry((table, key)).or_insert(rows.len());
+        if has_old_row {
+            let places = old_rows.entry(table.to_owned()).or_default();
+            if at == rows.len() {
+                places.insert(row.try_get(0)?);
+            }
+        }
+        if at == rows.len() {
+            let (table, key, event) = (table.to_owned(), key.to_owned(), event.to_owned());
+            rows.push(Noted { table, key, event, known: row.try_get(4)? });
+        }
+        // What became of a row at last.
+        if event == Event::Delete.name() {
+            deleted.insert(at)
+        } else {
+            deleted.remove(&at)
+        };
+    }
+    refuse_touched(db, &rows, &old_rows).await?;
+    for (at, Noted { table, key, .. }) in rows.iter().enumerate() {
         if let Some(checked) = CHECKED.iter().find(|checked| checked.table == table) {
-            let sha256 = checked.hash_of(db, key).await?;
+            let sha256 = if deleted.contains(&at) { String::new() } else { checked.hash_of(db, key).await? };
             if !sha256.is_empty() {
                 let keep = sqlx::query("insert or replace into checksums (evidence, key, sha256) values (?, ?, ?)");
                 keep.bind(table).bind(key).bind(sha256).execute(&mut *db).await?;
@@ -228,6 +358,26 @@ pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
     Ok(())
 }
 
+/// Refuses a change of rows that were not whole before it.
+async fn refuse_touched(
+    db: &mut Connection,
+    noted: &[Noted],
+    old_rows: &BTreeMap<String, HashSet<i64>>,
+) -> StoreResult<()> {
+    // A seal or a checksum of a row that was not there: it was deleted outside the program.
+    let was_there = |row: &&Noted| row.known.as_ref().is_some_and(|known| !known.is_empty());
+    if let Some(row) = noted.iter().filter(|row| row.event == Event::Insert.name()).find(was_there) {
+        return Err(touched(&row.table, &row.key));
+    }
+    for (table, firsts) in old_rows {
+        let Some(sealed) = TABLES.iter().chain(CHECKED).find(|sealed| sealed.table == table) else { continue };
+        if let Some(key) = sealed.old_row_unlike(db, firsts).await? {
+            return Err(touched(table, &key));
+        }
+    }
+    Ok(())
+}
+
 /// The result of verifying the seals.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SealCheck {
@@ -245,7 +395,14 @@ pub enum SealCheck {
         /// Sequence number of the seal.
         seq: i64,
     },
-    /// A row was changed, added or deleted outside the program.
+    /// A row was added outside the program.
+    Unsealed {
+        /// The table.
+        table: String,
+        /// The primary key.
+        key: String,
+    },
+    /// A row was changed or deleted outside the program.
     Touched {
         /// The table.
         table: String,
@@ -269,13 +426,13 @@ pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
     }
     let known = present(db).await?;
     for sealed in &known {
-        let unlike = match without_seal(db, *sealed).await? {
-            None if sealed.is_checked() => unlike_checksum(db, *sealed).await?,
-            None => unlike_seal(db, *sealed).await?,
-            found => found,
-        };
-        if let Some(key) = unlike {
-            return Ok(SealCheck::Touched { table: sealed.table.to_owned(), key });
+        if let Some((key, without_seal)) = unlike(db, *sealed).await? {
+            let table = sealed.table.to_owned();
+            return Ok(if without_seal {
+                SealCheck::Unsealed { table, key }
+            } else {
+                SealCheck::Touched { table, key }
+            });
         }
     }
     Ok(match of_no_table(db, &known).await? {
@@ -327,62 +484,33 @@ async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
     Ok(SealCheck::Whole { seals: after.unsigned_abs(), last })
 }
 
-/// The key of a row without a seal.
-async fn without_seal(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<String>> {
+/// The key of a row that differs from the hash that the record has of it, and whether it has none; or the key of a hash
+/// whose row is missing.
+async fn unlike(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<(String, bool)>> {
     let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
-    let seals = if sealed.is_checked() { "checksums" } else { "seals" };
-    let sql = format!(
-        "select cast({key} as text) as k from {table} \
-         where not exists (select 1 from {seals} where evidence = '{table}' and key = cast({key} as text)) limit 1"
-    );
-    Ok(sqlx::query_scalar(AssertSqlSafe(sql)).fetch_optional(db).await?)
-}
-
-/// The key of a row that differs from its checksum, or of a checksum without a row.
-async fn unlike_checksum(db: &mut Connection, checked: Sealed) -> StoreResult<Option<String>> {
-    let (table, key) = (checked.table, checked.key_of(&format!("{}.", checked.table)));
-    let gone = format!(
-        "select key from checksums where evidence = '{table}' except select cast({key} as text) from {table} limit 1"
-    );
-    if let Some(key) = sqlx::query_scalar(AssertSqlSafe(gone)).fetch_optional(&mut *db).await? {
-        return Ok(Some(key));
-    }
-    let sql = format!(
-        "select {table}.*, k.key as \"{JOINT}key\", k.sha256 as \"{JOINT}sha256\" from {table} \
-         join checksums k on k.evidence = '{table}' and k.key = cast({key} as text)"
-    );
-    let mut rows = sqlx::query(AssertSqlSafe(sql)).fetch(db);
-    while let Some(row) = rows.try_next().await? {
-        if hash_of_row(&row)? != row.try_get::<&str, _>(format!("{JOINT}sha256").as_str())? {
-            return Ok(Some(row.try_get(format!("{JOINT}key").as_str())?));
-        }
-    }
-    Ok(None)
-}
-
-/// The key of a row that differs from its newest seal.
-async fn unlike_seal(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<String>> {
-    let mut after = 0_i64;
-    loop {
-        let batch = sqlx::query(
-            "select seq, key, sha256 from seals s where evidence = ? and seq > ? and not exists \
-             (select 1 from seals n where n.evidence = s.evidence and n.key = s.key and n.seq > s.seq) \
-             order by seq limit ?",
+    let hashes = if sealed.is_checked() {
+        format!("select key from checksums where evidence = '{table}'")
+    } else {
+        format!(
+            "select key from seals s where evidence = '{table}' and sha256 <> '' and not exists \
+             (select 1 from seals n where n.evidence = s.evidence and n.key = s.key and n.seq > s.seq)"
         )
-        .bind(sealed.table)
-        .bind(after)
-        .bind(BATCH)
-        .fetch_all(&mut *db)
-        .await?;
-        let Some(last) = batch.last() else { return Ok(None) };
-        after = last.try_get("seq")?;
-        for row in &batch {
-            let key: String = row.try_get("key")?;
-            if sealed.hash_of(db, &key).await? != row.try_get::<&str, _>("sha256")? {
-                return Ok(Some(key));
-            }
+    };
+    let gone = format!("{hashes} except select cast({key} as text) from {table} limit 1");
+    let sql = format!(
+        "select {table}.*, cast({key} as text) as \"{JOINT}key\", {} as \"{JOINT}known\" from {table}",
+        sealed.known_hash(&key)
+    );
+    let mut rows = sqlx::query(AssertSqlSafe(sql)).fetch(&mut *db);
+    while let Some(row) = rows.try_next().await? {
+        let known: Option<&str> = row.try_get(format!("{JOINT}known").as_str())?;
+        if known != Some(hash_of_row(&row)?.as_str()) {
+            return Ok(Some((row.try_get(format!("{JOINT}key").as_str())?, known.is_none())));
         }
     }
+    drop(rows);
+    let gone: Option<String> = sqlx::query_scalar(AssertSqlSafe(gone)).fetch_optional(db).await?;
+    Ok(gone.map(|key| (key, false)))
 }
 
 /// The hash of a seal and the previous one.
@@ -403,11 +531,11 @@ fn hash_of_row(row: &SqliteRow) -> StoreResult<String> {
             continue;
         }
         let kind = raw.type_info().name().to_owned();
-        let bytes = match kind.as_str() {
-            "INTEGER" | "BOOLEAN" => row.try_get::<i64, _>(place)?.to_be_bytes().to_vec(),
-            "REAL" => row.try_get::<f64, _>(place)?.to_bits().to_be_bytes().to_vec(),
+        let bytes: &[u8] = match kind.as_str() {
+            "INTEGER" | "BOOLEAN" => &row.try_get::<i64, _>(place)?.to_be_bytes(),
+            "REAL" => &row.try_get::<f64, _>(place)?.to_bits().to_be_bytes(),
             // Read as bytes, because damaged text may not be valid UTF-8.
-            _ => row.try_get_unchecked::<Vec<u8>, _>(place)?,
+            _ => row.try_get_unchecked::<&[u8], _>(place)?,
         };
         hash.update(format!("{name}\n{kind}\n{}\n", bytes.len()));
         hash.update(bytes);

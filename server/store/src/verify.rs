@@ -1,11 +1,12 @@
 //! Verifies a record: its file, schema, hash chains, every row, and its anchors.
 
 use super::anchor::{self, Ends};
-use super::{Connection, StoreError, StoreResult, audit, backup, schema_versions, seals};
+use super::{Connection, FORM, StoreError, StoreResult, audit, backup, schema_versions, seals};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row, SqliteConnection, SqlitePool};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use tokio::sync::OnceCell;
 
 /// The result for an intact record.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,25 +32,11 @@ pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
 }
 
 async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
-    let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     backup::check_open(pool).await?;
     let version = schema_versions::check_version(pool, record).await?;
     // One consistent state for all comparisons.
     let mut db = pool.begin().await?;
-    schema(&mut db, version).await?;
-    let audit = match audit::verify(&mut db).await? {
-        audit::ChainCheck::Whole { rows, last } => (rows, last),
-        audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
-    };
-    let seals = match seals::verify(&mut db).await? {
-        seals::SealCheck::Whole { seals, last } => Some((seals, last)),
-        seals::SealCheck::None => None,
-        seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
-        seals::SealCheck::Touched { table, key } => {
-            return Err(damaged(format!("row {key} of {table} was changed, added or deleted outside the program")));
-        }
-    };
-    sequences(&mut db).await?;
+    let (audit, seals) = rows(&mut db, version).await?;
     let mut seen = Vec::new();
     for anchor in std::iter::once(anchor::beside_record(record)).chain(anchors.iter().cloned()) {
         match anchor::check(&mut db, record, &anchor).await? {
@@ -63,13 +50,38 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
     Ok(Whole { audit, seals, anchors: seen })
 }
 
+/// Number of links of a chain, and the hash of the last one.
+type Chain = (u64, String);
+
+/// Verifies schema, chains, and every row of a record of this version. Returns the audit trail and the seals.
+///
+/// # Errors
+/// [`StoreError::Damaged`], or [`StoreError::Unsealed`] for a row that was added outside the program.
+pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chain, Option<Chain>)> {
+    let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
+    schema(db, version).await?;
+    let audit = match audit::verify(db).await? {
+        audit::ChainCheck::Whole { rows, last } => (rows, last),
+        audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
+    };
+    let seals = match seals::verify(db).await? {
+        seals::SealCheck::Whole { seals, last } => Some((seals, last)),
+        seals::SealCheck::None => None,
+        seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
+        seals::SealCheck::Unsealed { table, key } => return Err(StoreError::Unsealed { table, key }),
+        seals::SealCheck::Touched { table, key } => return Err(seals::touched(&table, &key)),
+    };
+    sequences(db).await?;
+    Ok((audit, seals))
+}
+
 /// Checks that tables, indices, triggers and views match the schema_versions, because a missing trigger protects nothing.
 async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
-    let options = SqliteConnectOptions::new().filename(":memory:");
-    let mut fresh = SqliteConnection::connect_with(&options).await?;
-    schema_versions::up_to(version).run_direct(None, &mut fresh, false).await?;
-    let (expected, found) = (parts(&mut fresh).await?, parts(db).await?);
-    fresh.close().await?;
+    let expected = match version {
+        FORM => PRESENT.get_or_try_init(|| created(FORM)).await?,
+        older => &created(older).await?,
+    };
+    let found = parts(db).await?;
     match expected.symmetric_difference(&found).next() {
         None => Ok(()),
         Some((kind, name, ..)) => {
@@ -79,9 +91,25 @@ async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
     }
 }
 
-/// Kind, name, table and text of each part of a schema. A library writes the list of schema_versions; the tests of upgrades
+/// The parts of the schema that this program creates.
+async fn created(version: i64) -> StoreResult<BTreeSet<Part>> {
+    let options = SqliteConnectOptions::new().filename(":memory:");
+    let mut fresh = SqliteConnection::connect_with(&options).await?;
+    schema_versions::up_to(version).run_direct(None, &mut fresh, false).await?;
+    let parts = parts(&mut fresh).await?;
+    fresh.close().await?;
+    Ok(parts)
+}
+
+/// Kind, name, table and text of a part of a schema.
+type Part = (String, String, String, Option<String>);
+
+/// The parts of the newest schema, which every start compares.
+static PRESENT: OnceCell<BTreeSet<Part>> = OnceCell::const_new();
+
+/// The parts of a schema. A library writes the list of schema_versions; the tests of upgrades
 /// detect if a version of it changes the text.
-async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<(String, String, String, Option<String>)>> {
+async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<Part>> {
     let sql = "select type, name, tbl_name, sql from sqlite_master";
     Ok(sqlx::query_as(sql).fetch_all(db).await?.into_iter().collect())
 }

@@ -18,14 +18,13 @@ pub(crate) struct WholeFile {
 }
 
 impl WholeFile {
-    /// Creates an empty hidden file next to `target`, readable by its owner only. Deletes hidden files of killed
-    /// processes whose names start with `family`.
+    /// Creates an empty hidden file next to `target`, readable by its owner only. Its name starts with `family`, whatever
+    /// the target, so that the next one of the family deletes it if this process is killed.
     pub(crate) fn begin(target: &Path, family: &str) -> io::Result<Self> {
         let folder = folder_of(target);
         remove_left_over(folder, family);
-        let name = target.file_name().unwrap_or_default().to_string_lossy();
         for number in 0_u32.. {
-            let part = folder.join(format!(".{name}.{}-{number}{PART}", std::process::id()));
+            let part = folder.join(format!(".{family}.{}-{number}{PART}", std::process::id()));
             match private().write(true).read(true).create_new(true).open(&part) {
                 Ok(file) => {
                     // Locked while this process lives. Without file locks, leftovers must be deleted by hand.
@@ -167,6 +166,18 @@ mod tests {
             use std::os::unix::fs::PermissionsExt;
             assert_eq!(std::fs::metadata(&target).unwrap().permissions().mode() & 0o777, 0o600);
         }
+    }
+
+    #[test]
+    fn leftover_is_deleted_whatever_the_name_of_the_next_copy() {
+        let folder = tempfile::tempdir().unwrap();
+        let killed = WholeFile::begin(&folder.path().join("copy1.db"), "a.db").unwrap();
+        let name = killed.part().to_owned();
+        let bytes = std::fs::read(&name).unwrap();
+        drop(killed);
+        std::fs::write(&name, bytes).unwrap();
+        drop(WholeFile::begin(&folder.path().join("copy2.db"), "a.db").unwrap());
+        assert_eq!(names(folder.path()), [""; 0]);
     }
 
     #[test]

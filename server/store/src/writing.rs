@@ -67,6 +67,16 @@ impl Outside {
         self.files.as_ref().map_or(Ok(()), |files| files.check())
     }
 
+    /// [`Self::check`], and refuses a record that another program has changed since the last call. Called after the
+    /// beginning of a transaction, when no other program can write.
+    async fn check_alone(&self, connection: &mut SqliteConnection, seen: Option<i64>) -> StoreResult<i64> {
+        let version = data_version(connection).await?;
+        match &self.files {
+            Some(files) if seen.is_some_and(|seen| seen != version) => Err(files.refuse_second_writer()),
+            _ => Ok(version),
+        }
+    }
+
     /// [`Self::check`], and verifies the log after a commit. Returns the number of frames.
     async fn check_log(&self, connection: &mut SqliteConnection) -> StoreResult<u32> {
         let frames = log_frames(connection).await?;
@@ -82,13 +92,17 @@ struct State {
     group: Option<watch::Sender<Outcome>>,
     /// Whether a change has begun and not ended.
     begun: bool,
+    /// The data version of the connection, which changes with every commit of another connection.
+    version: Option<i64>,
 }
 
 impl Writing {
-    /// Takes over a connection that nothing else writes with.
-    pub(super) fn new(connection: SqliteConnection, space: Space, outside: Outside) -> Self {
+    /// Takes over a connection that nothing else writes with. `version` is its data version when the record was
+    /// verified.
+    pub(super) fn new(connection: SqliteConnection, version: Option<i64>, space: Space, outside: Outside) -> Self {
         let line = Line::new(Some(connection).into());
-        let shared = Arc::new(Shared { state: Mutex::default(), ended: Notify::new(), space, outside });
+        let state = State { version, ..State::default() };
+        let shared = Arc::new(Shared { state: Mutex::new(state), ended: Notify::new(), space, outside });
         let flusher = tokio::spawn(supervise_flushing(Arc::clone(&line), Arc::clone(&shared)));
         Self { line, shared, flusher }
     }
@@ -268,6 +282,14 @@ async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
             return Err(error);
         }
         run(&mut connection, "begin immediate").await?;
+        let seen = shared.state().version;
+        match shared.outside.check_alone(&mut connection, seen).await {
+            Ok(version) => shared.state().version = Some(version),
+            Err(error) => {
+                let _ = run(&mut connection, "rollback").await;
+                return Err(error);
+            }
+        }
         shared.state().group = Some(watch::channel(None).0);
     }
     if let Err(error) = run(&mut connection, "savepoint change").await {
@@ -302,6 +324,11 @@ async fn keep_flushing(line: Line, shared: Arc<Shared>) {
     }
 }
 
+/// A number that differs from the last one if another connection has committed in between.
+pub(super) async fn data_version(connection: &mut SqliteConnection) -> StoreResult<i64> {
+    Ok(sqlx::query_scalar("pragma data_version").fetch_one(connection).await?)
+}
+
 /// Number of frames in the write-ahead log.
 async fn log_frames(connection: &mut SqliteConnection) -> StoreResult<u32> {
     let row = sqlx::query("pragma wal_checkpoint(noop)").fetch_one(connection).await?;
@@ -333,7 +360,7 @@ mod tests {
     async fn table(file: &std::path::Path) -> Writing {
         let mut connection = open(file).await;
         run(&mut connection, "create table t (x integer primary key) strict").await.unwrap();
-        Writing::new(connection, Space::of(file), Outside::default())
+        Writing::new(connection, None, Space::of(file), Outside::default())
     }
 
     async fn insert(writer: &mut Writer, x: i64) -> Result<(), sqlx::Error> {
