@@ -11,7 +11,7 @@ const LETTERS: [char; 16] =
 pub struct Drawn {
     document: Value,
     state: u64,
-    drawn: u64,
+    texts: u64,
     /// What a field refers to: one of these values is drawn.
     pub known: BTreeMap<&'static str, Vec<Value>>,
 }
@@ -19,7 +19,7 @@ pub struct Drawn {
 impl Drawn {
     /// Draws from a description.
     pub fn from(document: Value) -> Self {
-        Self { document, state: 1, drawn: 0, known: BTreeMap::new() }
+        Self { document, state: 1, texts: 0, known: BTreeMap::new() }
     }
 
     /// A whole number below `end` (SplitMix64, Steele et al. 2014).
@@ -117,10 +117,10 @@ impl Drawn {
             1 => most,
             _ => least + self.below(most - least + 1),
         };
-        self.drawn += 1;
+        self.texts += 1;
         // Names are taken once: a number makes each another one, where it fits.
         let letter = |digit: u32| char::from_u32(u32::from('a') + digit).unwrap();
-        let code: String = self.drawn.to_string().chars().filter_map(|c| c.to_digit(10)).map(letter).collect();
+        let code: String = self.texts.to_string().chars().filter_map(|c| c.to_digit(10)).map(letter).collect();
         let is_code = pattern.starts_with("^(?!");
         let mut text: Vec<char> = code.chars().take(usize::try_from(length).unwrap()).collect();
         while (text.len() as u64) < length {

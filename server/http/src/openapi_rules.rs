@@ -254,7 +254,7 @@ fn widen(schema: &mut Value, other: &Value) {
             }
         }
         (Value::Array(items), Value::Array(others)) => {
-            items.iter_mut().zip(others).for_each(|(own, other)| widen(own, other))
+            items.iter_mut().zip(others).for_each(|(own, other)| widen(own, other));
         }
         _ => {}
     }
