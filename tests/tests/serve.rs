@@ -232,17 +232,12 @@ async fn busy_connections_of_nine_addresses_leave_another_address_room() {
         }
     }
     tokio::time::sleep(Duration::from_secs(1)).await;
-    let address = process.address().to_owned();
-    let times = tokio::task::spawn_blocking(move || {
-        let time = |_| {
-            let begun = std::time::Instant::now();
-            assert_eq!(get(&address, "/health").unwrap().status, 200);
-            begun.elapsed()
-        };
-        (0..8).map(time).collect::<Vec<_>>()
-    });
-    let times = times.await.unwrap();
-    assert!(times.iter().all(|time| *time < Duration::from_secs(2)), "{times:?}");
+    // The other threads of the runtime go on dripping.
+    for call in 0..8 {
+        let begun = std::time::Instant::now();
+        assert_eq!(get(process.address(), "/health").unwrap().status, 200, "call {call}");
+        assert!(begun.elapsed() < Duration::from_secs(2), "call {call} took {:?}", begun.elapsed());
+    }
 }
 
 /// A record whose administrators are all disabled, as older versions let it become.
