@@ -72,7 +72,8 @@ async fn no_csv_endpoint_gives_a_formula() {
     let mut asked = BTreeSet::new();
     for (path, operations) in description["paths"].as_object().unwrap() {
         let Some(content) = operations["get"]["responses"]["200"]["content"].as_object() else { continue };
-        if !content.contains_key("text/csv") {
+        // A measurement file is given out byte for byte as it was uploaded.
+        if !content.contains_key("text/csv") || path == "/api/v1/measurement-files/{id}/content" {
             continue;
         }
         let id = if path.contains("/trials/{id}") { good[0].to_string() } else { study.to_string() };

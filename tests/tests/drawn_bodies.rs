@@ -7,6 +7,7 @@ use axum::Router;
 use axum::body::Body;
 use axum::http::{Request, StatusCode, header};
 use gaitwright_http::openapi;
+use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, TrialId};
 use gaitwright_tests::analytic::Analytic;
@@ -45,7 +46,12 @@ impl Scene {
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
         let finished = service.study(|new| (new.trial_budget, new.feedback_mode) = (18, FeedbackMode::Mixed)).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
-        let human = service.study(|new| (new.trial_budget, new.feedback_mode) = (40, FeedbackMode::Human)).await;
+        // Of another subject: what is reported as unsafe there closes no gait here.
+        let other = service.fetch("/api/v1/subjects").await.items()[1]["id"].as_str().unwrap().parse().unwrap();
+        let of_another = |new: &mut NewStudy| {
+            (new.subject_id, new.trial_budget, new.feedback_mode) = (other, 40, FeedbackMode::Human);
+        };
+        let human = service.study(of_another).await;
         service.wait_for(human, &[StudyState::Waiting]).await;
         let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 5000)).await;
         let converged = service.trials(finished).await.into_iter().filter(|trial| trial.gait_rmse_rad.is_some());

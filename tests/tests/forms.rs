@@ -142,8 +142,8 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
     };
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     for (field, value, says) in [
-        ("muscles", "maybe", "it must be on, off"),
-        ("muscles", "", "it must be on, off"),
+        ("muscles", "maybe", "it must be on or off"),
+        ("muscles", "", "it must be on or off"),
         ("feedback_mode", "both", "it must be automatic, human or mixed"),
         ("trial_budget", "-1", "it must be 1 to 10000"),
         ("parallel_trials", "1.5", "it must be 1 to 64"),

@@ -126,6 +126,7 @@ struct Saved {
     text: String,
     at: String,
     retracted: bool,
+    is_safety_report: bool,
     /// Answers of others to the same comparison: author and text.
     other_answers: Vec<(String, String)>,
 }
@@ -259,6 +260,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 text,
                 at: row.created_at.minute(),
                 retracted: row.retraction.is_some(),
+                is_safety_report: false,
                 other_answers,
             })
         }
@@ -272,6 +274,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 text,
                 at: assessment.created_at.minute(),
                 retracted: assessment.retraction.is_some(),
+                is_safety_report: assessment.answer.is_about_safety(),
                 other_answers: Vec::new(),
             })
         }

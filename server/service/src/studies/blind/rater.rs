@@ -181,6 +181,9 @@ pub async fn answer(
             "one of the other answers, because only the service withdraws pairs",
         ));
     }
+    if shown.answer.is_some() {
+        return Err(Error::conflict(answered_already(sided.answer())));
+    }
     printable::note("note", &given.note, 2000)?;
     if given.response_ms.is_some_and(|ms| ms < 0) {
         return Err(Error::invalid("response_ms", json!(given.response_ms), "0 or more"));

@@ -196,10 +196,11 @@ pub enum GaitOfWalk {
 /// of its gaits is not walkable, the allocation is not in this record, or the subject withdrew consent.
 pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, walk: u8) -> Result<GaitOfWalk, Error> {
     let session = still_shown(writer, id).await?;
-    gaits_to_walk_with(writer, &session, walk).await?;
+    checked_device_walk(walk)?;
     if !session.allocation.included {
         return Err(not_included());
     }
+    gaits_to_walk_with(writer, &session, walk).await?;
     let to_device = caller.is_device();
     let is_one = allocations::for_device(writer, id, walk, (&caller.actor, to_device)).await?;
     let detail = json!({ "walk": walk, "to_device": to_device });
