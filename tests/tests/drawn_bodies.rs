@@ -9,7 +9,7 @@ use axum::http::{Request, StatusCode, header};
 use gaitwright_http::openapi;
 use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
-use gaitwright_store::{StudyId, TrialId};
+use gaitwright_store::{StudyId, SubjectId, TrialId};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::drawn::Drawn;
 use gaitwright_tests::measured::{electromyogram, four_strides, motion};
@@ -47,7 +47,10 @@ impl Scene {
         let finished = service.study(|new| (new.trial_budget, new.feedback_mode) = (18, FeedbackMode::Mixed)).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
         // Of another subject: what is reported as unsafe there closes no gait here.
-        let other = service.fetch("/api/v1/subjects").await.items()[1]["id"].as_str().unwrap().parse().unwrap();
+        let own = service.subject().await;
+        let subjects = service.fetch("/api/v1/subjects").await.items();
+        let ids = subjects.as_array().unwrap().iter().map(|subject| subject["id"].as_str().unwrap().parse().unwrap());
+        let other: SubjectId = ids.into_iter().find(|id| *id != own).unwrap();
         let of_another = |new: &mut NewStudy| {
             (new.subject_id, new.trial_budget, new.feedback_mode) = (other, 40, FeedbackMode::Human);
         };
@@ -114,7 +117,7 @@ impl Scene {
         }
         let gaits = json!({"gait_one": self.trials[0], "gait_two": self.trials[1]});
         let id = self.id_of(&format!("/studies/{}/lab-sessions", self.finished), gaits).await;
-        for walk in if walked { 1..=3 } else { 1..=0 } {
+        for walk in 1..=if walked { 3 } else { 0 } {
             self.post(&format!("/lab-sessions/{id}/walks"), json!({"walk": walk})).await;
         }
         id

@@ -23,7 +23,7 @@ const UNPRINTABLE: &str =
     r"\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069";
 
 /// Names: component, field and maximum length.
-const NAMES: [(&str, &str, u32); 11] = [
+const NAMES: [(&str, &str, u32); 12] = [
     ("NewUser", "name", 80),
     ("NewToken", "name", 80),
     ("Invitation", "name", 80),
@@ -34,6 +34,7 @@ const NAMES: [(&str, &str, u32); 11] = [
     ("Ask", "worker", 80),
     ("NewPreference", "author", 80),
     ("NewAssessment", "author", 80),
+    ("NewSafetyReport", "author", 80),
     ("Suggestion", "author", 80),
 ];
 
@@ -57,9 +58,16 @@ pub(super) fn state(document: &mut Value) {
             add(schemas, component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
         }
         add(schemas, "NewConsent", "form", &json!({ "pattern": needed }));
-        for component in
-            ["NewPreference", "NewAssessment", "Suggestion", "RaterAnswer", "NewLabAnswer", "RecordedWalk", "Closing"]
-        {
+        for component in [
+            "NewPreference",
+            "NewAssessment",
+            "NewSafetyReport",
+            "Suggestion",
+            "RaterAnswer",
+            "NewLabAnswer",
+            "RecordedWalk",
+            "Closing",
+        ] {
             add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["Tell", "Why"] {
@@ -76,7 +84,7 @@ pub(super) fn state(document: &mut Value) {
         let people =
             json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers" });
         schemas.insert("PersonSource".to_owned(), people);
-        for component in ["NewPreference", "NewAssessment", "Suggestion"] {
+        for component in ["NewPreference", "NewAssessment", "NewSafetyReport", "Suggestion"] {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
             set(schemas, component, "source", one);
         }

@@ -200,12 +200,10 @@ impl Store {
         // Few rows ahead, because the verification reads rows that contain whole measurement files.
         let one = options.clone().row_buffer_size(quarantine::ROWS_AHEAD);
         let only = SqlitePoolOptions::new().max_connections(1).connect_with(one).await?;
-        if schema_versions::check_version(&only, path).await? == 0 {
-            refuse_to_begin_anew(path, &anchors)?;
-        } else {
-            for anchor in &anchors {
-                anchor::check(&mut *only.acquire().await?, path, anchor).await?;
-            }
+        if let Err(refused) = check_history(&only, path, &anchors).await {
+            // A log that is left behind would be taken for that of a lost record.
+            only.close().await;
+            return Err(refused);
         }
         let version = writing::data_version(&mut *only.acquire().await?).await?;
         migrations::apply(&only, path).await?;
@@ -384,6 +382,18 @@ fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) -> StoreRes
         return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: log });
     }
     refuse_to_begin_anew(path, anchors)
+}
+
+/// Refuses a file that is not the record which its companions know: another program's, an earlier state, or an empty file
+/// in its place.
+async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
+    if schema_versions::check_version(pool, path).await? == 0 {
+        return refuse_to_begin_anew(path, anchors);
+    }
+    for anchor in anchors {
+        anchor::check(&mut *pool.acquire().await?, path, anchor).await?;
+    }
+    Ok(())
 }
 
 /// Refuses a file without a schema if an anchor shows that its log was lost.
