@@ -119,6 +119,9 @@ async fn an_unsafe_walk_is_reported_before_the_next_one_and_ends_the_walks() {
     let reported = service.post(&format!("{lab}/answers"), &unsafe_first).await;
     assert_eq!(reported.status, StatusCode::OK, "{}", reported.text);
     assert_eq!(reported.json()["walk"], Value::Null);
+    let page = service.fetch(&format!("/lab/{}", session["id"].as_str().unwrap())).await.text;
+    assert!(page.contains("A walk was reported as unsafe") && !page.contains("All walks are recorded"), "{page}");
+    assert!(service.fetch("/lab").await.text.contains("a walk was reported as unsafe"));
     for walk in [2, 3] {
         let file = service.fetch(&format!("{lab}/controller.json?walk={walk}")).await;
         assert_eq!(file.status, StatusCode::CONFLICT, "{}", file.text);

@@ -46,6 +46,7 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
     for session in lab_sessions::open(&mut reader, authorized.caller.reach(), LISTED).await? {
         let seen = lab::in_the_lab(&mut reader, session.id).await?;
         let next = match (seen.walk, seen.asks) {
+            _ if seen.was_unsafe() => "a walk was reported as unsafe".to_owned(),
             (Some(walk), _) => format!("walk {walk} is next"),
             (None, Some(_)) => "all walks recorded, answer pending".to_owned(),
             (None, None) => "all walks recorded and answered".to_owned(),
@@ -108,12 +109,12 @@ pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
 ) -> Result<Response, PageError> {
-    let taken_back = async {
+    let retracted = async {
         let mut writer = app.write().await?;
         lab::retract(&mut writer, &authorized.caller, id).await?;
         Ok(commit(writer).await?)
     };
-    read_back(&app, id, taken_back.await, String::new()).await
+    read_back(&app, id, retracted.await, String::new()).await
 }
 
 /// Shows the present state, with the reason and the typed note if a form was refused.

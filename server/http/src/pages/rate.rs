@@ -259,15 +259,15 @@ pub(super) async fn retract(
     State(mut app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Response, PageError> {
-    let taken_back = async {
+    let retracted = async {
         let mut writer = app.write().await?;
         blind::retract(&mut writer, &authorized.caller, &token).await?;
         commit(writer).await?;
         app.scheduler.changed();
         Ok(())
     };
-    let taken_back = taken_back.await;
-    told(&mut app, &authorized.caller, &token, taken_back).await
+    let retracted = retracted.await;
+    told(&mut app, &authorized.caller, &token, retracted).await
 }
 
 /// Redirects after an action; a conflict is shown on the page of the pair.

@@ -4,7 +4,7 @@
 use gait_optimizer::SolveReport;
 use gaitwright_store::trials::Trial;
 
-/// Relative difference below which no person can tell two motions apart.
+/// Relative difference up to which two motions count as the same.
 const TOLERANCE: f64 = 1e-5;
 
 /// Figures that identify a motion of a subject, in whichever study it was found.
@@ -19,7 +19,7 @@ impl Motion {
         Some(Self(single.iter().chain(durations_s).chain(vhip_m_s).copied().collect()))
     }
 
-    /// Whether both are the same motion to every person.
+    /// Whether all figures agree within the tolerance.
     pub fn is_same(&self, other: &Self) -> bool {
         let close = |(one, other): (&f64, &f64)| (one - other).abs() <= TOLERANCE * one.abs().max(other.abs());
         self.0.len() == other.0.len() && self.0.iter().zip(&other.0).all(close)

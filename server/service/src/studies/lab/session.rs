@@ -310,6 +310,13 @@ pub struct InTheLab {
     pub closed: bool,
 }
 
+impl InTheLab {
+    /// Whether the answer reports an unsafe walk, which ends the walks.
+    pub fn was_unsafe(&self) -> bool {
+        self.answer.as_ref().is_some_and(|answer| answer.answer.is_about_safety())
+    }
+}
+
 /// The session as shown in the lab.
 ///
 /// # Errors
