@@ -7,8 +7,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
+use gaitwright_service::studies::motion::is_same_gait;
 use gaitwright_service::workers::{Assignment, Evaluate, GaitSolver};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
 use gaitwright_tests::service::Service;
@@ -97,8 +99,12 @@ async fn main() {
     let mixed = FeedbackMode::Mixed;
     let study = service.study(|new| (new.trial_budget, new.muscles, new.feedback_mode) = (15, true, mixed)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let converged: Vec<_> =
-        service.trials(study).await.into_iter().filter(|trial| trial.state.as_str() == "converged").collect();
+    let mut gaits: Vec<Trial> = Vec::new();
+    for trial in service.trials(study).await {
+        if trial.state == TrialState::Converged && !gaits.iter().any(|known| is_same_gait(known, &trial)) {
+            gaits.push(trial);
+        }
+    }
     service.stop().await;
     large::fill_to(&database, study, large::TRIALS - 100).await;
     let service = Service::start(&database, Both(Analytic::default()), 1).await;
@@ -112,9 +118,9 @@ async fn main() {
     let address = listener.local_addr().unwrap().to_string();
     let router = service.router();
     tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
-    let pairs: Vec<_> = (1..converged.len())
+    let pairs: Vec<_> = (1..gaits.len())
         .flat_map(|other| (0..other).map(move |one| (one, other)))
-        .map(|(one, other)| (converged[one].id, converged[other].id))
+        .map(|(one, other)| (gaits[one].id, gaits[other].id))
         .collect();
     let write = format!("/api/v1/studies/{study}/preferences");
     let read = format!("/api/v1/studies/{study}");

@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_learner::{Dimension, SearchSpace};
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::studies::lab;
+use gaitwright_service::studies::motion::is_same_gait;
 use gaitwright_service::workers::Evaluate;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::studies::StudyState;
@@ -337,6 +339,33 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     assert!(again.status == StatusCode::CONFLICT && again.text.contains("The session is closed"), "{}", again.text);
     assert_eq!(service.post_text(&format!("{page}/unblind"), FORM, "note=over").await.status, StatusCode::SEE_OTHER);
     assert!(!service.fetch(&page).await.text.contains("one of the two gaits (blinded)"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn the_form_of_a_session_offers_each_motion_once_and_no_gait_reported_as_unsafe() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service
+        .study(|new| {
+            // The bound changes nothing, so the second and the third trial, which start from the first, find one gait.
+            let acceleration = Dimension { name: "a2".to_owned(), values: vec![70.0, 80.0, 90.0], lengthscale: 10.0 };
+            new.search_space = Some(SearchSpace::new(vec![acceleration]).unwrap().into());
+            new.trial_budget = 3;
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let offered = async || {
+        let page = service.fetch(&format!("/studies/{study}/lab")).await.text;
+        let list = page.split("id=\"gait_two\"").nth(1).unwrap_or_default().split("</select>").next().unwrap().to_owned();
+        trials.iter().filter(|trial| list.contains(&trial.id.to_string())).cloned().collect::<Vec<_>>()
+    };
+    let both = offered().await;
+    assert!(both.len() == 2 && converged(&trials).len() == 3 && !is_same_gait(&both[0], &both[1]), "{both:?}");
+    let path = format!("/api/v1/trials/{}/safety-reports", both[0].id);
+    assert_eq!(service.post(&path, &json!({"note": "stumbled"})).await.status, StatusCode::CREATED);
+    assert_eq!(offered().await, [], "one gait is not enough for a session");
     service.stop().await;
 }
 

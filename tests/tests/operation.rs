@@ -12,7 +12,7 @@ use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
-use gaitwright_store::{Store, backup, certificates, commit, explanations, gaits, members, studies};
+use gaitwright_store::{Store, certificates, commit, explanations, gaits, members, read_only, studies};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::certified::certificate;
@@ -216,7 +216,7 @@ async fn a_copy_is_restored_and_the_present_record_is_kept_beside_it() {
 
 /// How many studies a file holds.
 async fn studies_in(file: &Path) -> usize {
-    let pool = backup::open_read_only(file).await.unwrap();
+    let pool = read_only::open(file).await.unwrap();
     let rows = sqlx::query("select 1 from studies").fetch_all(&pool).await.unwrap();
     pool.close().await;
     rows.len()

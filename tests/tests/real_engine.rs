@@ -300,7 +300,7 @@ async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone
     let child =
         cli::command(BINARY, folder.path(), &arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let of_others = [of_people, coarser, shorter, tighter, bolder];
-    let pool = gaitwright_store::backup::open_read_only(&database).await.unwrap();
+    let pool = gaitwright_store::read_only::open(&database).await.unwrap();
     let mut ours = None;
     until("a study of its own", async || {
         let mut reader = pool.acquire().await.unwrap();

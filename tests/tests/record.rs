@@ -6,7 +6,7 @@ use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gaitwright_store::audit::{self, ChainCheck};
 use gaitwright_store::studies::StudyState;
-use gaitwright_store::{Store, StoreError, backup};
+use gaitwright_store::{Store, StoreError, backup, read_only};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
@@ -134,7 +134,7 @@ async fn one_changed_byte_in_the_audit_trail_is_found() {
     assert_eq!(places.len(), 1);
     bytes[places[0] + needle.len() - 2] = b'7';
     std::fs::write(&database, bytes).unwrap();
-    let pool = backup::open_read_only(&database).await.unwrap();
+    let pool = read_only::open(&database).await.unwrap();
     let verdict = audit::verify(&mut pool.acquire().await.unwrap()).await.unwrap();
     assert_eq!(verdict, ChainCheck::Broken { seq: 3 });
 }
@@ -211,5 +211,5 @@ async fn a_copy_made_while_the_service_runs_is_whole_and_goes_on() {
     assert_eq!(actions(&trials), actions(&whole), "the copy goes on to the same trials");
     again.stop().await;
     std::fs::write(&copy, b"not a database at all").unwrap();
-    assert!(backup::check(&copy).await.is_err());
+    assert!(read_only::check(&copy).await.is_err());
 }

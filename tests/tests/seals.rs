@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_store::seals::{self, SealCheck};
-use gaitwright_store::{Store, StoreError, audit, backup, commit, verify as store_verify};
+use gaitwright_store::{Store, StoreError, audit, commit, read_only, verify as store_verify};
 use gaitwright_tests::every_table::filled;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection, Row};
@@ -15,7 +15,7 @@ async fn open(database: &Path) -> SqliteConnection {
 }
 
 async fn verify(database: &Path) -> SealCheck {
-    let pool = backup::open_read_only(database).await.unwrap();
+    let pool = read_only::open(database).await.unwrap();
     seals::verify(&mut pool.acquire().await.unwrap()).await.unwrap()
 }
 
@@ -87,7 +87,7 @@ async fn seals_and_audit_rows_that_are_missing_are_found_at_the_end_too() {
         assert_eq!(verify(&touched(&database, &sql).await).await, SealCheck::Broken { seq }, "{sql}");
     }
     let cut = touched(&database, "delete from audit where seq = (select max(seq) from audit)").await;
-    let pool = backup::open_read_only(&cut).await.unwrap();
+    let pool = read_only::open(&cut).await.unwrap();
     let found = audit::verify(&mut pool.acquire().await.unwrap()).await.unwrap();
     assert!(matches!(found, audit::ChainCheck::Broken { .. }), "{found:?}");
 }

@@ -7,7 +7,7 @@ use gait_learner::{ActionIndex, Feedback};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::Trial;
-use gaitwright_store::{StudyId, backup, studies};
+use gaitwright_store::{StudyId, read_only, studies};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -148,7 +148,7 @@ async fn a_copy_is_made_and_checked_on_request() {
     let copied = service.backed_up().await;
     let file = folder.path().join(copied["file"].as_str().unwrap());
     assert_eq!(std::fs::metadata(&file).unwrap().len(), copied["bytes"].as_u64().unwrap());
-    backup::check(&file).await.unwrap();
+    read_only::check(&file).await.unwrap();
     let again = service.backed_up().await;
     assert_ne!(again["file"], copied["file"]);
     service.stop().await;
@@ -162,7 +162,7 @@ async fn copies_that_are_asked_for_together_are_made_one_after_the_other() {
     let mut names = std::collections::BTreeSet::new();
     for backup in futures_util::future::join_all(asked).await {
         let file = backup["file"].as_str().unwrap().to_owned();
-        backup::check(&folder.path().join(&file)).await.unwrap();
+        read_only::check(&folder.path().join(&file)).await.unwrap();
         assert!(names.insert(file), "two copies have one name");
     }
     service.stop().await;

@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_store::{FORM, Store, backup, verify};
+use gaitwright_store::{FORM, Store, read_only, verify};
 use gaitwright_tests::archives::exported;
 use gaitwright_tests::cli;
 use serde_json::{Value, json};
@@ -21,11 +21,12 @@ const V1: &[u8] = include_bytes!("../records/v1.db.zst");
 /// Tables that sign-in alone fills, and the example does not.
 const OF_SIGN_IN: [&str; 3] = ["clock", "sign_in_failures", "sign_in_sources"];
 /// The records that are kept, by the form in which they were written.
-const RECORDS: [(i64, &[u8]); 4] = [
+const RECORDS: [(i64, &[u8]); 5] = [
     (1, V1),
     (7, include_bytes!("../records/v7.db.zst")),
     (8, include_bytes!("../records/v8.db.zst")),
     (9, include_bytes!("../records/v9.db.zst")),
+    (10, include_bytes!("../records/v10.db.zst")),
 ];
 
 fn unpacked(record: &[u8]) -> (TempDir, PathBuf) {
@@ -167,7 +168,7 @@ async fn upgrade_keeps_one_copy_of_the_record_as_it_was() {
     Store::open(&database).await.unwrap().close().await;
     let copy = folder.path().join("a.db.v1");
     assert_eq!(versions(&copy).await, [1]);
-    backup::check(&copy).await.unwrap();
+    read_only::check(&copy).await.unwrap();
     let layout = layout(&old).await;
     assert_eq!(rows(&copy, &layout).await, rows(&old, &layout).await);
 

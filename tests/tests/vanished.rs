@@ -346,7 +346,7 @@ async fn a_backup_is_finished_without_its_requester_and_refused_when_it_cannot_b
     }
     let names = copies();
     assert!(names.len() == 1 && !names[0].starts_with('.'), "{names:?}");
-    gaitwright_store::backup::check(&folder.path().join(&names[0])).await.unwrap();
+    gaitwright_store::read_only::check(&folder.path().join(&names[0])).await.unwrap();
     let mut recorded = service.fetch("/api/v1/audit").await.text;
     for _ in 0..500 {
         if recorded.contains(&names[0]) {
@@ -375,7 +375,7 @@ async fn scheduled_copies_are_made_checked_and_the_oldest_removed() {
     for _ in 0..4 {
         let (file, bytes) = claimed.add(&service.store, 2).await.unwrap();
         assert!(bytes > 0);
-        gaitwright_store::backup::check(&file).await.unwrap();
+        gaitwright_store::read_only::check(&file).await.unwrap();
         made.push(file.file_name().unwrap().to_str().unwrap().to_owned());
         tokio::time::sleep(std::time::Duration::from_millis(20)).await;
     }

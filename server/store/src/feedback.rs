@@ -330,6 +330,11 @@ pub async fn authors_of_pair(
     rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get("author")?))).collect()
 }
 
+const SUGGESTIONS_BETWEEN: &str = "select f.id, f.author from feedback f join trials t on t.id = f.trial_a \
+     where f.study_id = ?1 and f.kind = 'suggestion' and f.suggested in (?2, ?3) \
+     and ((f.suggested = ?2 and t.action_index = ?3) or (f.suggested = ?3 and t.action_index = ?2)) \
+     and not exists (select 1 from retractions r where r.feedback_seq = f.seq) order by f.seq desc";
+
 /// The authors of suggestions that prefer one of two actions of a study to the other, newest first, without retracted
 /// ones.
 ///
@@ -341,17 +346,7 @@ pub async fn suggestions_between(
     (one, other): (ActionIndex, ActionIndex),
 ) -> StoreResult<Vec<(FeedbackId, String)>> {
     let [one, other] = [one, other].map(|action| i64::try_from(action.0).unwrap_or(i64::MAX));
-    let rows = sqlx::query(
-        "select f.id, f.author from feedback f join trials t on t.id = f.trial_a \
-         where f.study_id = ?1 and f.kind = 'suggestion' \
-         and ((f.suggested = ?2 and t.action_index = ?3) or (f.suggested = ?3 and t.action_index = ?2)) \
-         and not exists (select 1 from retractions r where r.feedback_seq = f.seq) order by f.seq desc",
-    )
-    .bind(study)
-    .bind(one)
-    .bind(other)
-    .fetch_all(db)
-    .await?;
+    let rows = sqlx::query(SUGGESTIONS_BETWEEN).bind(study).bind(one).bind(other).fetch_all(db).await?;
     rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get("author")?))).collect()
 }
 
@@ -435,4 +430,22 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         created_at: row.try_get("created_at")?,
         retraction: Retraction::from_row(row)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schema_versions;
+    use sqlx::{Connection as _, SqliteConnection};
+
+    /// A preference asks this while it holds the only writer.
+    #[tokio::test]
+    async fn suggestions_between_two_actions_are_found_without_reading_the_answers_of_a_study() {
+        let mut db = SqliteConnection::connect(":memory:").await.unwrap();
+        schema_versions::fresh(&mut db).await.unwrap();
+        let plan = AssertSqlSafe(format!("explain query plan {SUGGESTIONS_BETWEEN}"));
+        let steps = sqlx::query(plan).bind("s").bind(1).bind(2).fetch_all(&mut db).await.unwrap();
+        let steps: Vec<String> = steps.iter().map(|step| step.get("detail")).collect();
+        assert!(steps[0].contains("feedback_suggestions (study_id=? AND suggested=?)"), "{steps:?}");
+    }
 }

@@ -47,8 +47,10 @@ mod packed;
 pub mod presentations;
 pub mod quarantine;
 pub mod reach;
+pub mod read_only;
 pub mod reference_gaits;
 pub mod restore;
+mod restore_marker;
 pub mod results;
 pub mod rights;
 pub mod row;
@@ -286,6 +288,11 @@ impl Store {
     /// [`StoreError::NearlyFull`].
     pub fn room(&self) -> StoreResult<()> {
         self.writing.space().room()
+    }
+
+    /// Free space on the disk of the record, if the system reports it.
+    pub fn free_bytes(&self) -> Option<u64> {
+        self.writing.space().free_bytes()
     }
 
     /// Refuses a file beside the record, or elsewhere on its disk, that would leave less free than is kept in reserve.

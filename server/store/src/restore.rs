@@ -4,29 +4,17 @@
 //! marker beside the record says so. If the process is killed, the next owner of the record finishes the restore if the
 //! backup has the name already, and otherwise leaves the old record with its log as it is.
 
-use super::anchor::{self, Ends};
 use super::ownership::Ownership;
+use super::restore_marker::{self, Marker, mark, unmark};
 use super::whole_file::{WholeFile, sync_folder};
-use super::{StoreError, StoreResult, backup, beside, free_name, json};
-use serde::{Deserialize, Serialize};
+use super::{StoreError, StoreResult, anchor, backup, beside, free_name, read_only};
 use sha2::{Digest, Sha256};
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// SQLite's companion files.
 const COMPANIONS: [&str; 2] = ["-wal", "-shm"];
-
-/// A restore that has begun to replace a record.
-#[derive(Debug, Serialize, Deserialize)]
-struct Marker {
-    /// Hash of the backup, which tells whether it has the name of the record.
-    sha256: String,
-    /// The last rows of its chains, for the anchors.
-    ends: Ends,
-    /// The second anchor.
-    elsewhere: Option<PathBuf>,
-}
 
 /// A step of a restore that is on the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +29,7 @@ enum Step {
 /// Replaces a record with a backup, and updates the anchors to it. Returns where the old record is kept.
 ///
 /// # Errors
-/// [`StoreError::InUse`] while a process owns the record, errors of [`backup::check`] for the backup,
+/// [`StoreError::InUse`] while a process owns the record, errors of [`read_only::check`] for the backup,
 /// [`StoreError::Unverified`], [`StoreError::WrongAnchor`], or a file that cannot be written. The record is unchanged
 /// then, or the next start finishes the restore.
 pub async fn from_file(from: &Path, to: &Path, elsewhere: Option<&Path>) -> StoreResult<Option<PathBuf>> {
@@ -55,12 +43,12 @@ async fn replace(
     reached: &(dyn Fn(Step) + Sync),
 ) -> StoreResult<Option<PathBuf>> {
     anchor::refuse_wrong(elsewhere, to, Some(from))?;
-    backup::check(from).await?;
+    read_only::check(from).await?;
     let _owner = Ownership::take(to)?;
     finish_interrupted(to)?;
     let cannot_write = |source| StoreError::Open { path: to.to_owned(), source };
     // Copy through SQLite, because part of the backup may be in its log.
-    let pool = backup::open_read_only(from).await?;
+    let pool = read_only::open(from).await?;
     let copied = async {
         let ends = anchor::ends(&mut *pool.acquire().await?).await?;
         Ok::<_, StoreError>((ends, backup::whole_copy(&pool, from, to, to).await?))
@@ -103,42 +91,13 @@ fn keep(to: &Path, kept: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// The path of the marker beside a record.
-fn marker_of(record: &Path) -> PathBuf {
-    beside(record, ".restoring")
-}
-
-fn mark(record: &Path, marker: &Marker) -> StoreResult<()> {
-    let (path, text) = (marker_of(record), json::to_text("restore", marker)?);
-    let family = record.file_name().unwrap_or_default().to_string_lossy();
-    let written = WholeFile::begin(&path, &family).and_then(|mut whole| {
-        whole.file().write_all(text.as_bytes())?;
-        whole.replace(&path)
-    });
-    written.map_err(|source| StoreError::Open { path, source })
-}
-
-/// Refuses to read a record that a killed restore left half replaced.
-pub(super) fn refuse_interrupted(record: &Path) -> StoreResult<()> {
-    if marker_of(record).exists() {
-        return Err(StoreError::RestoreInterrupted { path: record.to_owned() });
-    }
-    Ok(())
-}
-
 /// Finishes the restore of a killed process if the backup has the name of the record, and forgets it otherwise. To be
 /// called by the owner of the record, before the record is opened.
 pub(super) fn finish_interrupted(record: &Path) -> StoreResult<()> {
-    let path = marker_of(record);
-    let cannot_read = |source| StoreError::Open { path: path.clone(), source };
-    let text = match std::fs::read_to_string(&path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-        other => other.map_err(cannot_read)?,
-    };
-    let marker: Marker = json::from_text("restore", &text)?;
+    let Some(marker) = restore_marker::read(record)? else { return Ok(()) };
     let is_renamed = match hash_of(record) {
         Err(error) if error.kind() == ErrorKind::NotFound => false,
-        hash => hash.map_err(cannot_read)? == marker.sha256,
+        hash => hash.map_err(|source| StoreError::Open { path: record.to_owned(), source })? == marker.sha256,
     };
     if is_renamed {
         finish(record, &marker, &|_| {})?;
@@ -164,13 +123,6 @@ fn finish(record: &Path, marker: &Marker, reached: &dyn Fn(Step)) -> StoreResult
     }
     reached(Step::Anchored);
     unmark(record)
-}
-
-/// Removes the marker durably: with a later change in the log, it would cost that change.
-fn unmark(record: &Path) -> StoreResult<()> {
-    let path = marker_of(record);
-    let removed = std::fs::remove_file(&path).and_then(|()| sync_folder(record));
-    removed.map_err(|source| StoreError::Open { path, source })
 }
 
 fn hash_of(file: &Path) -> io::Result<String> {

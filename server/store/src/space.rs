@@ -27,6 +27,11 @@ impl Space {
         self.reserve.store(bytes, Ordering::Relaxed);
     }
 
+    /// Free bytes for this process, if the system reports them.
+    pub(super) fn free_bytes(&self) -> Option<u64> {
+        free_bytes(&self.folder)
+    }
+
     /// Fails if less space is free than the reserve.
     pub(super) fn room(&self) -> StoreResult<()> {
         self.room_for(0)
@@ -35,7 +40,7 @@ impl Space {
     /// Refuses where less than the reserve would be free after so many bytes were written.
     pub(super) fn room_for(&self, bytes: u64) -> StoreResult<()> {
         let reserve = self.reserve.load(Ordering::Relaxed).max(ONE_CHANGE_BYTES);
-        match free_bytes(&self.folder) {
+        match self.free_bytes() {
             Some(free) if free < reserve.saturating_add(bytes) => {
                 Err(StoreError::NearlyFull { free_mb: free >> 20, reserve_mb: reserve >> 20 })
             }

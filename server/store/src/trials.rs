@@ -157,7 +157,7 @@ pub struct TrialEnd {
 
 /// Outcome of a trial as told by a script.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct ScriptOutcome {
     /// Converged or not converged.
     pub state: TrialState,
     /// Gait RMSE, rad.
@@ -345,7 +345,7 @@ pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> Store
 ///
 /// # Errors
 /// A refusal by a trigger if the trial already has a result; errors of the database.
-pub async fn tell(db: &mut Connection, id: TrialId, told: &Told) -> StoreResult<()> {
+pub async fn tell(db: &mut Connection, id: TrialId, told: &ScriptOutcome) -> StoreResult<()> {
     sqlx::query(
         "update trials set state = ?, gait_rmse_rad = ?, cost_of_transport = ?, message = ?, finished_at = ? \
          where id = ?",

@@ -1,7 +1,7 @@
 //! Verifies a record: its file, schema, hash chains, every row, and its anchors.
 
 use super::anchor::{self, Ends};
-use super::{Connection, FORM, StoreError, StoreResult, audit, backup, schema_versions, seals};
+use super::{Connection, FORM, StoreError, StoreResult, audit, read_only, schema_versions, seals};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row, SqliteConnection, SqlitePool};
 use std::collections::BTreeSet;
@@ -25,14 +25,14 @@ pub struct Whole {
 /// [`StoreError::Damaged`], [`StoreError::CutOff`] or [`StoreError::Rewritten`] with the first discrepancy; errors of
 /// the database.
 pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
-    let pool = backup::open_read_only(record).await?;
+    let pool = read_only::open(record).await?;
     let found = verify_pool(&pool, record, anchors).await;
     pool.close().await;
     found
 }
 
 async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
-    backup::check_open(pool).await?;
+    read_only::check_open(pool).await?;
     let version = schema_versions::check_version(pool, record).await?;
     // One consistent state for all comparisons.
     let mut db = pool.begin().await?;
@@ -75,7 +75,7 @@ pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chai
     Ok((audit, seals))
 }
 
-/// Checks that tables, indices, triggers and views match the schema_versions, because a missing trigger protects nothing.
+/// Checks that tables, indices, triggers and views match the migrations, because a missing trigger protects nothing.
 async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
     let expected = match version {
         FORM => PRESENT.get_or_try_init(|| created(FORM)).await?,
@@ -107,7 +107,7 @@ type Part = (String, String, String, Option<String>);
 /// The parts of the newest schema, which every start compares.
 static PRESENT: OnceCell<BTreeSet<Part>> = OnceCell::const_new();
 
-/// The parts of a schema. A library writes the list of schema_versions; the tests of upgrades
+/// The parts of a schema. The table of applied migrations is written by a library; the tests of upgrades
 /// detect if a version of it changes the text.
 async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<Part>> {
     let sql = "select type, name, tbl_name, sql from sqlite_master";

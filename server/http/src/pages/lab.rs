@@ -24,14 +24,13 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
     self, Condition, EmgView, FileForm, NewSession, SessionView, WalkActivity, WalkView,
 };
-use gaitwright_store::listing::{self, Listed, Listing};
+use gaitwright_store::listing::Listed;
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::trials::TrialState;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 
-/// How many gaits the form offers, by lowest Gait RMSE.
+/// How many converged trials the form considers, lowest Gait RMSE first.
 const OFFERED: u32 = 200;
 
 #[derive(Template)]
@@ -39,7 +38,7 @@ const OFFERED: u32 = 200;
 struct SessionsPage {
     study: Study,
     sessions: Vec<(SessionView, String)>,
-    /// Converged trials of the study by Gait RMSE, lowest first, with their labels.
+    /// Different walkable gaits of the study, lowest Gait RMSE first, with their labels.
     gaits: Vec<(TrialId, String)>,
     may_run: bool,
     fields: Fields,
@@ -85,15 +84,7 @@ async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, r
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
-    let listing = Listing {
-        sort: "gait_rmse_rad",
-        descending: false,
-        state: Some(TrialState::Converged),
-        contains: String::new(),
-        limit: OFFERED,
-        offset: 0,
-    };
-    let converged = listing::of_study(&mut reader, id, &listing).await?;
+    let gaits = lab::gaits_to_plan_with(&mut reader, id, OFFERED).await?;
     drop(reader);
     let named =
         |trial: Listed| (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)));
@@ -105,7 +96,7 @@ async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, r
     page(&SessionsPage {
         study,
         sessions: sessions.into_iter().map(shown).collect(),
-        gaits: converged.into_iter().map(named).collect(),
+        gaits: gaits.into_iter().map(named).collect(),
         may_run,
         fields,
         refused,

@@ -31,6 +31,7 @@ struct SystemPage {
     running: u32,
     oldest_queued: String,
     totals: Totals,
+    free_bytes: Option<u64>,
     record: String,
     measured: [Option<trials::Measured>; 2],
     may_administer: bool,
@@ -40,6 +41,11 @@ impl SystemPage {
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn megabytes(bytes: &i64) -> String {
         format!("{:.1}", *bytes as f64 / 1e6)
+    }
+
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn gigabytes(bytes: &u64) -> String {
+        format!("{:.1}", *bytes as f64 / 1e9)
     }
 
     /// `3 finished, 1 running`.
@@ -104,6 +110,7 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
         running,
         oldest_queued: duration(totals.oldest_queued_seconds),
         totals,
+        free_bytes: app.store().free_bytes(),
         record: record.display().to_string(),
         measured,
         may_administer,

@@ -15,7 +15,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_store::audit;
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
-use gaitwright_store::trials::{NewTrial, Told, Trial, TrialState};
+use gaitwright_store::trials::{NewTrial, ScriptOutcome, Trial, TrialState};
 use gaitwright_store::{Store, StudyId, TrialId, Writer, events, studies, trials};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -157,7 +157,7 @@ pub struct Tell {
 #[derive(Debug)]
 pub struct Heard {
     snapshot: StudySnapshot,
-    told: Told,
+    told: ScriptOutcome,
     answers: Vec<FeedbackContent>,
 }
 
@@ -197,7 +197,7 @@ pub async fn hear(store: &mut Store, id: TrialId, tell: &Tell) -> Result<Heard, 
     Ok(Heard { snapshot, told, answers })
 }
 
-fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
+fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
     let reason = tell.reason.trim();
     printable::note("reason", reason, 2000)?;
     for (field, value) in [("gait_rmse_rad", tell.gait_rmse_rad), ("cost_of_transport", tell.cost_of_transport)] {
@@ -217,7 +217,7 @@ fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
         let allowed = "a number, because Gait RMSE answers the comparisons of this study";
         return Err(Error::invalid("gait_rmse_rad", json!(null), allowed));
     }
-    Ok(Told {
+    Ok(ScriptOutcome {
         state,
         gait_rmse_rad: tell.gait_rmse_rad.filter(|_| state == TrialState::Converged),
         cost_of_transport: tell.cost_of_transport.filter(|_| state == TrialState::Converged),

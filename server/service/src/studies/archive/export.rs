@@ -5,7 +5,7 @@ use super::signature::SigningKey;
 use crate::error::Error;
 use gaitwright_store::archive::{self, Read};
 use gaitwright_store::archived_allocations::masked;
-use gaitwright_store::{StoreError, StudyId, backup};
+use gaitwright_store::{StoreError, StudyId, read_only};
 use std::io::Write;
 use std::path::Path;
 use tokio::sync::mpsc;
@@ -25,7 +25,7 @@ pub async fn export<W: Write + Send + 'static>(
     out: W,
     key: Option<SigningKey>,
 ) -> Result<W, Error> {
-    let pool = backup::open_read_only(database).await?;
+    let pool = read_only::open(database).await?;
     let (sender, mut rows) = mpsc::channel::<Option<Read>>(ROWS_AHEAD);
     #[allow(clippy::disallowed_methods, reason = "works while rows come in, which no pool of finished data can")]
     let packing = tokio::task::spawn_blocking(move || {

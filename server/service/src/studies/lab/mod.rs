@@ -1,7 +1,7 @@
 //! Lab sessions: a subject walks without the device and with two gaits, blinded, as in the experiment of the paper.
 //!
-//! Walk 1 is without the device. The order of the two gaits is an allocation (`store::allocations`), drawn in balanced
-//! blocks and concealed until an administrator unblinds the session. Before that, only the device gets the controller
+//! Walk 1 is without the device. The order of the two gaits is an allocation (`store::allocations`), drawn by a biased
+//! coin and concealed until an administrator unblinds the session. Before that, only the device gets the controller
 //! files; if a person fetches one, the record says so. Measurements and the subject's answer refer to walk numbers, and
 //! the answer reaches the learner at unblinding.
 
@@ -20,7 +20,7 @@ pub use measured::{
 pub use question::{AnswerView, WALKS};
 pub use session::{
     Condition, GaitOfWalk, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WalkView, checked_walk,
-    close, for_device, gaits_to_walk_with, in_the_lab, plan, record_walk, still_open, was_recorded,
+    close, for_device, gaits_to_plan_with, gaits_to_walk_with, in_the_lab, plan, record_walk, still_open, was_recorded,
 };
 pub use unblinding::unblind;
 pub use upload::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, check_kept, keep};

@@ -4,11 +4,16 @@ use super::question::{AnswerView, WALKS, asks, can_be_retracted, has_file, next_
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::walkable::{self, NotWalkable, WalkableGait};
+use crate::studies::motion::is_same_gait;
+use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, DeviceFile, Lot};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, Act, Done, LabSession, NewLabSession};
-use gaitwright_store::{Connection, Instant, LabSessionId, StudyId, TrialId, Writer, consents, studies};
+use gaitwright_store::listing::{self, Listed, Listing};
+use gaitwright_store::trials::{self, Trial, TrialState};
+use gaitwright_store::{
+    Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -224,6 +229,30 @@ pub(super) fn not_included() -> Error {
         "The archive of this session did not include the allocation, because the session was blinded. Unblind it where it was \
          planned.",
     )
+}
+
+/// The walkable gaits of a study, each motion once, among the `limit` converged trials of lowest Gait RMSE, lowest first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<Listed>> {
+    let listing = Listing {
+        sort: "gait_rmse_rad",
+        descending: false,
+        state: Some(TrialState::Converged),
+        contains: String::new(),
+        limit,
+        offset: 0,
+    };
+    let grounds = Grounds::read(db, study).await?;
+    let mut kept: Vec<(Listed, Trial)> = Vec::new();
+    for listed in listing::of_study(db, study, &listing).await? {
+        let trial = trials::get(db, listed.id).await?;
+        if grounds.admit(&trial).is_ok() && !kept.iter().any(|(_, other)| is_same_gait(other, &trial)) {
+            kept.push((listed, trial));
+        }
+    }
+    Ok(kept.into_iter().map(|(listed, _)| listed).collect())
 }
 
 /// The two gaits of a session for the next walk, gait one first.
