@@ -358,7 +358,8 @@ async fn the_form_of_a_session_offers_each_motion_once_and_no_gait_reported_as_u
     let trials = service.trials(study).await;
     let offered = async || {
         let page = service.fetch(&format!("/studies/{study}/lab")).await.text;
-        let list = page.split("id=\"gait_two\"").nth(1).unwrap_or_default().split("</select>").next().unwrap().to_owned();
+        let list =
+            page.split("id=\"gait_two\"").nth(1).unwrap_or_default().split("</select>").next().unwrap().to_owned();
         trials.iter().filter(|trial| list.contains(&trial.id.to_string())).cloned().collect::<Vec<_>>()
     };
     let both = offered().await;

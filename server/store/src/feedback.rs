@@ -330,8 +330,8 @@ pub async fn authors_of_pair(
     rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get("author")?))).collect()
 }
 
-const SUGGESTIONS_BETWEEN: &str = "select f.id, f.author from feedback f join trials t on t.id = f.trial_a \
-     where f.study_id = ?1 and f.kind = 'suggestion' and f.suggested in (?2, ?3) \
+const SUGGESTIONS_BETWEEN: &str = "select f.id, f.author from feedback f indexed by feedback_suggestions \
+     join trials t on t.id = f.trial_a where f.study_id = ?1 and f.kind = 'suggestion' and f.suggested in (?2, ?3) \
      and ((f.suggested = ?2 and t.action_index = ?3) or (f.suggested = ?3 and t.action_index = ?2)) \
      and not exists (select 1 from retractions r where r.feedback_seq = f.seq) order by f.seq desc";
 

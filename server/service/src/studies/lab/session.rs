@@ -11,9 +11,7 @@ use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, Act, Done, LabSession, NewLabSession};
 use gaitwright_store::listing::{self, Listed, Listing};
 use gaitwright_store::trials::{self, Trial, TrialState};
-use gaitwright_store::{
-    Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies,
-};
+use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
