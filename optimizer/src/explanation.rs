@@ -48,7 +48,7 @@ impl<'a> From<&'a SolveOutcome> for Unsolved<'a> {
 /// A tuned bound that the last iterate reaches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoundAtLimit {
-    /// `a1`..`a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
@@ -61,7 +61,7 @@ pub struct BoundAtLimit {
 /// A tuned bound with its given value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GivenBound {
-    /// `a1`..`a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
