@@ -7,6 +7,7 @@
 
 mod arguments;
 mod splitmix;
+mod tuned_actions;
 
 use arguments::argument;
 use gait_optimizer::explanation::{Explanation, RelaxedBound, explain};
@@ -15,18 +16,7 @@ use gait_optimizer::{
 };
 use splitmix::SplitMix;
 use std::error::Error;
-
-/// Values beyond Table I (Li et al. 2022), by bound.
-const TIGHT: [&[f64]; 8] = [
-    &[2.0, 3.0, 4.0],
-    &[10.0, 20.0, 30.0],
-    &[1.5, 2.0],
-    &[0.35, 0.5],
-    &[0.15, 0.2, 0.3],
-    &[0.0, 0.02],
-    &[5.0, 10.0],
-    &[5.0, 8.0],
-];
+use tuned_actions::TIGHT;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let muscles = argument("--muscles", "off") == "on";
@@ -80,7 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn drawn_bounds(random: &mut SplitMix) -> Result<TunedBounds, Box<dyn Error>> {
     let mut bounds = TunedBounds::default();
     for _ in 0..2 {
-        let bound = random.below(8);
+        let bound = random.below(TunedBounds::COUNT);
         bounds.set(TunedBounds::NAMES[bound], TIGHT[bound][random.below(TIGHT[bound].len())])?;
     }
     Ok(bounds)

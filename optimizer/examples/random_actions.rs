@@ -7,6 +7,7 @@ mod splitmix;
 mod tuned_actions;
 
 use arguments::argument;
+use gait_optimizer::TunedBounds;
 use splitmix::SplitMix;
 use std::collections::HashSet;
 use std::error::Error;
@@ -19,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if count > all {
         return Err(format!("--count: Table I has {all} actions").into());
     }
-    println!("a1,a2,a3,a4,a5,a6,a7,a8");
+    println!("{}", TunedBounds::NAMES.join(","));
     let mut drawn = HashSet::new();
     while drawn.len() < count {
         let action = LEVELS.map(|levels| levels[random.below(levels.len())].to_string()).join(",");

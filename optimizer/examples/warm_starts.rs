@@ -35,12 +35,17 @@ fn run(
 }
 
 /// The bounds with some distinct ones set to other values.
-fn changed(from: TunedBounds, count: usize, values: &[&[f64]; 8], random: &mut SplitMix) -> (TunedBounds, String) {
+fn changed(
+    from: TunedBounds,
+    count: usize,
+    values: &[&[f64]; TunedBounds::COUNT],
+    random: &mut SplitMix,
+) -> (TunedBounds, String) {
     loop {
         let mut action = from.to_array();
         let mut drawn = Vec::new();
         while drawn.len() < count {
-            let bound = random.below(8);
+            let bound = random.below(TunedBounds::COUNT);
             if drawn.contains(&bound) {
                 continue;
             }
@@ -88,7 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let from = argument("--from", "");
     if !from.is_empty() {
         let action: Vec<f64> = from.split(',').map(str::parse).collect::<Result<_, _>>()?;
-        base.bounds = TunedBounds::from_array(action.try_into().map_err(|_| "--from: eight numbers")?)?;
+        base.bounds = TunedBounds::from_array(action.try_into().map_err(|_| "--from: one number for each bound")?)?;
     }
     let start = run(&base, None, threads, &mut |_| {})?;
     eprintln!(

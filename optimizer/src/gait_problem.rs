@@ -5,7 +5,7 @@
 //! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics`] |
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`outputs`], [`hip_velocity`], [`transitions`] |
 //! | C3 physical limits: friction, unilateral contact, clearance, touchdown | [`contact_limits`] |
-//! | C4 bounds of the gait: a1 to a8, joints, torques, speed, steps | [`variable_bounds`], [`stride`] |
+//! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
 //! | C8 fibre kinematics | [`fibres`] |
 //! | C9-C12 joint torques of the muscles | [`muscle_forces`] |

@@ -1,71 +1,82 @@
-//! The tuned constraint bounds a1 to a8 (Table I of the paper).
+//! The tuned constraint bounds (Table I of the paper).
 
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// The eight tuned bounds. Defaults are the loosest values of Table I.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TunedBounds {
-    /// a1: upper bound of the magnitude of every coordinate velocity, rad/s (m/s for the hip point).
-    pub a1: f64,
-    /// a2: upper bound of the magnitude of every coordinate acceleration, rad/s² (m/s² for the hip point).
-    pub a2: f64,
-    /// a3: lower bound of the hip velocity v_hip, m/s.
-    pub a3: f64,
-    /// a4: upper bound of the hip velocity v_hip, m/s.
-    pub a4: f64,
-    /// a5: lower bound of the swing-foot clearance at mid-swing, m.
-    pub a5: f64,
-    /// a6: upper bound of the magnitude of the torso lean, rad.
-    pub a6: f64,
-    /// a7: upper bound of the magnitude of both hip angles, degrees.
-    pub a7: f64,
-    /// a8: upper bound of the magnitude of both ankle angles, degrees.
-    pub a8: f64,
+const LOWER: bool = true;
+const UPPER: bool = false;
+
+/// Defines [`TunedBounds`] from one list, in the order of an action.
+macro_rules! tuned_bounds {
+    ($($(#[$says:meta])* $name:ident: $is_lower:ident, $default:literal, $range:expr, $meaning:literal;)+) => {
+        /// The tuned bounds. Defaults are the loosest values of Table I.
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct TunedBounds {
+            $($(#[$says])* pub $name: f64,)+
+        }
+
+        impl Default for TunedBounds {
+            fn default() -> Self {
+                Self { $($name: $default,)+ }
+            }
+        }
+
+        impl TunedBounds {
+            /// Number of bounds.
+            pub const COUNT: usize = [$($is_lower),+].len();
+            /// Names, in the order of an action.
+            pub const NAMES: [&'static str; Self::COUNT] = [$(stringify!($name)),+];
+            /// Whether each bound is a lower bound, in the order of an action. A lower bound is loosest at its minimum.
+            pub const IS_LOWER: [bool; Self::COUNT] = [$($is_lower),+];
+            /// Allowed range of each bound, in the order of an action.
+            pub const RANGES: [(f64, f64); Self::COUNT] = [$($range),+];
+            /// Quantity that each bound limits, with its unit, in the order of an action.
+            pub const MEANINGS: [&'static str; Self::COUNT] = [$($meaning),+];
+
+            /// Values, in the order of an action.
+            pub fn to_array(self) -> [f64; Self::COUNT] {
+                [$(self.$name),+]
+            }
+
+            fn slots(&mut self) -> [&mut f64; Self::COUNT] {
+                [$(&mut self.$name),+]
+            }
+
+            /// Validated bounds from values in the order of an action.
+            ///
+            /// # Errors
+            /// [`ModelError::OutOfRange`] naming the bound.
+            pub fn from_array([$($name),+]: [f64; Self::COUNT]) -> Result<Self, ModelError> {
+                let bounds = Self { $($name),+ };
+                bounds.validate()?;
+                Ok(bounds)
+            }
+        }
+    };
 }
 
-impl Default for TunedBounds {
-    fn default() -> Self {
-        Self { a1: 20.0, a2: 90.0, a3: 0.3, a4: 1.4, a5: 0.0, a6: 0.5, a7: 50.0, a8: 40.0 }
-    }
+tuned_bounds! {
+    /// Upper bound of the magnitude of every coordinate velocity, rad/s (m/s for the hip point).
+    a1: UPPER, 20.0, (1.0, 100.0), "coordinate velocity, rad/s";
+    /// Upper bound of the magnitude of every coordinate acceleration, rad/s² (m/s² for the hip point).
+    a2: UPPER, 90.0, (5.0, 1000.0), "coordinate acceleration, rad/s²";
+    /// Lower bound of the hip velocity v_hip, m/s.
+    a3: LOWER, 0.3, (0.05, 3.0), "hip velocity lower bound, m/s";
+    /// Upper bound of the hip velocity v_hip, m/s.
+    a4: UPPER, 1.4, (0.05, 3.0), "hip velocity upper bound, m/s";
+    /// Lower bound of the swing-foot clearance at mid-swing, m.
+    a5: LOWER, 0.0, (0.0, 0.3), "swing-foot clearance, m";
+    /// Upper bound of the magnitude of the torso lean, rad.
+    a6: UPPER, 0.5, (0.0, 1.0), "torso lean, rad";
+    /// Upper bound of the magnitude of both hip angles, degrees.
+    a7: UPPER, 50.0, (5.0, 68.0), "hip angle, °";
+    /// Upper bound of the magnitude of both ankle angles, degrees.
+    a8: UPPER, 40.0, (5.0, 60.0), "ankle angle, °";
 }
 
 impl TunedBounds {
-    /// Names, in the order of an action.
-    pub const NAMES: [&'static str; 8] = ["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"];
-    /// Quantity that each bound limits, with its unit, in the order of an action.
-    pub const MEANINGS: [&'static str; 8] = [
-        "coordinate velocity, rad/s",
-        "coordinate acceleration, rad/s²",
-        "hip velocity lower bound, m/s",
-        "hip velocity upper bound, m/s",
-        "swing-foot clearance, m",
-        "torso lean, rad",
-        "hip angle, °",
-        "ankle angle, °",
-    ];
-    /// Allowed range of each bound, in the order of an action.
-    pub const RANGES: [(f64, f64); 8] =
-        [(1.0, 100.0), (5.0, 1000.0), (0.05, 3.0), (0.05, 3.0), (0.0, 0.3), (0.0, 1.0), (5.0, 68.0), (5.0, 60.0)];
-
-    /// Values, in the order of an action.
-    pub fn to_array(self) -> [f64; 8] {
-        [self.a1, self.a2, self.a3, self.a4, self.a5, self.a6, self.a7, self.a8]
-    }
-
-    /// Validated bounds from values in the order of an action.
-    ///
-    /// # Errors
-    /// [`ModelError::OutOfRange`] naming the bound.
-    pub fn from_array(a: [f64; 8]) -> Result<Self, ModelError> {
-        let [a1, a2, a3, a4, a5, a6, a7, a8] = a;
-        let bounds = Self { a1, a2, a3, a4, a5, a6, a7, a8 };
-        bounds.validate()?;
-        Ok(bounds)
-    }
-
-    /// Sets one bound by name, `a1` to `a8`. [`Self::validate`] checks the bounds against each other.
+    /// Sets one bound by name. [`Self::validate`] checks the bounds against each other.
     ///
     /// # Errors
     /// [`ModelError::Unknown`] for any other name, [`ModelError::OutOfRange`] for a value outside its range.
@@ -78,17 +89,7 @@ impl TunedBounds {
             });
         };
         ModelError::check_range(name, value, Self::RANGES[index].0, Self::RANGES[index].1)?;
-        let slot = match index {
-            0 => &mut self.a1,
-            1 => &mut self.a2,
-            2 => &mut self.a3,
-            3 => &mut self.a4,
-            4 => &mut self.a5,
-            5 => &mut self.a6,
-            6 => &mut self.a7,
-            _ => &mut self.a8,
-        };
-        *slot = value;
+        *self.slots()[index] = value;
         Ok(())
     }
 

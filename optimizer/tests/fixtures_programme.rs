@@ -18,16 +18,28 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-fn programme(muscles: bool) -> GaitProgramme {
+fn programme(muscles: bool, bounds: &TunedBounds) -> GaitProgramme {
     GaitProgramme::new(
         &Subject::builtin(1).unwrap(),
         &Device::ampro3().unwrap(),
-        &TunedBounds::default(),
+        bounds,
         muscles,
         &GaitSettings::reference_problem(),
         &ReferenceGait::builtin().unwrap(),
     )
     .unwrap()
+}
+
+/// Every bound a tenth of its way from the default to the tightest value. A lower bound of 0 would hide the derivatives of
+/// its row.
+fn tight_bounds() -> TunedBounds {
+    let mut values = TunedBounds::default().to_array();
+    for (bound, value) in values.iter_mut().enumerate() {
+        let (lowest, highest) = TunedBounds::RANGES[bound];
+        let tightest = if TunedBounds::IS_LOWER[bound] { highest } else { lowest };
+        *value += 0.1 * (tightest - *value);
+    }
+    TunedBounds::from_array(values).unwrap()
 }
 
 const DOMAINS: [&str; 8] = ["DS2_R", "DS3_R", "SS2_R", "SS1_R", "DS2_L", "DS3_L", "SS2_L", "SS1_L"];
@@ -72,7 +84,7 @@ fn group(name: RowName) -> String {
 fn gait_problem_matches_independent_sums() {
     for (name, muscles) in [("nlp_s1_n", false), ("nlp_s1_m", true)] {
         let data = fixture(name);
-        let mut programme = programme(muscles);
+        let mut programme = programme(muscles, &TunedBounds::default());
         if let Some(height) = data["subject"]["H"].as_f64() {
             assert_eq!(height, 1.727);
         }
@@ -136,7 +148,7 @@ fn multiply(pattern: &interior_point::SparsityPattern, values: &[f64], v: &[f64]
 fn derivatives_match_finite_differences() {
     for (name, muscles) in [("nlp_s1_n", false), ("nlp_s1_m", true)] {
         let x = numbers(&fixture(name)["x"]);
-        let mut programme = programme(muscles);
+        let mut programme = programme(muscles, &tight_bounds());
         programme.weights.tracking = 0.7;
         let (n, m) = (programme.variables(), programme.rows());
         let direction: Vec<f64> = (0..n).map(|i| (1.3 * i as f64).sin()).collect();
@@ -198,7 +210,7 @@ fn derivatives_match_finite_differences() {
 #[test]
 fn elimination_tree_covers_every_coupling() {
     for muscles in [false, true] {
-        let programme = programme(muscles);
+        let programme = programme(muscles, &TunedBounds::default());
         let blocks = programme.elimination_blocks().unwrap();
         let related = |mut a: usize, mut b: usize| {
             // The block with the larger number must be an ancestor of the other.

@@ -1,5 +1,6 @@
 //! The command line as a process.
 
+use gait_optimizer::TunedBounds;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -16,6 +17,17 @@ pub fn command(binary: &str, folder: &Path, arguments: &[&str]) -> Command {
 /// Runs it to its end.
 pub fn run(binary: &str, folder: &Path, arguments: &[&str]) -> Output {
     command(binary, folder, arguments).output().unwrap()
+}
+
+/// The row of a table of actions for bounds such as `a5=0.013`.
+pub fn action(bounds: &str) -> String {
+    TunedBounds::parse(bounds).unwrap().to_array().map(|value| value.to_string()).join(",")
+}
+
+/// A table of actions for `sweep`: the header and one row for each.
+pub fn actions(rows: &[&str]) -> String {
+    let header = TunedBounds::NAMES.join(",");
+    std::iter::once(header).chain(rows.iter().map(|bounds| action(bounds))).map(|line| line + "\n").collect()
 }
 
 /// Names of the files of a folder, sorted.

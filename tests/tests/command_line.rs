@@ -42,7 +42,7 @@ fn an_unknown_subject_is_refused_with_the_known_ones() {
 
 #[test]
 fn malformed_bounds_are_refused_by_name() {
-    refused(&["solve", "--bounds", "a9=1"], "bounds is \"a9\"; it must be one of a1");
+    refused(&["solve", "--bounds", "a0=1"], "bounds is \"a0\"; it must be one of a1");
     refused(&["solve", "--bounds", "a5"], "expected NAME=VALUE");
     refused(&["solve", "--bounds", "a1=20,"], "expected NAME=VALUE");
     refused(&["solve", "--bounds", "a5=high"], "the value is not a number");
@@ -87,15 +87,14 @@ fn a_table_of_actions_is_checked_whole_before_anything_is_solved() {
         assert!(!folder.path().join("out.csv").exists());
         String::from_utf8(output.stderr).unwrap()
     };
-    assert!(sweep("a1,a2\n1,2\n").contains("it must be \"a1,a2,a3,a4,a5,a6,a7,a8\""));
-    assert!(sweep("a1,a2,a3,a4,a5,a6,a7,a8\n").contains("has no rows"));
-    let good = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0,0.5,50,40\n";
-    assert!(sweep(&format!("{good}20,90,0.3,1.4,0,0.5,50\n")).contains("line"));
-    assert!(
-        sweep(&format!("{good}20,90,0.3,1.4,0,0.5,fifty,40\n"))
-            .contains("line 3: a7 is \"fifty\", which is not a number")
-    );
-    assert!(sweep(&format!("{good}20,90,0.3,1.4,0,0.5,50,400\n")).contains("line 3: a8 is 400;"));
+    assert!(sweep("a1,a2\n1,2\n").contains("it must be \"a1,a2,a3,a4,a5,a6,a7,a8"));
+    assert!(sweep(&cli::actions(&[])).contains("has no rows"));
+    let (good, row) = (cli::actions(&[""]), cli::action("a1=19"));
+    let (shorter, _) = row.rsplit_once(',').unwrap();
+    assert!(sweep(&format!("{good}{shorter}\n")).contains("line"));
+    let with = |value: &str| format!("{good}{}\n", row.replacen("19", value, 1));
+    assert!(sweep(&with("fast")).contains("line 3: a1 is \"fast\", which is not a number"));
+    assert!(sweep(&with("400")).contains("line 3: a1 is 400;"));
 }
 
 #[test]
@@ -168,8 +167,7 @@ fn a_file_that_cannot_be_written_is_found_before_anything_is_solved() {
     refused_beside(&[], &["solve", "--out", "nowhere/gait.json"], "Cannot write nowhere/gait.json");
     refused_beside(&[], &["solve", "--out", "folder"], "Cannot write folder: it is a folder");
     let folder = tempfile::tempdir().unwrap();
-    let actions = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0,0.5,50,40\n";
-    std::fs::write(folder.path().join("actions.csv"), actions).unwrap();
+    std::fs::write(folder.path().join("actions.csv"), cli::actions(&[""])).unwrap();
     let output = gaitwright(folder.path(), &["sweep", "--actions", "actions.csv", "--out", "nowhere/out.csv"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("Cannot write nowhere/out.csv"));
@@ -261,8 +259,7 @@ fn files_that_name_no_fields_and_a_dash_for_a_file_are_refused() {
 #[test]
 fn settings_of_the_solver_are_refused_with_field_value_and_range() {
     let folder = tempfile::tempdir().unwrap();
-    let table = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0,0.5,50,40\n";
-    std::fs::write(folder.path().join("actions.csv"), table).unwrap();
+    std::fs::write(folder.path().join("actions.csv"), cli::actions(&[""])).unwrap();
     let commands = [&["solve"][..], &["tune"], &["sweep", "--actions", "actions.csv", "--out", "out.csv"]];
     for (settings, expected) in [
         (

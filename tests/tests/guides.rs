@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_optimizer::TunedBounds;
 use gaitwright_http::openapi;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
@@ -251,4 +252,19 @@ fn every_link_of_a_page_to_a_guide_has_its_section() {
     for guide in ["clinician", "rater", "lab-session", "lab-script", "administrator", "glossary"] {
         assert!(linked.contains(guide), "no page links to the guide {guide}");
     }
+}
+
+#[test]
+fn guides_have_every_tuned_bound() {
+    let guide = |name: &str| std::fs::read_to_string(repository().join("docs").join(name)).unwrap();
+    for bound in TunedBounds::NAMES {
+        assert!(
+            guide("clinician.md").contains(&format!("\n| {bound} |")),
+            "{bound} is not in the table of clinician.md"
+        );
+    }
+    let header = TunedBounds::NAMES.join(",");
+    assert!(guide("unattended.md").contains(&format!("`{header}`")), "unattended.md does not have the header {header}");
+    let last = TunedBounds::NAMES.last().unwrap();
+    assert!(guide("glossary.md").contains(&format!("a1 to {last}")), "glossary.md does not have a1 to {last}");
 }

@@ -4,6 +4,7 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
+use gait_optimizer::TunedBounds;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, events};
@@ -149,7 +150,8 @@ async fn a_study_is_made_run_and_read_as_json_and_csv() {
     let csv = service.fetch(&format!("/api/v1/studies/{study}/trials.csv")).await;
     assert!(csv.content_type().starts_with("text/csv"));
     assert_eq!(csv.text.lines().count(), 6);
-    assert!(csv.text.starts_with("number,trial_id,a1,a2,a3,a4,a5,a6,a7,a8,state,gait_rmse_rad"));
+    let header = format!("number,trial_id,{},state,gait_rmse_rad", TunedBounds::NAMES.join(","));
+    assert!(csv.text.starts_with(&header));
 
     let history = service.fetch(&format!("/api/v1/studies/{study}/history")).await.items();
     assert_eq!(history.as_array().unwrap().last().unwrap()["iteration"], 5);
@@ -181,7 +183,7 @@ async fn studies_that_cannot_be_are_refused_by_field() {
         ("solve_options", json!({"threads": 17}), "solve_options.threads"),
         (
             "search_space",
-            json!({"dimensions": [{"name": "a9", "values": [1.0], "lengthscale": 1.0}]}),
+            json!({"dimensions": [{"name": "a0", "values": [1.0], "lengthscale": 1.0}]}),
             "search_space.dimensions[0].name",
         ),
         (

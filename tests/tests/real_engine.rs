@@ -85,17 +85,17 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
         String::from_utf8_lossy(&unknown.stderr).contains("many.json has no basin 9 for --warm-basin. Basins: 1, 2")
     );
 
-    let actions = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0.013,0.5,50,40\n20,90,0.3,1.4,0,0.5,5,5\n";
-    std::fs::write(folder.join("actions.csv"), actions).unwrap();
+    let [reachable, unreachable] = ["a5=0.013", "a7=5,a8=5"];
+    std::fs::write(folder.join("actions.csv"), cli::actions(&[reachable, unreachable])).unwrap();
     let sweep = ["sweep", "--actions", "actions.csv", "--out", "out.csv", "--warm", "gait.json", "--max-iterations"];
     let output = gaitwright(folder, &[&sweep[..], &["200"], &COARSE].concat());
     assert!(output.stdout.is_empty());
     let table = std::fs::read_to_string(folder.join("out.csv")).unwrap();
     let rows: Vec<&str> = table.lines().collect();
     insta::assert_snapshot!("sweep_header", rows[0]);
-    assert!(rows[1].starts_with("20,90,0.3,1.4,0.013,0.5,50,40,converged,"), "{}", rows[1]);
+    assert!(rows[1].starts_with(&format!("{},converged,", cli::action(reachable))), "{}", rows[1]);
     // No posture meets these bounds: that is an answer, and one of the six words.
-    let status = rows[2].strip_prefix("20,90,0.3,1.4,0,0.5,5,5,").unwrap().split(',').next().unwrap();
+    let status = rows[2].strip_prefix(&(cli::action(unreachable) + ",")).unwrap().split(',').next().unwrap();
     assert!(["infeasible", "stalled", "iteration_limit"].contains(&status), "{}", rows[2]);
     assert_eq!(cli::files(folder), ["actions.csv", "gait.json", "many.json", "out.csv"]);
 
@@ -360,8 +360,8 @@ async fn failed_trial_sets_the_exit_code() {
 fn a_killed_sweep_leaves_its_rows() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let actions = format!("a1,a2,a3,a4,a5,a6,a7,a8\n{}", "20,90,0.3,1.4,0.013,0.5,50,40\n".repeat(9));
-    std::fs::write(folder.join("actions.csv"), actions).unwrap();
+    let action = "a5=0.013";
+    std::fs::write(folder.join("actions.csv"), cli::actions(&[action; 9])).unwrap();
     let sweep = ["sweep", "--actions", "actions.csv", "--out", "out.csv", "--workers", "1", "--max-iterations", "20"];
     let arguments = [&sweep[..], &COARSE].concat();
     let mut child = cli::command(BINARY, folder, &arguments).stderr(Stdio::null()).spawn().unwrap();
@@ -374,7 +374,8 @@ fn a_killed_sweep_leaves_its_rows() {
     child.kill().unwrap();
     child.wait().unwrap();
     let text = std::fs::read_to_string(&part).unwrap();
-    assert!(text.lines().skip(1).take(2).all(|row| row.starts_with("20,90,0.3,1.4,0.013,0.5,50,40,")), "{text}");
+    let start = cli::action(action) + ",";
+    assert!(text.lines().skip(1).take(2).all(|row| row.starts_with(&start)), "{text}");
     assert!(!folder.join("out.csv").exists());
 }
 

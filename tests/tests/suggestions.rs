@@ -33,7 +33,7 @@ async fn the_learner_hears_a_suggestion_until_it_is_taken_back() {
     let a6 = plan.search_space.values(trial.action_index)[5];
     let other = if a6 == 0.3 { 0.2 } else { 0.3 };
     for (body, field) in [
-        (json!({"over": trial.id, "bounds": {"a9": 1.0}}), "bounds"),
+        (json!({"over": trial.id, "bounds": {"a0": 1.0}}), "bounds"),
         (json!({"over": trial.id, "bounds": {"a6": 0.31}}), "bounds.a6"),
         (json!({"over": trial.id, "bounds": {"a6": a6}}), "bounds"),
         (json!({"over": trial.id, "bounds": {}}), "bounds"),

@@ -1,7 +1,10 @@
 //! Levels of the tuned bounds.
 
+use gait_optimizer::TunedBounds;
+
 /// Levels of Table I (Li et al. 2022).
-pub(crate) const LEVELS: [&[f64]; 8] = [
+#[allow(dead_code)] // each example takes what it needs
+pub(crate) const LEVELS: [&[f64]; TunedBounds::COUNT] = [
     &[15.0, 20.0],
     &[70.0, 80.0, 90.0],
     &[0.3, 0.4, 0.5],
@@ -14,7 +17,7 @@ pub(crate) const LEVELS: [&[f64]; 8] = [
 
 /// Values far beyond Table I.
 #[allow(dead_code)] // each example takes what it needs
-pub(crate) const TIGHT: [&[f64]; 8] = [
+pub(crate) const TIGHT: [&[f64]; TunedBounds::COUNT] = [
     &[2.0, 3.0, 4.0],
     &[10.0, 20.0, 30.0],
     &[1.5, 2.0],

@@ -3,16 +3,15 @@
 //! A set is feasible if there is a gait with its bounds at their given values and all others at their loosest values. The
 //! predicate must be monotonic: subsets of a feasible set are feasible.
 
-/// Number of tuned bounds.
-const COUNT: usize = 8;
+use crate::tuned_bounds::TunedBounds;
 
 /// A set of tuned bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub(super) struct BoundSet(u8);
+pub(super) struct BoundSet(u32);
 
 impl BoundSet {
     pub(super) const EMPTY: Self = Self(0);
-    pub(super) const ALL: Self = Self(u8::MAX);
+    pub(super) const ALL: Self = Self((1 << TunedBounds::COUNT) - 1);
 
     pub(super) fn with(self, bound: usize) -> Self {
         Self(self.0 | 1 << bound)
@@ -32,7 +31,7 @@ impl BoundSet {
 
     /// The bounds in the order of an action.
     pub(super) fn bounds(self) -> impl Iterator<Item = usize> {
-        (0..COUNT).filter(move |bound| self.contains(*bound))
+        (0..TunedBounds::COUNT).filter(move |bound| self.contains(*bound))
     }
 }
 
@@ -124,7 +123,7 @@ mod tests {
     use std::convert::Infallible;
 
     /// Feasible if it contains no conflict.
-    fn met(conflicts: &[u8], set: BoundSet) -> bool {
+    fn met(conflicts: &[u32], set: BoundSet) -> bool {
         conflicts.iter().all(|conflict| conflict & !set.0 != 0)
     }
 
@@ -132,7 +131,7 @@ mod tests {
         result.unwrap_or_else(|never| match never {})
     }
 
-    fn found(conflicts: &[u8], order: &[usize]) -> (Option<BoundSet>, Vec<BoundSet>) {
+    fn found(conflicts: &[u32], order: &[usize]) -> (Option<BoundSet>, Vec<BoundSet>) {
         let mut not_met = Vec::new();
         let result = answer(conflict(order, |set| {
             let met = met(conflicts, set);
@@ -144,11 +143,17 @@ mod tests {
         (result, not_met)
     }
 
-    const IN_ORDER: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
+    fn in_order() -> Vec<usize> {
+        (0..TunedBounds::COUNT).collect()
+    }
+
+    fn some_conflicts(most: usize) -> impl Strategy<Value = Vec<u32>> {
+        prop::collection::vec(1..=BoundSet::ALL.0, 1..most)
+    }
 
     #[test]
     fn one_infeasible_set_is_tested_for_each_bound_besides_the_conflict() {
-        let (pair, not_met) = found(&[0b0100_1000], &IN_ORDER);
+        let (pair, not_met) = found(&[0b0100_1000], &in_order());
         assert_eq!(pair, Some(BoundSet(0b0100_1000)));
         assert_eq!(not_met, [0b0111_1111, 0b0100_1111, 0b0100_1000].map(BoundSet));
         let (pair, not_met) = found(&[0b0100_1000], &[6, 3, 0, 1, 2, 4, 5, 7]);
@@ -161,15 +166,15 @@ mod tests {
 
     #[test]
     fn no_conflict_differs_from_an_empty_conflict() {
-        assert_eq!(found(&[], &IN_ORDER).0, None);
-        assert_eq!(found(&[0], &IN_ORDER).0, Some(BoundSet::EMPTY));
+        assert_eq!(found(&[], &in_order()).0, None);
+        assert_eq!(found(&[0], &in_order()).0, Some(BoundSet::EMPTY));
     }
 
     proptest! {
         #[test]
         fn conflicts_are_irreducible_and_relaxations_are_minimal_hitting_sets(
-            conflicts in prop::collection::vec(1u8..=255, 1..5),
-            order in Just(IN_ORDER.to_vec()).prop_shuffle(),
+            conflicts in some_conflicts(5),
+            order in Just(in_order()).prop_shuffle(),
         ) {
             let first = found(&conflicts, &order).0.unwrap();
             prop_assert!(!met(&conflicts, first));
@@ -177,12 +182,12 @@ mod tests {
                 prop_assert!(met(&conflicts, first.without(BoundSet::EMPTY.with(bound))));
             }
             let gives_a_gait = |loosened| met(&conflicts, BoundSet::ALL.without(loosened));
-            let remedies = answer(remedies(first, 8, |loosened| Ok(gives_a_gait(loosened)), |loosened| {
+            let remedies = answer(remedies(first, TunedBounds::COUNT, |loosened| Ok(gives_a_gait(loosened)), |loosened| {
                 let kept: Vec<usize> = order.iter().copied().filter(|bound| !loosened.contains(*bound)).collect();
                 Ok(found(&conflicts, &kept).0)
             }));
             let size = |set: &BoundSet| set.0.count_ones();
-            let hits: Vec<BoundSet> = (0..=255).map(BoundSet).filter(|set| gives_a_gait(*set)).collect();
+            let hits: Vec<BoundSet> = (0..=BoundSet::ALL.0).map(BoundSet).filter(|set| gives_a_gait(*set)).collect();
             let smallest = hits.iter().map(size).min().unwrap();
             let expected: Vec<BoundSet> = hits.into_iter().filter(|set| size(set) == smallest).collect();
             prop_assert_eq!(&remedies.help, &expected);
@@ -193,14 +198,14 @@ mod tests {
         }
 
         #[test]
-        fn relaxations_have_at_most_the_requested_size(conflicts in prop::collection::vec(1u8..=255, 1..8)) {
-            let first = found(&conflicts, &IN_ORDER).0.unwrap();
+        fn relaxations_have_at_most_the_requested_size(conflicts in some_conflicts(8)) {
+            let first = found(&conflicts, &in_order()).0.unwrap();
             let mut largest = 0;
             let remedies = answer(remedies(first, 2, |loosened| {
                 largest = largest.max(loosened.0.count_ones());
                 Ok(met(&conflicts, BoundSet::ALL.without(loosened)))
             }, |loosened| {
-                let kept: Vec<usize> = IN_ORDER.into_iter().filter(|bound| !loosened.contains(*bound)).collect();
+                let kept: Vec<usize> = in_order().into_iter().filter(|bound| !loosened.contains(*bound)).collect();
                 Ok(found(&conflicts, &kept).0)
             }));
             prop_assert!(largest <= 2);

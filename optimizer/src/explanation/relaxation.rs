@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// The effect of relaxing one tuned bound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Relaxation {
-    /// `a1`..`a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
@@ -36,7 +36,7 @@ pub struct Relaxation {
 /// One bound of a joint relaxation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RelaxedBound {
-    /// `a1`..`a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,

@@ -16,7 +16,7 @@ pub struct GaitProblem {
     pub subject: Subject,
     /// The device on the right leg.
     pub device: Device,
-    /// The tuned bounds a1 to a8.
+    /// The tuned bounds.
     pub bounds: TunedBounds,
     /// Whether the problem has muscles (C1 to C12) or not (C1 to C4).
     pub muscles: bool,

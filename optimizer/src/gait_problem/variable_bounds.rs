@@ -1,4 +1,4 @@
-//! C3 and C4: bounds of variables and of inequality rows, from the tuned bounds a1 to a8, the device and the settings.
+//! C3 and C4: bounds of variables and of inequality rows, from the tuned bounds, the device and the settings.
 
 use super::layout::{FORCE, Layout, Q, QD, QDD, U};
 use super::rows::RowTable;

@@ -79,7 +79,10 @@ impl Pair {
         let mut once = pair.row_of.clone();
         once.sort_unstable();
         once.dedup();
-        assert_eq!(once.len(), pair.production.rows(), "{}: rows written once each", pair.name);
+        let is_missing = |row: &usize| once.binary_search(row).is_err();
+        if let Some(row) = (0..pair.production.rows()).find(is_missing) {
+            panic!("{}: `rows.rs` lacks the row {}", pair.name, pair.names()[row].label());
+        }
         assert_eq!(once.len(), pair.row_of.len(), "{}: no row written twice", pair.name);
         pair
     }

@@ -165,13 +165,25 @@ pub(super) fn state(document: &mut Value) {
     }
 }
 
-/// The ranges of the bounds, and a second schema for requests, where each bound has a default.
+/// The bounds of an action, and a second schema for requests, where each bound has a default.
 fn state_bounds(schemas: &mut Map<String, Value>) {
-    for (name, (least, most)) in TunedBounds::NAMES.iter().zip(TunedBounds::RANGES) {
-        add(schemas, "Bounds", name, &json!({ "minimum": least, "maximum": most }));
+    let mut properties = Map::new();
+    for (bound, name) in TunedBounds::NAMES.iter().enumerate() {
+        let side = if TunedBounds::IS_LOWER[bound] { "Minimum" } else { "Maximum" };
+        let meaning = format!("{side}: {}.", TunedBounds::MEANINGS[bound]);
+        let (least, most) = TunedBounds::RANGES[bound];
+        let mut schema = number(&meaning, least, most, &json!("number"));
+        schema["format"] = json!("double");
+        properties.insert((*name).to_owned(), schema);
     }
-    let Some(bounds) = schemas.get_mut("Bounds").and_then(Value::as_object_mut) else { return };
-    bounds.insert("additionalProperties".to_owned(), json!(false));
+    let bounds = json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": TunedBounds::NAMES,
+        "properties": properties,
+    });
+    put(schemas, "Bounds", bounds);
+    let Some(bounds) = schemas.get("Bounds").and_then(Value::as_object) else { return };
     let mut given = bounds.clone();
     given.remove("required");
     given.insert("description".to_owned(), json!("Values of bounds. Absent bounds have their defaults."));

@@ -25,7 +25,7 @@ use std::sync::mpsc;
 pub(super) struct Sweep {
     #[command(flatten)]
     flags: ProblemFlags,
-    /// CSV file of actions with the header a1,a2,a3,a4,a5,a6,a7,a8.
+    /// CSV file of actions. Its columns are all bounds in order: a1,a2 and so on.
     #[arg(long, value_name = "FILE.csv")]
     actions: PathBuf,
     /// Output file with one row for each action, in the same order. Until it is complete, rows are in a hidden file
@@ -158,7 +158,7 @@ fn actions(path: &Path) -> Result<Vec<TunedBounds>, Error> {
     for record in reader.records() {
         let record = record.map_err(|e| malformed(e.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let mut values = [0.0; 8];
+        let mut values = [0.0; TunedBounds::COUNT];
         for ((value, cell), name) in values.iter_mut().zip(&record).zip(TunedBounds::NAMES) {
             *value = cell
                 .parse()

@@ -155,7 +155,7 @@ pub struct Common {
 /// A bound whose relaxation gives a gait.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Relief {
-    /// `a1`..`a8`.
+    /// Name of the bound.
     pub bound: String,
     /// Number of trials in which its relaxation is the smallest one that does.
     pub trials: u32,

@@ -5,23 +5,18 @@ use super::{Connection, StoreResult, StudyId, TrialId, json};
 use gait_optimizer::TunedBounds;
 use sqlx::Row;
 
+/// Columns other than the bounds by which trials can be sorted.
+const COLUMNS: [&str; 6] = ["number", "state", "gait_rmse_rad", "cost_of_transport", "iterations", "seconds_total"];
 /// Columns by which trials can be sorted.
-pub const SORTS: [&str; 14] = [
-    "number",
-    "state",
-    "gait_rmse_rad",
-    "cost_of_transport",
-    "iterations",
-    "seconds_total",
-    "a1",
-    "a2",
-    "a3",
-    "a4",
-    "a5",
-    "a6",
-    "a7",
-    "a8",
-];
+pub const SORTS: [&str; COLUMNS.len() + TunedBounds::COUNT] = {
+    let mut sorts = [""; COLUMNS.len() + TunedBounds::COUNT];
+    let mut at = 0;
+    while at < sorts.len() {
+        sorts[at] = if at < COLUMNS.len() { COLUMNS[at] } else { TunedBounds::NAMES[at - COLUMNS.len()] };
+        at += 1;
+    }
+    sorts
+};
 
 /// Filter, order and page of a listing.
 #[derive(Debug, Clone)]

@@ -55,6 +55,10 @@ document! {
     /// A device: measurements of the prosthesis, each with its range.
     DeviceDefinition
 }
+document! {
+    /// The tuned bounds of one action.
+    Bounds
+}
 
 /// Height and mass of a subject.
 #[derive(Debug, ToSchema)]
@@ -63,27 +67,6 @@ pub struct Body {
     pub height_m: f64,
     /// Body mass, kg.
     pub body_mass_kg: f64,
-}
-
-/// The tuned bounds of one action.
-#[derive(Debug, ToSchema)]
-pub struct Bounds {
-    /// Maximum of all coordinate velocities, rad/s.
-    pub a1: f64,
-    /// Maximum of all coordinate accelerations, rad/s².
-    pub a2: f64,
-    /// Minimum hip velocity, m/s.
-    pub a3: f64,
-    /// Maximum hip velocity, m/s.
-    pub a4: f64,
-    /// Minimum clearance of the swing foot, m.
-    pub a5: f64,
-    /// Maximum torso lean, rad.
-    pub a6: f64,
-    /// Maximum hip angle, degrees.
-    pub a7: f64,
-    /// Maximum ankle angle, degrees.
-    pub a8: f64,
 }
 
 /// A grid of actions.
@@ -96,7 +79,7 @@ pub struct SearchSpace {
 /// One tuned bound of a grid.
 #[derive(Debug, ToSchema)]
 pub struct Dimension {
-    /// `a1` to `a8`.
+    /// Name of the bound.
     pub name: String,
     /// Its values, ascending.
     pub values: Vec<f64>,
@@ -118,7 +101,7 @@ pub struct Violation {
 /// A tuned bound that is active at the last iterate of a solve.
 #[derive(Debug, ToSchema)]
 pub struct BoundAtLimit {
-    /// `a1` to `a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
@@ -131,7 +114,7 @@ pub struct BoundAtLimit {
 /// A tuned bound with its given value.
 #[derive(Debug, ToSchema)]
 pub struct GivenBound {
-    /// `a1` to `a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
@@ -160,7 +143,7 @@ pub struct Conflict {
 /// Effect of relaxing one tuned bound alone.
 #[derive(Debug, ToSchema)]
 pub struct Relaxation {
-    /// `a1` to `a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
@@ -181,7 +164,7 @@ pub struct Relaxation {
 /// Relaxation of one of several bounds.
 #[derive(Debug, ToSchema)]
 pub struct RelaxedBound {
-    /// `a1` to `a8`.
+    /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,

@@ -150,7 +150,7 @@ pub struct StudyPlan {
     /// Values of bounds that are not tuned.
     #[schema(value_type = schema::Bounds)]
     pub base_bounds: TunedBounds,
-    /// Tuned bounds and their values, with dimensions named `a1` to `a8`.
+    /// Tuned bounds and their values, with dimensions named as the bounds.
     #[schema(value_type = schema::SearchSpace)]
     pub search_space: SearchSpace,
     /// Settings of the learner.

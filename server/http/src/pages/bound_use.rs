@@ -7,8 +7,6 @@ use gaitwright_service::error::Error;
 
 /// A bound is active if the gait reaches this share of it.
 const ACTIVE: f64 = 0.99;
-/// Indices of the bounds that limit from below: hip velocity (a3) and foot clearance (a5).
-const FROM_BELOW: [usize; 2] = [2, 4];
 
 /// A bound, and the extreme value that the gait reaches.
 pub(super) struct BoundUse {
@@ -29,15 +27,15 @@ pub(super) fn of(action: &TunedBounds, gait: Option<&Gait>) -> Result<Vec<BoundU
         let reached = extremes[place];
         // A violated bound counts as active: the solve did not converge, and this bound is a reason.
         let value = values[place];
-        let from_below = FROM_BELOW.contains(&place);
-        let is_active = |reached: f64| if from_below { ACTIVE * reached <= value } else { reached >= ACTIVE * value };
+        let is_lower = TunedBounds::IS_LOWER[place];
+        let is_active = |reached: f64| if is_lower { ACTIVE * reached <= value } else { reached >= ACTIVE * value };
         BoundUse { bound, reached: reached.map(format::number), active: reached.is_some_and(is_active) }
     };
     Ok(format::bounds(action).into_iter().enumerate().map(with_use).collect())
 }
 
 /// The largest value of each limited quantity, or the smallest for a bound from below.
-fn extremes(gait: &Gait) -> Result<[Option<f64>; 8], Error> {
+fn extremes(gait: &Gait) -> Result<[Option<f64>; TunedBounds::COUNT], Error> {
     let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).reduce(f64::max);
     let angle = |places: &'static [usize]| {
         let rows = gait.domains.iter().flat_map(|domain| &domain.q);

@@ -1,4 +1,4 @@
-//! Search spaces: grids over the bounds a1 to a8, and the bounds of each action.
+//! Search spaces: grids over the tuned bounds, and the bounds of each action.
 
 use crate::error::{Error, FieldError};
 use gait_learner::{ActionIndex, Dimension, LearnerError, SearchSpace};
@@ -6,16 +6,17 @@ use gait_optimizer::{ModelError, TunedBounds};
 use serde::Deserialize;
 use serde_json::json;
 
-/// Values and lengthscale of each bound in Table I of the paper: 11,664 actions.
-pub const TABLE_I: [(&str, &[f64], f64); 8] = [
-    ("a1", &[15.0, 20.0], 5.0),
-    ("a2", &[70.0, 80.0, 90.0], 10.0),
-    ("a3", &[0.3, 0.4, 0.5], 0.1),
-    ("a4", &[1.2, 1.3, 1.4], 0.1),
-    ("a5", &[0.0, 0.013, 0.026, 0.039], 0.013),
-    ("a6", &[0.0, 0.1, 0.2, 0.3, 0.4, 0.5], 0.1),
-    ("a7", &[20.0, 35.0, 50.0], 15.0),
-    ("a8", &[20.0, 30.0, 40.0], 10.0),
+/// Values and lengthscale of each bound in Table I of the paper, in the order of an action: 11,664 actions. A bound
+/// that the table lacks has one value.
+pub const TABLE_I: [(&[f64], f64); TunedBounds::COUNT] = [
+    (&[15.0, 20.0], 5.0),
+    (&[70.0, 80.0, 90.0], 10.0),
+    (&[0.3, 0.4, 0.5], 0.1),
+    (&[1.2, 1.3, 1.4], 0.1),
+    (&[0.0, 0.013, 0.026, 0.039], 0.013),
+    (&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5], 0.1),
+    (&[20.0, 35.0, 50.0], 15.0),
+    (&[20.0, 30.0, 40.0], 10.0),
 ];
 
 /// A search space as a request states it.
@@ -63,12 +64,13 @@ impl GivenSpace {
 /// Never for this table; the signature is that of the constructor.
 pub fn table_i() -> Result<SearchSpace, LearnerError> {
     SearchSpace::new(
-        TABLE_I
+        TunedBounds::NAMES
             .iter()
-            .map(|(name, values, lengthscale)| Dimension {
+            .zip(TABLE_I)
+            .map(|(name, (values, lengthscale))| Dimension {
                 name: (*name).to_owned(),
                 values: values.to_vec(),
-                lengthscale: *lengthscale,
+                lengthscale,
             })
             .collect(),
     )
@@ -124,7 +126,7 @@ mod tests {
         assert_eq!(space.len(), 11_664);
         validate(&space, TunedBounds::default()).unwrap();
         let last = bounds_of(&space, TunedBounds::default(), ActionIndex(11_663)).unwrap();
-        assert_eq!(last.to_array(), [20.0, 90.0, 0.5, 1.4, 0.039, 0.5, 50.0, 40.0]);
+        assert_eq!(last, TunedBounds { a3: 0.5, a5: 0.039, ..TunedBounds::default() });
     }
 
     #[test]
@@ -143,7 +145,7 @@ mod tests {
             SearchSpace::new(vec![Dimension { name: name.to_owned(), values: values.to_vec(), lengthscale: 1.0 }])
                 .unwrap()
         };
-        assert!(validate(&dimension("a9", &[1.0]), TunedBounds::default()).is_err());
+        assert!(validate(&dimension("a0", &[1.0]), TunedBounds::default()).is_err());
         assert!(validate(&dimension("a1", &[1000.0]), TunedBounds::default()).is_err());
         assert!(validate(&dimension("a3", &[0.3, 1.5]), TunedBounds::default()).is_err());
     }

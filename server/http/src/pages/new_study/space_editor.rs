@@ -38,8 +38,9 @@ impl SpaceEditor {
             return Err(Error::Malformed(format!("unknown field {field}")));
         }
         let defaults = TunedBounds::default().to_array();
-        let row = |(bound, (name, values, lengthscale)): (usize, &(&'static str, &[f64], f64))| {
+        let row = |(bound, name): (usize, &'static str)| {
             let (low, high) = TunedBounds::RANGES[bound];
+            let (values, lengthscale) = TABLE_I[bound];
             let text = |part: &str, preset: String| fields.get(&format!("{part}_{name}")).cloned().unwrap_or(preset);
             let preset: Vec<String> = values.iter().map(f64::to_string).collect();
             BoundRow {
@@ -52,7 +53,7 @@ impl SpaceEditor {
                 fixed: text("fixed", defaults[bound].to_string()),
             }
         };
-        Ok(Self { rows: TABLE_I.iter().enumerate().map(row).collect() })
+        Ok(Self { rows: TunedBounds::NAMES.into_iter().enumerate().map(row).collect() })
     }
 
     /// The search space, and the values of the bounds that are not tuned.
@@ -151,6 +152,6 @@ mod tests {
         assert_eq!(refused(&[("tuned_a1", "on"), ("lengthscale_a1", "-5")]), "lengthscale_a1");
         assert_eq!(refused(&[("tuned_a5", "on"), ("fixed_a6", "NaN")]), "fixed_a6");
         assert_eq!(refused(&[("fixed_a6", "0.1")]), "tuned_a1");
-        assert!(matches!(SpaceEditor::typed(&typed(&[("values_a9", "1")])), Err(Error::Malformed(_))));
+        assert!(matches!(SpaceEditor::typed(&typed(&[("values_a0", "1")])), Err(Error::Malformed(_))));
     }
 }
