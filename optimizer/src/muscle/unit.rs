@@ -1,4 +1,4 @@
-//! The ten muscle-tendon units: parameters, attachments, length and lever arms.
+//! The ten muscle-tendon units: parameters, attachments, length and moment arms.
 //!
 //! Parameters are those of the model file of Geyer and Herr 2010 (IEEE TNSRE 18:263). In Geyer's convention, hip and
 //! knee are at 180° when straight and the ankle is at 90°; angles increase with extension and plantarflexion. As
@@ -34,7 +34,7 @@ impl Joint {
 pub struct Attachment {
     /// Index of the joint angle in q: 3 hip_L, 4 knee_L, 5 ankle_L, 6 hip_R.
     pub coordinate: usize,
-    /// Largest lever arm r0, m.
+    /// Largest moment arm r0, m.
     pub lever_m: f64,
     /// Factor rho of the length change.
     pub rho: f64,

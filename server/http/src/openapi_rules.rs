@@ -367,7 +367,7 @@ fn device(name: &str) -> Value {
     json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
 }
 
-/// The schema of muscle parameters: what is left out stays as in the published table, and a muscle has lever arms only at
+/// The schema of muscle parameters: what is left out stays as in the published table, and a muscle has moment arms only at
 /// the joints that it spans.
 fn muscles() -> Value {
     let published = MuscleParameters::default();

@@ -97,7 +97,8 @@ pub struct Trial {
     /// How the solve ended.
     #[schema(value_type = Option<schema::SolveStatus>)]
     pub status: Option<SolveStatus>,
-    /// Gait RMSE of a converged gait, rad. The report has that of a last iterate.
+    /// Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
+    /// iterate.
     pub gait_rmse_rad: Option<f64>,
     /// Cost of transport of a converged gait, dimensionless.
     pub cost_of_transport: Option<f64>,

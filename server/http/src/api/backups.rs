@@ -17,7 +17,7 @@ use gaitwright_store::BackupId;
 
 /// Back up the record
 ///
-/// Writes a backup next to the database and checks it. It is made to its end, even if the caller goes away.
+/// Writes a backup next to the database and checks it. The backup is completed even if the caller disconnects.
 #[utoipa::path(
     post,
     path = "/backups",

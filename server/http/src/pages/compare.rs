@@ -347,7 +347,7 @@ impl Submitted {
 }
 
 fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
-    text.parse().map_err(|_| Error::invalid(field, text, "an identifier of this form"))
+    text.parse().map_err(|_| Error::invalid(field, text, "an identifier from this form"))
 }
 
 /// The outcome of a submitted form.

@@ -161,7 +161,7 @@ impl Asked {
     }
 
     fn id<T: FromStr>(&self) -> Result<T, Error> {
-        self.id.parse().map_err(|_| Error::invalid("id", self.id.as_str(), "an identifier of this page"))
+        self.id.parse().map_err(|_| Error::invalid("id", self.id.as_str(), "an identifier from this page"))
     }
 }
 

@@ -101,7 +101,7 @@ async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) 
     })
 }
 
-/// The jobs that have not ended, of studies that a caller reaches, in the order of their identifiers.
+/// The jobs that have not ended, of studies that a caller can access, in the order of their identifiers.
 ///
 /// # Errors
 /// What the database reports.

@@ -24,7 +24,7 @@ pub struct NewMember {
 /// Who can access a study.
 #[derive(Debug, Clone)]
 pub struct StudyAccess {
-    /// Whether only members and administrators reach it.
+    /// Whether only members and administrators can access the study.
     pub restricted: bool,
     /// Members, in the order in which they were added.
     pub members: Vec<Member>,

@@ -168,7 +168,7 @@ async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unp
             Err(does_not_fit(format!("{what} {id} exists here with different content ({})", differing.join(", "))))
         }
         Known::NameTaken(name) => Err(does_not_fit(format!(
-            "another {what} here has the name {name:?}. Rename one of them where it was made"
+            "another {what} here has the name {name:?}. Rename one of them on the system where it was created"
         ))),
     }
 }

@@ -378,8 +378,8 @@ pub async fn unblind(
     pairs.retain(|sided| sided.presentation.rater == rater);
     if pairs.is_empty() {
         return Err(Error::conflict(
-            "The archive of this study did not include the sides of this rater's pairs. Unblind the rater where the study \
-             was made.",
+            "The archive of this study did not include the sides of this rater's pairs. Unblind the rater on the \
+             system where the study was created.",
         ));
     }
     let detail = json!({ "rater": rater, "reason": reason });
