@@ -1,4 +1,4 @@
-//! Files that are no record of this program, or the record under another name.
+//! Files that are not records of this program, and other names of a record.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -48,7 +48,7 @@ async fn the_database_of_another_program_is_refused_and_left_as_it_is() {
     }
 }
 
-/// What a process leaves that is killed while it makes a new file.
+/// The file that remains if a process is killed while creating a record.
 #[tokio::test]
 async fn a_record_that_was_hardly_begun_is_made_to_the_end() {
     let folder = tempfile::tempdir().unwrap();
