@@ -566,7 +566,7 @@ async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned
     let before = scene.service.feedback(scene.study).await.len();
     scene.post(&format!("/api/v1/lab-sessions/{session}/answers"), &json!({"number": 1, "answer": "first"})).await;
     scene.post(&format!("/api/v1/lab-sessions/{session}/unblind"), &json!({"reason": "done"})).await;
-    assert_eq!(scene.service.feedback(scene.study).await.len(), before, "the learner hears nothing");
+    assert_eq!(scene.service.feedback(scene.study).await.len(), before, "nothing reaches the learner");
     let rows = lab_sessions::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
     assert!(rows[0].answer().is_some(), "what was said stays in the record");
     let audit = scene.service.fetch("/api/v1/audit").await.text;
@@ -645,7 +645,7 @@ async fn a_plan_made_before_a_safety_report_is_not_written() {
     assert!(is_written().await);
     let feedback = scene.service.feedback(scene.study).await.len();
     scene.close(Rule::Safety).await;
-    assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: the learner hears nothing");
+    assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: nothing reaches the learner");
     assert!(!is_written().await, "and the plan is made anew all the same");
     scene.service.stop().await;
 }

@@ -136,7 +136,7 @@ fn term_signal_shuts_the_service_down_cleanly() {
     assert!(killed.success());
     assert!(process.child.wait().unwrap().success());
     let log = folder.path().join("gaitwright.db-wal");
-    assert!(!log.exists(), "the write-ahead log is folded into the file");
+    assert!(!log.exists(), "the write-ahead log is merged into the file");
 }
 
 #[test]
