@@ -1,7 +1,7 @@
 //! The layer that writes the access log: views and exports of subjects' data, and refusals.
 //!
-//! It logs every route that is not listed as one without data of subjects, so a new route is logged by default. Views
-//! are collected and written within a second, and repeated views once a minute with their number. An export is written
+//! It logs every route except those listed as free of subject data, so a new route is logged by default. Views are
+//! collected and written within a second, and repeated views once a minute with their number. An export is written
 //! before the response is sent.
 
 use super::AppState;

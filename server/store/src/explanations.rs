@@ -81,7 +81,7 @@ pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bo
 /// access, of subjects who have not withdrawn consent.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(TrialId, StudyId)>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(

@@ -20,7 +20,7 @@ const COMPANIONS: [&str; 2] = ["-wal", "-shm"];
 /// A restore that has begun to replace a record.
 #[derive(Debug, Serialize, Deserialize)]
 struct Marker {
-    /// Hash of the backup, which tells whether it has the name of the record.
+    /// Hash of the backup, to check whether the record is the backup.
     sha256: String,
     /// The last rows of its chains, for the anchors.
     ends: Ends,

@@ -156,7 +156,7 @@ pub struct TrialEnd {
     pub message: String,
 }
 
-/// Outcome of a trial as told by a script.
+/// Outcome of a trial as reported by a script.
 #[derive(Debug, Clone)]
 pub struct Told {
     /// Converged or not converged.
@@ -342,7 +342,7 @@ pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> Store
     Ok(row.map(|row| row.try_get(0)).transpose()?)
 }
 
-/// Records the outcome told by a script.
+/// Records the outcome that a script reported.
 ///
 /// # Errors
 /// A refusal by a trigger if the trial already has a result; errors of the database.

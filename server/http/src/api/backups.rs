@@ -27,7 +27,7 @@ use gaitwright_store::BackupId;
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn create(State(app): State<AppState>, request: Idempotent<Administer>) -> Result<Response, Refusal> {
-    // A task of its own, so that a request whose caller goes away cannot end between its commit and the backup.
+    // A separate task, so that a request whose caller disconnects cannot end between its commit and the backup.
     let accepted = tokio::spawn(async move {
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,

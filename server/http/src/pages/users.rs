@@ -55,7 +55,7 @@ struct UsersPage {
 struct Refused {
     /// Which form.
     act: String,
-    /// Which field; none if no single field is at fault.
+    /// The refused field; `None` if no single field is at fault.
     field: Option<&'static str>,
     message: String,
 }

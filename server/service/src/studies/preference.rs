@@ -113,7 +113,7 @@ pub enum StandingAnswer {
     Suggestion(FeedbackId),
 }
 
-/// The newest answer of a person to a comparison, through whichever door it came, without retracted answers.
+/// The newest answer of a person to a comparison, whichever entry point it came through, without retracted answers.
 ///
 /// # Errors
 /// Errors of the database.
@@ -143,7 +143,7 @@ pub async fn standing_answer(
     standing_suggestion(db, study, (one, other), author).await
 }
 
-/// Whether a rater's answer counts: staff can retract what the learner heard of it.
+/// Whether a rater's answer counts: staff can retract the preference derived from it.
 async fn stands(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
     if shown.answer.is_none_or(|said| said == Judgement::Withdrawn) {
         return Ok(false);

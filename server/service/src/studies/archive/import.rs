@@ -126,7 +126,7 @@ async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer, 
                 row.set("forked_from", forked_from.clone().map_or(Cell::Null, Cell::Text));
             }
             if table == "imports" && !trusted {
-                // Nobody vouches for what the archive says of earlier signatures.
+                // No signature vouches for the earlier signatures that the archive lists.
                 row.set("signed_by", Cell::Null);
                 row.set("trusted", Cell::Integer(0));
             }
