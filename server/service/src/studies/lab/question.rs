@@ -56,8 +56,8 @@ pub(super) fn asks(session: &LabSession) -> Option<u32> {
     open.then(|| next_number(session))
 }
 
-/// The number of an answer that reports an unsafe walk, if one is accepted: as soon as the first walk with the device
-/// begins.
+/// The number of an answer that reports an unsafe walk, if one is accepted: once walk 1, the one without the device,
+/// is recorded.
 pub(super) fn takes_report(session: &LabSession) -> Option<u32> {
     let open = session.done(Act::Closed).is_none() && session.answer().is_none();
     (open && next_walk(session) != Some(1)).then(|| next_number(session))
