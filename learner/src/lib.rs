@@ -6,7 +6,7 @@
 //! [`what_to_ask`]), and recommends an action ([`Posterior::best`]).
 //!
 //! All functions are pure functions of space, log, settings and seed. They do no I/O and read no clock. Equal arguments
-//! give equal bits on every machine.
+//! give bitwise equal results on every machine.
 //!
 //! ```
 //! use gait_learner::*;

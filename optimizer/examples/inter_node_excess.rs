@@ -1,5 +1,5 @@
-//! What holds between the nodes: certificates of gaits of random actions of Table I, as they are at their nodes, and solved
-//! on with tightened bounds.
+//! Excess between the nodes: certificates of gaits of random actions of Table I, before and after solving on with
+//! tightened bounds.
 //!
 //! `cargo run --release -p gait-optimizer --example inter_node_excess -- [--subject 1] [--muscles on] [--draws 20] [--seed 1]
 //! [--threads 1]`: one CSV row each, counts and medians at the end.

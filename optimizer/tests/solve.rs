@@ -51,7 +51,7 @@ fn cold_then_warm() {
     assert!(attempts.iter().rev().map(|a| a.chosen).eq((0..attempts.len()).map(|i| i == 0)));
 }
 
-/// Whatever the certificate finds between the nodes.
+/// The objections of the certificate between the nodes.
 fn objections_between_points(outcome: &SolveOutcome) -> Vec<String> {
     let certificate = certify(&outcome.gait).unwrap();
     certificate.objections.into_iter().filter(|words| words.contains("between nodes")).collect()

@@ -208,7 +208,7 @@ def with_a_job(client: Client, subject: UUID) -> None:
 
 
 def main() -> None:
-    # The service runs without sign-in: whoever sends no token may do everything. Scripts send one.
+    # The service runs without sign-in, so requests without a token have all rights. Scripts normally send a token.
     administrator = Client(base_url=sys.argv[1], token="none", auth_header_name="X-Without-Sign-In")
     scopes = [NewTokenScopesItem.READ, NewTokenScopesItem.RUN, NewTokenScopesItem.ANSWER]
     reply = create_token.sync_detailed(client=administrator, body=NewToken(name="python", scopes=scopes))

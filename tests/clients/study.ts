@@ -16,7 +16,7 @@ const BUDGET = 10;
 const SECONDS = 60;
 const FIGURE = "course-gait-rmse-of-the-best-action-by-iteration";
 const address = process.argv[2];
-// The service runs without sign-in: whoever sends no token may do everything. Scripts send one.
+// The service runs without sign-in, so requests without a token have all rights. Scripts normally send a token.
 const administrator = createClient<paths>({ baseUrl: address });
 const client = createClient<paths>({ baseUrl: address });
 

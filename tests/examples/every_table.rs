@@ -1,5 +1,5 @@
-//! Writes a record of this version with a row in every table. Such a record is kept for each version that people used, so
-//! that the upgrade from it can be tested.
+//! Writes a record of this version with a row in every table. The repository has such a record for each schema version,
+//! to test upgrades.
 //!
 //! `cargo run -p gaitwright-tests --example every_table -- tests/records/v1.db.zst`
 
@@ -7,7 +7,7 @@
 
 use gaitwright_tests::every_table;
 
-/// The strongest compression that needs no more memory to read.
+/// The strongest compression that does not need more memory for decompression.
 const LEVEL: i32 = 19;
 
 #[tokio::main]

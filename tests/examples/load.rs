@@ -1,6 +1,5 @@
-//! Load on loopback while a study with ten thousand trials runs and real solves take a processor: durable preference writes
-//! of several people to that study, at a steady rate together, and reads of it; then, with nothing else going on, the pages
-//! of such a study.
+//! Load over loopback on a study with ten thousand trials, while real solves occupy a processor: several people write
+//! durable preferences at a steady total rate, and others read. Then, without other load, the pages of such a study.
 //!
 //! `cargo run --release -p gaitwright-tests --example load -- [SECONDS] [WRITES_PER_SECOND]`
 
@@ -19,7 +18,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Who writes at the same time.
+/// Number of people who write at the same time.
 const RATERS: usize = 8;
 
 /// Studies with muscles are solved, others answered at once.
@@ -40,7 +39,7 @@ impl Evaluate for Both {
     }
 }
 
-/// A connection that is kept.
+/// A persistent connection.
 struct Connection(BufReader<TcpStream>);
 
 impl Connection {
@@ -109,7 +108,7 @@ async fn main() {
     large::fill_to(&database, study, large::TRIALS - 100).await;
     let service = Service::start(&database, Both(Analytic::default()), 1).await;
     let more = json!({"trial_budget": 10_000});
-    // That is the work of this harness; the gaits are certified by now.
+    // Certification belongs to the harness, and is complete by now.
     service.stop_passing_gaits().await;
     let extended = service.post(&format!("/api/v1/studies/{study}/extend"), &more).await;
     println!("the study of {} trials goes on: {}", large::TRIALS - 100, extended.status);
@@ -132,7 +131,7 @@ async fn main() {
             let (begun, mut times) = (Instant::now(), Vec::new());
             let each = RATERS as f64 / rate;
             while begun.elapsed().as_secs_f64() < seconds {
-                // From when the request was due: a slow answer delays the next one, and that counts.
+                // Measured from when the request was due, so that the delay after a slow response counts.
                 let due = (times.len() as f64 + number as f64 / RATERS as f64) * each;
                 let due = begun + Duration::from_secs_f64(due);
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));

@@ -1,6 +1,6 @@
 //! An analytic solver: answers at once, deterministically, with a gait of the right shape.
 //!
-//! It exists for tests of the service alone; nothing it says is about walking.
+//! It is for tests of the service only; its figures do not describe walking.
 
 use gait_optimizer::body::{Axis, FootPoint, Side};
 use gait_optimizer::gait::{ContactRowName, MuscleTrajectory};
@@ -27,9 +27,9 @@ pub struct Analytic {
     pub panics: Vec<u32>,
     /// Trials with these numbers panic the first time only.
     pub panics_once: Vec<u32>,
-    /// So many solves hang after their first iteration, and do not hear that they are cancelled.
+    /// Number of solves that hang after their first iteration and ignore cancellation.
     pub hangs: u32,
-    /// How many solves were begun.
+    /// Number of started solves.
     pub begun: AtomicU32,
     /// Which solve made each iteration, in order: by the trial of its attempt.
     pub made: Arc<Mutex<Vec<TrialId>>>,
@@ -53,7 +53,7 @@ impl Evaluate for Analytic {
         assert!(!self.panics.contains(&assignment.number), "trial {} panics", assignment.number);
         assert!(!(self.panics_once.contains(&assignment.number) && begun == 0), "the first solve panics");
         let a = assignment.problem.bounds.to_array();
-        // Strange to the last bit on purpose: what is stored must come back exactly.
+        // A value without a short decimal form, to test that stored values are read back exactly.
         let distance = (a[4] - 0.026).abs() * 10.0 + (a[5] - 0.3).abs() + (a[6] - 35.0).abs() / 50.0 + 1.0 / a[0];
         let warm = assignment.warm_start.as_ref().map_or(0.1, |w| w.point.x[0]);
         let rmse = 0.1 + distance / 3.0 + warm * 1e-3;

@@ -1,4 +1,4 @@
-//! Archives of studies, for tests that take one elsewhere.
+//! Archives of studies, for tests that move a study to another record.
 
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::archive::{self, PublicKey};

@@ -1,4 +1,4 @@
-//! An engine whose workers are all away: it takes jobs and begins none.
+//! An engine without workers: it accepts jobs and starts none.
 
 use futures_util::future::BoxFuture;
 use gaitwright_service::workers::{Assignment, Attempt, Dispatch, DispatchError, News};
@@ -11,7 +11,7 @@ use std::time::Duration;
 pub struct Away {
     /// How many jobs it takes.
     pub size: usize,
-    /// The jobs that it has, in the order in which they came.
+    /// The accepted jobs, in order of arrival.
     pub jobs: Arc<Mutex<Vec<Attempt>>>,
 }
 

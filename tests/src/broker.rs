@@ -1,4 +1,4 @@
-//! A NATS broker as a process, with a folder of its own.
+//! A NATS broker as a process, with its own folder.
 
 use crate::skipped::skipped;
 use std::net::{TcpListener, TcpStream};
@@ -14,7 +14,7 @@ pub struct Broker {
 }
 
 impl Broker {
-    /// Starts one. `None`, with the reason on stderr: there is no nats-server on this machine and none is required.
+    /// Starts one. `None`, with the reason on stderr: if this machine has no nats-server and none is required.
     pub fn start() -> Option<Self> {
         if Command::new("nats-server").arg("--version").output().is_err() {
             assert!(std::env::var_os("GAITWRIGHT_REQUIRE_NATS").is_none(), "nats-server is required and not there");
@@ -32,13 +32,13 @@ impl Broker {
         format!("nats://127.0.0.1:{}", self.port)
     }
 
-    /// Kills it and starts it again with what it kept.
+    /// Kills the broker and restarts it with its stored data.
     pub fn restart(&mut self) {
         self.kill();
         self.process = run(&self.folder, self.port);
     }
 
-    /// Kills it and starts it again with nothing.
+    /// Kills the broker and restarts it without data.
     pub fn wipe(&mut self) {
         self.kill();
         self.folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Who sends a request: users of every role, tokens, nobody.
+//! Callers of requests: users of every role, tokens, and anonymous callers.
 
 use crate::analytic::Analytic;
 use crate::service::{Answer, Service};
@@ -21,7 +21,7 @@ use tempfile::TempDir;
 /// Content type of a submitted form.
 pub const FORM: &str = "application/x-www-form-urlencoded";
 
-/// A service where everybody signs in.
+/// A service that requires sign-in.
 pub async fn service() -> (TempDir, Service) {
     let folder = tempfile::tempdir().unwrap();
     let mut service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
@@ -29,7 +29,7 @@ pub async fn service() -> (TempDir, Service) {
     (folder, service)
 }
 
-/// How a request says who sends it.
+/// How a request identifies its caller.
 #[derive(Debug, Clone)]
 pub enum As {
     /// Without a word.
@@ -40,7 +40,7 @@ pub enum As {
     Token(String),
 }
 
-/// A user, and the one-time link to come in by.
+/// A user and their one-time sign-in link.
 pub async fn user(service: &Service, name: &str, role: Role) -> (UserId, String) {
     let mut writer = service.store.write().await.unwrap();
     let new = NewUser { name: name.to_owned(), role };
@@ -68,7 +68,7 @@ pub async fn token(service: &Service, scopes: &[Right]) -> As {
     As::Token(secret)
 }
 
-/// Makes a user or a token a member of a study.
+/// Adds a user or a token to the members of a study.
 pub async fn member(service: &Service, study: StudyId, kind: MemberKind, name: &str) -> Member {
     let mut writer = service.store.write().await.unwrap();
     let new = NewMember { kind, name: name.to_owned() };
@@ -86,19 +86,19 @@ pub async fn rater_of(service: &Service, studies: &[StudyId]) -> As {
     rater
 }
 
-/// Sends a request as somebody.
+/// Sends a request as a caller.
 pub async fn send(service: &Service, who: &As, method: &Method, path: &str, kind: &str, body: &str) -> Answer {
     let request = Request::builder().method(method).uri(path).header(header::CONTENT_TYPE, kind);
     service.send(of(who, request).body(Body::from(body.to_owned())).unwrap()).await
 }
 
-/// Fetches something as somebody, in one of the forms that it has.
+/// Fetches an address as a caller, in one of its media types.
 pub async fn send_accepting(service: &Service, who: &As, path: &str, form: &str) -> Answer {
     let request = Request::builder().uri(path).header(header::ACCEPT, form);
     service.send(of(who, request).body(Body::empty()).unwrap()).await
 }
 
-/// The request with what shows who sends it.
+/// Adds the credential of a caller to a request.
 fn of(who: &As, request: Builder) -> Builder {
     match who {
         As::Nobody => request,
@@ -109,7 +109,7 @@ fn of(who: &As, request: Builder) -> Builder {
     }
 }
 
-/// The session that an answer begins.
+/// The session that a response starts.
 pub fn session_of(answer: &Answer) -> As {
     As::Session(cookie_of(answer, "gaitwright_session"))
 }

@@ -1,11 +1,11 @@
-//! What a certification leaves, without one.
+//! Certificates for tests, made without certifying a gait.
 
 use gait_optimizer::certificate::{Certificate, FORMAT_VERSION};
 use gait_optimizer::{Gait, ModelError};
 use gaitwright_service::workers::Certify;
 use std::time::Duration;
 
-/// A certificate that passed, or one of a walker that falls.
+/// A passed certificate, or a failed one of a walker that falls.
 pub fn certificate(passed: bool) -> Certificate {
     let fall = (!passed).then(|| "the simulated walker falls".to_owned());
     Certificate {
@@ -20,7 +20,7 @@ pub fn certificate(passed: bool) -> Certificate {
     }
 }
 
-/// A certifier that takes its time, and passes the gaits that it is told to.
+/// A slow certifier, which passes the gaits that it is told to pass.
 pub struct Verdicts<P> {
     /// How long a certification takes.
     pub pause: Duration,

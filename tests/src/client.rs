@@ -30,8 +30,7 @@ impl Reply {
 
 /// Sends a request with a JSON body (empty for none).
 ///
-/// # Errors
-/// When the server is not there or goes away.
+/// # Errors When the server is not reachable or closes the connection.
 pub fn send(address: &str, method: &str, path: &str, body: &str) -> std::io::Result<Reply> {
     let mut stream = TcpStream::connect(address)?;
     stream.set_read_timeout(Some(Duration::from_secs(10)))?;
@@ -45,7 +44,7 @@ pub fn send(address: &str, method: &str, path: &str, body: &str) -> std::io::Res
     let text = String::from_utf8_lossy(&bytes);
     let (head, body) = text.split_once("\r\n\r\n").ok_or(std::io::ErrorKind::UnexpectedEof)?;
     let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).ok_or(std::io::ErrorKind::InvalidData)?;
-    // A body that is shorter than promised was cut off.
+    // A body shorter than its Content-Length was cut off.
     let promised =
         head.lines().find_map(|line| line.to_ascii_lowercase().strip_prefix("content-length: ")?.parse().ok());
     if promised.is_some_and(|promised: usize| body.len() < promised) {
@@ -56,16 +55,14 @@ pub fn send(address: &str, method: &str, path: &str, body: &str) -> std::io::Res
 
 /// `GET`.
 ///
-/// # Errors
-/// When the server is not there or goes away.
+/// # Errors When the server is not reachable or closes the connection.
 pub fn get(address: &str, path: &str) -> std::io::Result<Reply> {
     send(address, "GET", path, "")
 }
 
 /// `POST`.
 ///
-/// # Errors
-/// When the server is not there or goes away.
+/// # Errors When the server is not reachable or closes the connection.
 pub fn post(address: &str, path: &str, body: &Value) -> std::io::Result<Reply> {
     send(address, "POST", path, &body.to_string())
 }

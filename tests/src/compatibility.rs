@@ -1,5 +1,4 @@
-//! What a new description of the REST interface means to the clients of the present one: what breaks them, and what is
-//! only added.
+//! Compares two descriptions of the REST interface: which changes break clients, and which are additions.
 
 use serde_json::{Map, Value};
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,13 +7,13 @@ use std::fmt::Display;
 /// How two descriptions differ.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Difference {
-    /// What a client of the old one stumbles over.
+    /// Changes that break clients of the old description.
     pub breaks: Vec<String>,
     /// What it need not know.
     pub additions: Vec<String>,
 }
 
-/// Who sends a value: what may be sent must stay accepted, what is answered must stay readable.
+/// The direction of a value. Accepted requests must stay accepted, and responses must stay readable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Side {
     Request,

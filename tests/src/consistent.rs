@@ -1,4 +1,4 @@
-//! The analytic solver with gaits and figures that agree: what an archive must keep to be imported.
+//! The analytic solver with consistent gaits and figures, as the import of an archive requires.
 
 use crate::analytic::Analytic;
 use gait_optimizer::gait::ContactRowName;
@@ -7,7 +7,7 @@ use gait_optimizer::walking::{BEZIER_COEFFICIENTS, CYCLE};
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright_service::workers::{Assignment, Evaluate};
 
-/// The analytic solver; its gaits are whole, and its Gait RMSE is that of the gait.
+/// The analytic solver with complete gaits, whose Gait RMSE is computed from the gait.
 #[derive(Debug, Default)]
 pub struct Consistent(pub Analytic);
 

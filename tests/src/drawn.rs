@@ -1,9 +1,10 @@
-//! Bodies drawn from a schema of the description: those that fit it, and those that go beyond it in one place.
+//! Bodies drawn from a schema of the description: valid ones, and ones that violate the schema in one place.
 
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// Characters of drawn texts: of several bytes, of other scripts, and those that formulas, pages and quotes care about.
+/// Characters of drawn texts: multi-byte characters, other scripts, and those with a meaning in formulas, HTML and
+/// quotes.
 const LETTERS: [char; 16] =
     ['a', 'Z', '7', ' ', 'é', 'ß', '𝄞', '足', '"', '\'', '=', '<', '&', '\\', '\u{ad}', '\u{200d}'];
 
@@ -12,7 +13,7 @@ pub struct Drawn {
     document: Value,
     state: u64,
     texts: u64,
-    /// What a field refers to: one of these values is drawn.
+    /// Values to draw from for fields that refer to an object.
     pub known: BTreeMap<&'static str, Vec<Value>>,
 }
 
@@ -118,7 +119,7 @@ impl Drawn {
             _ => least + self.below(most - least + 1),
         };
         self.texts += 1;
-        // Names are taken once: a number makes each another one, where it fits.
+        // Names must be unique, so a number is appended if there is room.
         let letter = |digit: u32| char::from_u32(u32::from('a') + digit).unwrap();
         let code: String = self.texts.to_string().chars().filter_map(|c| c.to_digit(10)).map(letter).collect();
         let is_code = pattern.starts_with("^(?!");
@@ -134,7 +135,7 @@ impl Drawn {
     fn object(&mut self, schema: &Value) -> Value {
         let required = schema["required"].as_array().cloned().unwrap_or_default();
         let properties = schema["properties"].as_object().cloned().unwrap_or_default();
-        // Of many settings few are changed at the same time: some depend on each other.
+        // Only few of many settings are changed at the same time, because some depend on each other.
         let one_in = (properties.len() as u64 / 4).max(2);
         let mut object = Map::new();
         for (name, property) in &properties {
@@ -152,7 +153,7 @@ impl Drawn {
         Value::Object(object)
     }
 
-    /// Draws what a condition of the schema asks for.
+    /// Draws values that a condition of the schema requires.
     fn keep_condition(&mut self, schema: &Value, object: &mut Map<String, Value>) {
         let Some(conditions) = schema["if"]["properties"].as_object() else { return };
         let holds = conditions.iter().all(|(name, wanted)| object.get(name) == Some(&wanted["const"]));
@@ -167,7 +168,7 @@ impl Drawn {
         }
     }
 
-    /// Bodies that fit the schema but in one place, each with what is wrong.
+    /// Bodies that violate the schema in one place, each with a description of the violation.
     pub fn beyond(&mut self, schema: &Value) -> Vec<(String, Value)> {
         let schema = self.resolved(schema);
         let mut found = Vec::new();
@@ -200,7 +201,7 @@ impl Drawn {
     }
 }
 
-/// Values that a property does not take.
+/// Values that a property does not accept.
 fn wrong_values(property: &Value) -> Vec<(&'static str, Value)> {
     let mut wrong = Vec::new();
     let is =

@@ -85,7 +85,7 @@ pub async fn fill(database: &Path) {
     ] {
         sqlx::query(sql).execute(&mut **writer).await.unwrap();
     }
-    // A table that the record of the baseline does not have.
+    // Tables that the baseline schema does not have.
     let imports = "insert into imports (study_id, file_sha256, trusted, unchecked_rmse, actor, created_at) \
                    select id, hex(zeroblob(32)), 0, 0, 'K', '' from studies limit 1";
     sqlx::query(imports).execute(&mut **writer).await.unwrap();

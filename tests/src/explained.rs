@@ -1,4 +1,4 @@
-//! What an explanation finds out, without solving, and what there is to explain.
+//! Infeasibility explanations without solves, and trials to explain.
 
 use gait_learner::SearchSpace;
 use gait_optimizer::explanation::{BoundAtLimit, Conflict, Explanation, GivenBound, Relaxation};
@@ -14,18 +14,18 @@ const CLEARANCE: usize = 4;
 /// Place of a6, the torso lean.
 const TORSO: usize = 5;
 
-/// An explainer that takes its time, blames the clearance, and hears within a millisecond that it is cancelled.
+/// A slow explainer, which names the clearance as the conflict and reacts to cancellation within a millisecond.
 #[derive(Debug, Clone, Default)]
 pub struct Clearance {
     /// How long an explanation takes.
     pub pause: Duration,
     /// It panics instead.
     pub panics: bool,
-    /// How many explanations were begun, and how many of them were cancelled.
+    /// Numbers of started and of cancelled explanations.
     pub counts: Arc<Counts>,
 }
 
-/// How many explanations were begun and cancelled.
+/// Returns the numbers of started and of cancelled explanations.
 #[derive(Debug, Default)]
 pub struct Counts {
     /// Begun.
@@ -100,12 +100,12 @@ pub fn explanation(bounds: &TunedBounds, status: SolveStatus, violations: &[Viol
     }
 }
 
-/// Actions of which the analytic solver finds no gait.
+/// Actions for which the analytic solver finds no gait.
 pub fn without_gaits() -> SearchSpace {
     space([0.032, 0.035, 0.039])
 }
 
-/// Actions of a third of which it does.
+/// Actions, for a third of which it finds a gait.
 pub fn with_few_gaits() -> SearchSpace {
     space([0.02, 0.035, 0.039])
 }

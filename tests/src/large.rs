@@ -27,7 +27,7 @@ pub async fn fill(database: &Path, study: StudyId) {
     fill_to(database, study, TRIALS).await;
 }
 
-/// Fills a finished study with so many trials like its first one.
+/// Fills a finished study up to this number of trials like its first one.
 pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     let store = Store::open(database).await.unwrap();
     let mut writer = store.write().await.unwrap();
@@ -83,7 +83,7 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     store.close().await;
 }
 
-/// Adds so many answers of a person to a study with two trials.
+/// Adds this number of answers of a person to a study with two trials.
 pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
     let store = Store::open(database).await.unwrap();
     let mut writer = store.write().await.unwrap();
@@ -102,7 +102,7 @@ pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
     store.close().await;
 }
 
-/// Each page and list, with the fastest of three answers.
+/// Each page and list, with the shortest of three response times.
 pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(String, Duration)> {
     let api = format!("/api/v1/studies/{study}");
     let mut times = Vec::new();

@@ -1,4 +1,4 @@
-//! What the whole-system tests share: an analytic solver in place of the real one, a service on a temporary
+//! Shared parts of the whole-system tests: an analytic solver in place of the real one, a service on a temporary
 //! record, the command line as a process. The tests live in `tests/tests`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::missing_panics_doc)]

@@ -1,10 +1,10 @@
-//! Files as a motion laboratory brings them, made up.
+//! Synthetic files like those of a motion laboratory.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
-/// Six seconds of strides of 1.1 s at 1000 Hz: each channel an oscillation whose strength swings over the stride, that of
-/// the left tibialis anterior by a factor, and a switch under the right heel.
+/// Six seconds of strides of 1.1 s at 1000 Hz: each channel is an oscillation whose amplitude varies over the stride,
+/// that of the left tibialis anterior by a factor, and a switch under the right heel.
 pub fn electromyogram(strength: f64) -> String {
     let mut text = "time_s,RF_L,TA_L,BF_L,GAS_L,RF_R,BF_R,heel\n".to_owned();
     for k in 0..6000_u32 {

@@ -1,4 +1,4 @@
-//! Orders as they were drawn, read past the program: for tests that hold what is served against them.
+//! Allocations, read directly from the database, for tests that compare responses with them.
 
 use gaitwright_store::{LabSessionId, Store, StudyId, TrialId};
 use sqlx::Row;

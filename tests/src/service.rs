@@ -36,12 +36,12 @@ pub struct Service {
     pub store: Store,
     /// What runs its studies.
     pub scheduler: Scheduler,
-    /// Who may do what: everybody everything, unless a test says otherwise.
+    /// Access control. By default sign-in is off, so every caller has all rights.
     pub access: Arc<Access>,
     /// Backups on request.
     pub backups: Arc<Backups>,
     work: JoinHandle<()>,
-    /// Passes every gait at once; none where the service certifies gaits itself.
+    /// Passes every gait at once; `None` if the service certifies gaits itself.
     certifier: Option<JoinHandle<()>>,
 }
 
@@ -81,12 +81,12 @@ impl Answer {
 }
 
 impl Service {
-    /// Starts a service with a solver and so many workers.
+    /// Starts a service with a solver and this number of workers.
     pub async fn start(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
         Self::start_with(database, Arc::new(InProcess::new(workers, Arc::new(solver)).standing_back())).await
     }
 
-    /// Starts a service in which gaits get certificates only when somebody asks.
+    /// Starts a service that certifies gaits on request only.
     pub async fn start_without_certificates(database: &Path, solver: impl Evaluate) -> Self {
         let engine = Arc::new(InProcess::new(1, Arc::new(solver)).standing_back());
         Self::over(with_catalogue(database).await, engine, None)
@@ -97,18 +97,18 @@ impl Service {
         Self::over(with_catalogue(database).await, engine, None).passing_every_gait()
     }
 
-    /// Starts a service that certifies gaits by itself, and explains at once why there are none.
+    /// Starts a service that certifies gaits by itself and explains trials without a gait at once.
     pub async fn start_certifying(database: &Path, solver: impl Evaluate, certify: impl Certify) -> Self {
         Self::start_looking_back(database, solver, certify, Clearance::default()).await
     }
 
-    /// Starts a service that explains by itself why there are no gaits, and passes all others at once.
+    /// Starts a service that explains trials without a gait by itself, and passes all gaits at once.
     pub async fn start_explaining(database: &Path, solver: impl Evaluate, explain: impl Explain) -> Self {
         let certify = Verdicts { pause: Duration::ZERO, passes: |_: &Gait| true };
         Self::start_looking_back(database, solver, certify, explain).await
     }
 
-    /// Starts a service that looks into what solves gave.
+    /// Starts a service with a certifier and an explainer.
     pub async fn start_looking_back(
         database: &Path,
         solver: impl Evaluate,
@@ -142,7 +142,7 @@ impl Service {
         }
     }
 
-    /// Passes every gait as it comes: people are asked about certified gaits only.
+    /// Passes every gait when it is found, because people compare certified gaits only.
     fn passing_every_gait(mut self) -> Self {
         let (store, scheduler) = (self.store.clone(), self.scheduler.clone());
         self.certifier = Some(tokio::spawn(async move {
@@ -180,7 +180,7 @@ impl Service {
         self.store.close().await;
     }
 
-    /// Stops it as it is: of a record that takes no changes any more, its tasks may end with an error.
+    /// Stops the service and ignores errors of its tasks, which are possible if the record accepts no changes.
     pub async fn abandon(self) {
         self.scheduler.stop();
         self.work.abort();
@@ -237,13 +237,13 @@ impl Service {
         panic!("the study did not reach {states:?}: {:?}", self.get(study).await);
     }
 
-    /// Whether every gait was passed, where this harness does so.
+    /// Whether this harness has passed every gait, if it passes gaits.
     async fn is_certified(&self, study: StudyId) -> bool {
         let certificates = certificates::of_study(&mut self.store.read().await.unwrap(), study).await.unwrap();
         self.certifier.is_none() || !certificates.values().any(|found| *found == CertificateOnRecord::NotCertified)
     }
 
-    /// Waits until so many trials have ended.
+    /// Waits until this number of trials has ended.
     pub async fn wait_for_trials(&self, study: StudyId, ended: usize) {
         for _ in 0..6000 {
             let done = self.trials(study).await.iter().filter(|t| !t.state.is_open()).count();
@@ -283,7 +283,7 @@ impl Service {
         self.post_text(path, "application/json", &body.to_string()).await
     }
 
-    /// A backup that is requested over REST, when it is complete.
+    /// Requests a backup over REST and waits until it is complete.
     pub async fn backed_up(&self) -> Value {
         let requested = self.post("/api/v1/backups", &json!({})).await;
         assert_eq!(requested.status, StatusCode::ACCEPTED, "{}", requested.text);
@@ -347,7 +347,7 @@ pub async fn for_localhost<B>(mut request: Request<B>) -> Request<B> {
     request
 }
 
-/// A record with what every service begins with.
+/// A record with the built-in objects of every service.
 async fn with_catalogue(database: &Path) -> Store {
     let store = Store::open(database).await.unwrap();
     let mut writer = store.write().await.unwrap();

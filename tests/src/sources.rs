@@ -1,4 +1,4 @@
-//! The source files of the service, for tests that hold a rule over all of them.
+//! The source files of the service, for tests that check a rule on all of them.
 
 use std::path::{Path, PathBuf};
 

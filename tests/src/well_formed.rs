@@ -1,4 +1,4 @@
-//! An analytic solver whose gaits have every part of a gait: a controller file can be made of them.
+//! An analytic solver with complete gaits, from which controller files can be made.
 
 use crate::analytic::Analytic;
 use gait_optimizer::gait::ContactRowName;
@@ -24,7 +24,7 @@ impl Evaluate for WellFormed {
     }
 }
 
-/// Gives each domain the contacts, curves and times that it must have; the number is in every curve.
+/// Gives each domain valid contacts, curves and times. Every curve contains the number, so gaits differ.
 fn complete(gait: &mut Gait, number: u32) {
     for (trajectory, domain) in gait.domains.iter_mut().zip(CYCLE) {
         let points = trajectory.q.len();

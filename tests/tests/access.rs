@@ -1,4 +1,4 @@
-//! Who may do what: roles, tokens, sessions, links, back-off.
+//! Access control: roles, tokens, sessions, links, back-off.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 const UNKNOWN: &str = "01890000-0000-7000-8000-000000000000";
 
-/// Everybody there is, with their rights.
+/// Every kind of caller, with its rights.
 async fn everybody(service: &Service) -> Vec<(As, Vec<Right>)> {
     let mut callers = vec![(As::Nobody, Vec::new())];
     for role in Role::ALL {
@@ -72,7 +72,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
     service.stop().await;
 }
 
-/// The pages, as the router lists them: a page that is added and not listed here fails the test.
+/// The pages, as in the router. A page that is not listed here fails the test.
 const PAGES: [(&str, Option<Right>); 72] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
@@ -187,7 +187,7 @@ async fn every_page_is_shown_to_those_who_may_see_it() {
             }
         }
     }
-    // A line of the router that is written in another way would be passed over.
+    // A line of the router in another format would be missed.
     assert_eq!(seen, PAGES.iter().map(|(entry, _)| (*entry).to_owned()).collect());
     service.stop().await;
 }
@@ -230,7 +230,7 @@ async fn answer_after_the_end_of_the_sign_in_session_is_neither_stored_nor_lost(
     service.access = Arc::new(Access::by_sign_in(3600.0));
     let heard = service.feedback(study).await.len();
 
-    // A wrong password does not lose it either.
+    // A wrong password does not lose the entry either.
     let carried = form_of(&hidden_fields(&refused.text));
     let wrong =
         send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, &format!("name=R1&password=x&{carried}")).await;
@@ -245,7 +245,7 @@ async fn answer_after_the_end_of_the_sign_in_session_is_neither_stored_nor_lost(
     let row = service.feedback(study).await.pop().unwrap();
     assert_eq!((row.author.as_str(), row.note.as_str()), ("R1", "\"steady\" & calm"));
 
-    // A new password is not carried about, nor is anything to another site.
+    // New passwords are not kept, and entries are not sent to other sites.
     let account = send(&service, &As::Nobody, &Method::POST, "/account", FORM, "password=correct+horse").await;
     assert!(account.status == StatusCode::UNAUTHORIZED && !account.text.contains("correct"), "{}", account.text);
     for elsewhere in ["https://example.org/", "//example.org/", "/\\example.org/"] {
@@ -333,14 +333,14 @@ async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
     let page = send(&service, &first, &Method::GET, "/account", FORM, "").await;
     assert!(page.text.contains("name=\"present\""), "{}", page.text);
     let second = session_of(&change(&first, "password=battery+staple&present=correct+horse").await);
-    // Guesses wait here as at the door.
+    // Guesses are delayed here as on the sign-in page.
     let mut statuses = Vec::new();
     for _ in 0..6 {
         statuses.push(change(&second, "password=another+horse&present=guess").await.status);
     }
     assert_eq!(statuses.last(), Some(&StatusCode::TOO_MANY_REQUESTS), "{statuses:?}");
 
-    // Who forgot it gets a link, and is not asked for an hour.
+    // A user who forgot the password gets a link, and need not enter the current password for an hour.
     let mut writer = service.store.write().await.unwrap();
     let link = people::link(&mut writer, &Actor::program(), id).await.unwrap();
     commit(writer).await.unwrap();

@@ -1,4 +1,4 @@
-//! The access log: every view and export of subject data and every refusal leaves a row; nothing else takes one away.
+//! The access log: every view and export of subject data and every refusal leaves a row.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -65,7 +65,7 @@ async fn every_route_that_shows_subject_data_leaves_a_row() {
             "{known}"
         );
     }
-    // Whatever its handler does, an answer of the route is noted.
+    // A response of the route is logged, whatever its handler does.
     let mut all = Router::new();
     for route in &routes {
         all = all.route(route, get(async || "shown"));
@@ -104,7 +104,7 @@ async fn views_exports_and_refusals_name_who_what_and_whose() {
     for path in [format!("/trials/{trial}"), format!("/studies/{study}"), format!("/api/v1/trials/{trial}/gait")] {
         assert_eq!(fetch(&clinician, &path).await.status, StatusCode::OK, "{path}");
     }
-    // An export is on the disk before its answer is.
+    // The row of an export is on the disk before the response is sent.
     let csv = format!("/api/v1/studies/{study}/trials.csv");
     for (who, method, path) in [
         (&clinician, Method::GET, csv.clone()),

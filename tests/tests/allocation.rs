@@ -1,5 +1,4 @@
-//! Allocations: balanced, drawn by the operating system, and concealed from everything but the device until somebody
-//! unblinds.
+//! Allocations: balanced, drawn by the operating system, and concealed from everyone but the device until unblinding.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -28,7 +27,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// Of a chi-squared distribution with one degree of freedom, exceeded once in a million: these draws are truly random.
+/// Quantile of the chi-squared distribution with one degree of freedom that is exceeded once in a million. The draws
+/// are truly random, so a smaller one would fail too often.
 const CRITICAL: f64 = 23.93;
 const JSON: &str = "application/json";
 
@@ -37,8 +37,8 @@ fn chi_squared(count: usize, of: usize) -> f64 {
     2.0 * (count as f64 - half).powi(2) / half
 }
 
-/// Whether so many right guesses of so many are chance: within five standard deviations of one half, which chance
-/// leaves less than once in a million.
+/// Whether this number of correct guesses is compatible with chance: within five standard deviations of one half, which
+/// chance exceeds less than once in a million.
 fn is_chance(right: usize, of: usize) -> bool {
     (right as f64 - of as f64 / 2.0).abs() <= 2.5 * (of as f64).sqrt()
 }
@@ -51,7 +51,7 @@ async fn finished(service: &Service) -> (StudyId, Vec<Trial>) {
     (study, trials)
 }
 
-/// A study that ended, so often as there are `studies`, with gaits of the first one's kind: rows alone.
+/// Writes the rows of `studies` ended studies, with gaits like those of the first one.
 async fn copies(writer: &mut Connection, study: StudyId, studies: u32) -> Vec<(StudyId, TrialId, TrialId)> {
     let columns = async |writer: &mut Connection, table: &str| -> Vec<String> {
         let rows =
@@ -115,7 +115,7 @@ async fn planned_in_turn(writer: &mut Writer, studies: &[(StudyId, TrialId, Tria
     orders
 }
 
-/// By how much one order leads after each session.
+/// The lead of one order after each session.
 fn leads(orders: &[bool]) -> Vec<i32> {
     let mut lead = 0;
     let next = |first: &bool| {
@@ -172,7 +172,7 @@ async fn unblinded_session_says_nothing_about_one_that_is_still_concealed() {
             orders.push(unblinded.allocation.gait_one_first.unwrap());
         }
         opposite += usize::from(orders[0] != orders[1]);
-        // What would even out the other three.
+        // The order that would even out the other three.
         let others = orders[1..].iter().filter(|first| **first).count();
         by_next += usize::from((others < 2) == orders[0]);
     }
@@ -228,13 +228,13 @@ async fn allocations_do_not_follow_from_the_seed() {
         let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &body).await.json();
         first_sessions.push(gait_one_first(&service.store, planned["id"].as_str().unwrap().parse().unwrap()).await);
     }
-    // One order of 24 coins in 17 million.
+    // Each of the two uniform outcomes of 24 coins has a probability of 1 in 17 million.
     let ones = first_sessions.iter().filter(|first| **first).count();
     assert!((1..=23).contains(&ones), "{first_sessions:?}");
     service.stop().await;
 }
 
-/// What a program can guess from: everything that is written or served but the allocations themselves.
+/// The data from which a program can guess: everything that is stored or served, except the allocations.
 struct Seen {
     /// Rows of every other table, as text.
     tables: BTreeMap<String, Vec<Vec<String>>>,
@@ -275,13 +275,13 @@ fn cell(row: &sqlx::sqlite::SqliteRow, place: usize) -> String {
     }
 }
 
-/// One bit of a text: a program that knows no better guesses by such.
+/// One bit of a text, as a simple rule for guessing.
 fn bit(text: &str) -> bool {
     Sha256::digest(text.as_bytes())[0] & 1 == 1
 }
 
 /// Every rule by which a guess can follow from the rows of a table that has one row per order: each column as it is,
-/// each bit of the sum of its bytes, and whether it grew since the row before.
+/// each bit of the sum of its bytes, and whether it grew since the previous row.
 fn guesses(seen: &Seen, table: &str) -> Vec<(String, Vec<bool>)> {
     let width = seen.tables[table].first().map_or(0, Vec::len);
     let mut all = Vec::new();
@@ -337,8 +337,8 @@ async fn program_that_reads_all_but_allocations_guesses_1_000_allocations_at_cha
     let by_seed = |k: usize| bit(&format!("1 lab session {}", k / 250));
     assert!(is_chance((0..1000).filter(|k| by_seed(*k) == truth[*k]).count(), 1000));
 
-    // The seal of an allocation is a hash of its row. Without the nonce it would tell: all but the order is known or
-    // can be tried.
+    // The seal of an allocation is a hash of its row. Without the nonce it would reveal the order, because everything
+    // else is known or can be tried.
     let seals = &seen.tables["seals"];
     let mut right = 0;
     for (id, order) in ids.iter().zip(&truth) {
@@ -353,7 +353,7 @@ async fn program_that_reads_all_but_allocations_guesses_1_000_allocations_at_cha
     service.stop().await;
 }
 
-/// Tries every row that could have this hash but for its nonce.
+/// Tries every row that could have this hash, without its nonce.
 fn by_hash(sha256: &str, session: &str, created_at: &str) -> Option<bool> {
     for first in [false, true] {
         let mut hash = Sha256::new();
@@ -381,7 +381,8 @@ async fn best_guesser_who_sees_every_unblinded_allocation_is_right_four_times_of
     drop(writer);
     let (mut right, mut lead) = (0, 0);
     for first in &orders {
-        // The rule is public: from a lead of three on, the rarer order is likelier. Below, nothing is.
+        // The rule is public: from a lead of three on, the rarer order is likelier. Below that, both orders are equally
+        // likely.
         right += usize::from((lead < 0) == *first);
         lead += if *first { 1 } else { -1 };
     }
@@ -417,11 +418,11 @@ async fn exchange_orders(database: &Path) {
     store.close().await;
 }
 
-/// Everything that a reader, a rater, an administrator or nobody can fetch of these, but what the rater is shown on a
-/// side.
+/// Everything that a reader, a rater, an administrator or an anonymous caller can fetch, except the motions that the
+/// rater is shown.
 async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str) -> Vec<(String, String)> {
     let document: Value = serde_json::from_str(&gaitwright_http::openapi::text().unwrap()).unwrap();
-    // Each address, in every form that it can be asked for.
+    // Each address in every available format.
     let mut paths: Vec<(String, Option<String>)> = vec![("/health".to_owned(), None), ("/ready".to_owned(), None)];
     for (path, item) in document["paths"].as_object().unwrap() {
         if item["get"].is_object() {
@@ -478,7 +479,7 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
 }
 
 fn is_about_the_request(line: &str) -> bool {
-    // Each form has a key of its own. Rows of sessions tell when they were last used: these requests use them.
+    // Each form has a key of its own. Sessions have the time of their last use, which these requests change.
     let of_session =
         line.contains("with password") || line.contains("with link") || line.contains("<tr><th scope=\"row\">20");
     line.contains("name=\"key\"") || line.contains("request_id") || of_session
@@ -550,7 +551,7 @@ async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() 
             .await;
         sessions.push(id);
     }
-    // Nothing is being solved or said any more.
+    // Ends solves and answers, so that the record no longer changes.
     post(&service, &callers[1], &format!("/api/v1/studies/{human}/pause"), &json!({})).await;
     let mut ids = vec![study.to_string(), human.to_string(), trials[0].id.to_string(), trials[1].id.to_string()];
     ids.extend(sessions);
@@ -638,7 +639,7 @@ async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_dev
     let id = post(&service, &clinician, &path, &plan).await.json()["id"].as_str().unwrap().to_owned();
     let mut writer = service.store.write().await.unwrap();
     let row: LabSessionId = id.parse().unwrap();
-    // An analytic gait has no controller file: what is recorded of one is what counts here.
+    // An analytic gait has no controller file, so the test calls the function that records a download.
     let device_caller = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
     let reading_caller =
         gaitwright_service::access::Caller::token(TokenId::fresh(), "script", &[Right::Device, Right::Rate]);
@@ -663,7 +664,7 @@ async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_dev
     let session = get(&service, &clinician, &format!("/api/v1/lab-sessions/{id}")).await.json();
     assert_eq!(session["walks"][1]["after_unblinding"], true);
 
-    // Nobody else: neither who runs studies with a token, nor a rater.
+    // All other callers are refused, such as a token with the scope run and a rater.
     let file = format!("/api/v1/lab-sessions/{id}/controller.json?walk=2");
     for (who, may) in [
         (&device, true),

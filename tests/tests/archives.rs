@@ -1,5 +1,5 @@
-//! Archives come from outside: what was forged in one is refused by name, what would fill the memory is refused early,
-//! and what cannot be checked is marked.
+//! Archives are untrusted: forgeries are refused with a reason, archives that would exhaust the memory are refused
+//! early, and data that cannot be checked is marked.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -61,7 +61,7 @@ impl Rows {
         )
     }
 
-    /// The archive that somebody makes of them who knows the format.
+    /// An archive of these rows, as made by a forger who knows the format.
     fn packed(&self) -> Vec<u8> {
         let mut lines = String::new();
         for (table, row) in &self.0 {
@@ -138,7 +138,7 @@ fn definition(row: &mut Value, change: impl FnOnce(&mut Value)) {
     row["name"] = document["name"].clone();
 }
 
-/// Changes a figure of the first converged trial everywhere it stands.
+/// Changes a figure of the first converged trial wherever it occurs.
 fn everywhere(rows: &mut Rows, column: &str, value: f64) {
     let trial = rows.table("trials").into_iter().find(|row| row["state"] == "converged").unwrap();
     trial[column] = value.into();
@@ -389,7 +389,7 @@ const FORGERIES: [Forgery; 57] = [
     ("a consent", |r| r.0.push(("consents".to_owned(), json!({"seq": 1}))), "which is not part of an archive"),
 ];
 
-/// Forgeries of what only the whole file shows.
+/// Forgeries that only checks of the whole file can detect.
 const MORE: [Forgery; 8] =
     [
         ("an audit row", |r| r.0.push(("audit".to_owned(), json!({"seq": 1}))), "which is not part of an archive"),
@@ -445,12 +445,12 @@ async fn forged_archives_are_refused_by_name_and_change_nothing() {
         }
     }
     assert!(missed.is_empty(), "{} of {}:\n{}", missed.len(), FORGERIES.len() + MORE.len(), missed.join("\n"));
-    // Repacked as it was, it is accepted.
+    // Repacked without a change, the archive is accepted.
     assert_eq!(import(&store, &whole.packed()).await.unwrap(), study);
     store.close().await;
 }
 
-/// What no rule of a noun can find: only a signature says who answered what.
+/// Forgeries that no rule can detect: only a signature vouches for answers.
 #[tokio::test]
 async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_marked() {
     let (folder, service, study, file) = study().await;
@@ -508,7 +508,7 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
     assert_eq!(from.as_array().unwrap().len(), 2);
     again.stop().await;
 
-    // An archive that nobody vouches for vouches for no earlier one.
+    // An unsigned archive does not vouch for earlier imports.
     let mut rows = Rows::of(&answer.1);
     let (earlier, key) = (rows.first("imports"), own.to_string());
     (earlier["signed_by"], earlier["trusted"]) = (json!(key), json!(1));
@@ -601,7 +601,7 @@ async fn a_row_that_was_changed_by_another_hand_is_not_exported() {
     assert!(refusal.contains("a row of subjects was changed outside the program"), "{refusal}");
 }
 
-/// Reads a bomb with the program itself: what it says, and its peak memory, bytes.
+/// Imports a decompression bomb with the command line. Returns its message and its peak memory in bytes.
 fn detonate(folder: &Path, bomb: &[u8]) -> (bool, String, u64) {
     let file = folder.join("bomb.gait");
     std::fs::write(&file, bomb).unwrap();
@@ -628,7 +628,7 @@ fn detonate(folder: &Path, bomb: &[u8]) -> (bool, String, u64) {
     (output.status.code() == Some(2), String::from_utf8_lossy(&output.stderr).into_owned(), peak)
 }
 
-/// So much memory an import takes at most, whatever it is given.
+/// Maximum memory of an import, whatever the archive.
 const MOST_MEMORY_BYTES: u64 = 320 << 20;
 
 /// A compressed archive of content that is made as it is compressed.
@@ -786,7 +786,7 @@ async fn bombs_are_refused_within_bounded_memory() {
         ("a deep report", with(&|rows| rows.first("trials")["report"] = "[".repeat(900).into())),
         ("a study within ten frames", (0..10).fold(framed("x\n"), |inner, _| framed(&hex::encode(inner)))),
     ];
-    // Many rows, each right by itself.
+    // Many rows, each of which is valid.
     let mut rows = whole.clone();
     let trial = rows.first("remarks").clone();
     bombs.push((

@@ -1,4 +1,4 @@
-//! Backups are verified, belong to one record, and leave nothing behind; a restore overwrites nothing else.
+//! Backups are verified, belong to one record, and leave no temporary files. A restore overwrites only its record.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

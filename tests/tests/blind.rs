@@ -1,4 +1,4 @@
-//! Blind comparisons: what a rater is shown, what is recorded, and that nothing says which gait is which.
+//! Blind comparisons: the shown pairs, the recorded answers, and concealment of the allocation.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -55,7 +55,7 @@ async fn responses_to_raters_reveal_no_gait() {
         let answer = service.fetch(&path).await;
         assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
         if path.contains("/motions/") {
-            // Positions and nothing else.
+            // The motion has only positions.
             let figures = answer.text.strip_prefix("{\"figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
             assert!(figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{figures}");
             continue;
@@ -84,7 +84,7 @@ async fn responses_to_raters_reveal_no_gait() {
     for word in ["trial", "rmse", "bound", "converged", "\"a1\"", "0.026", "stride_", ".csv", ".json", "seed"] {
         assert!(!words.contains(word), "{word}");
     }
-    // As long, as many figures, the same place at the start.
+    // Both motions have the same length, number of figures and start position.
     let motion = |side: &str| {
         let path = format!("/api/v1/blind-pairs/{token}/motions/{side}");
         let service = &service;
@@ -107,7 +107,7 @@ async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &s
         let next = format!("/api/v1/studies/{study}/blind-pairs/next");
         let pair = send(service, who, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
         if pair.is_null() {
-            // The answer that was just given is being taken in.
+            // The study is still processing the last answer.
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         }
@@ -185,7 +185,7 @@ async fn rater_answer_counts_for_the_gait_shown_on_that_side() {
     service.stop().await;
 }
 
-/// An analytic solver whose hip is higher the worse the gait: a motion to the millimetre tells its trial.
+/// An analytic solver whose hip is higher the worse the gait: a motion in millimetres identifies its trial.
 struct Tall(Analytic);
 
 /// Height of the hip in the gait of such a trial, m.
@@ -412,7 +412,7 @@ async fn the_last_answer_can_be_retracted_once_and_counts_no_more() {
     assert_eq!((&figures[0]["shown"], &figures[0]["answered"]), (&json!(1), &json!(0)), "{figures}");
     assert_eq!(service.post_text(&at(&pair, "/retract"), FORM, "").await.status, StatusCode::CONFLICT);
 
-    // Neither what is not the last answer, nor that a gait is unsafe.
+    // Neither an earlier answer nor a safety report can be retracted.
     let mut pairs = Vec::new();
     while pairs.len() < 2 {
         service.wait_for(study, &[StudyState::Waiting]).await;

@@ -1,5 +1,5 @@
-//! Every byte that a rater can get: whatever a rater asks for, with whichever identifier, it says nothing of what is
-//! rated; and one pair looks like another, whether it is new or asked again.
+//! Every byte that a rater can fetch: no response, for any identifier, reveals anything about the rated gaits, and new
+//! and repeated pairs look the same.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 const JSON: &str = "application/json";
-/// Headers that any answer of the service may carry. Anything else must be looked at: it may name something.
+/// Headers that are allowed in every response. Any other header needs a review, because it may reveal something.
 const HEADERS: [&str; 17] = [
     "allow",
     "cache-control",
@@ -53,7 +53,7 @@ async fn waiting(service: &Service, trials: u32) -> StudyId {
     study
 }
 
-/// What nobody may learn from an answer to a rater: identifiers, names and figures of what is rated.
+/// Data that a response to a rater must not contain: identifiers, names and figures of what is rated.
 async fn secrets(service: &Service, studies_of: &[StudyId]) -> BTreeSet<String> {
     let mut secrets = BTreeSet::new();
     let mut reader = service.store.read().await.unwrap();
@@ -142,7 +142,7 @@ async fn no_address_reveals_rated_gaits_to_a_rater() {
     service.stop().await;
 }
 
-/// Holds an answer against the secrets, but for what the rater has sent.
+/// Checks a response against the secrets, except those that the rater has sent.
 fn check(what: &str, answer: &Answer, id: &str, token: &str, secrets: &BTreeSet<String>) {
     assert!(!answer.status.is_server_error(), "{what}: {}", answer.text);
     let mut bytes = answer.text.clone();
@@ -203,7 +203,7 @@ async fn a_pair_that_is_asked_again_looks_like_a_new_one_even_where_others_answe
         let next = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await;
         let pair = next.json()["pair"].clone();
         if pair.is_null() {
-            // What was answered is being taken in.
+            // The study is still processing the answer.
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         }

@@ -1,4 +1,4 @@
-//! Devices and muscles of a person, through pages and REST.
+//! Devices and muscle values, through pages and REST.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -100,7 +100,7 @@ async fn muscles_of_a_person_are_written_down_and_new_studies_take_them_up() {
     let of = async |study| service.get(study).await.plan.gait_settings.muscles;
     assert!(of(before).await.is_published());
     assert_eq!(of(after).await.sol.max_force_n, Some(4200.0));
-    // A fork has the set-up of its parent, whatever was written down since.
+    // A fork has the set-up of its parent, not values that were recorded later.
     let fork = service.post(&format!("/api/v1/studies/{before}/fork"), &json!({})).await.json();
     assert!(of(fork["id"].as_str().unwrap().parse().unwrap()).await.is_published());
     assert_eq!(service.put(&api, &json!({})).await.status, StatusCode::OK);

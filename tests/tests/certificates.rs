@@ -43,7 +43,7 @@ fn a_gait_is_solved_certified_and_converted() {
     assert_eq!(certificate["passed"].as_bool(), Some(certificate["objections"].as_array().unwrap().is_empty()));
     assert!(certificate["return_map"]["largest"].as_f64().unwrap() < 1.0);
 
-    // The same gait from its file, and alone as the service gives it.
+    // The same gait from a file of `solve --out`, and as downloaded from the service.
     let again: Value = serde_json::from_str(&done(folder, &["certify", "gait.json", "--json"])).unwrap();
     assert_eq!(&again, certificate);
     let outcome: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("gait.json")).unwrap()).unwrap();
@@ -56,7 +56,7 @@ fn a_gait_is_solved_certified_and_converted() {
     let strikes = format!("0,{end}");
     let reference = ["reference", "gait.mot", "--name", "our own", "--heel-strikes-s", &strikes, "--out", "own.json"];
     done(folder, &reference);
-    // Measured against itself, a gait is no farther away than its interpolation.
+    // The Gait RMSE of a gait against itself is only the error of interpolation.
     let warm = ["--warm", "gait.json", "--mesh", "2,2,3,5", "--muscles", "off", "--json"];
     let against = [&["solve", "--reference", "own.json"][..], &warm].concat();
     let figures: Value = serde_json::from_str(&done(folder, &against)).unwrap();
@@ -67,7 +67,7 @@ fn a_gait_is_solved_certified_and_converted() {
     assert!(rows.next().unwrap().starts_with("time_s,domain,px_m,pz_m,torso_rad,"), "{table}");
     assert!(rows.clone().count() > 20 && rows.all(|row| row.split(',').count() == 34 && !row.contains("NaN")));
 
-    // Of a gait that no record knows nobody can say whether it was reported as unsafe.
+    // A gait outside a record may have been reported as unsafe, so it has no controller file.
     refused(folder, &["convert", "gait.json", "--to", "controller"], "invalid value 'controller'");
     let tiles = done(folder, &["convert", "gait.json", "--to", "tiles"]);
     assert!(tiles.starts_with("<svg") && tiles.contains(">100 %</text>"), "{tiles}");

@@ -1,6 +1,6 @@
 //! Every operation that changes something leaves exactly one row in the audit trail, and the form, REST and the
 //! unattended loop leave the same rows in the record. The table is compared with the description: an operation that is
-//! added and not listed here fails the test.
+//! not listed here fails the test.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -48,7 +48,7 @@ impl Scene {
         Self { service, finished, draft, script, human }
     }
 
-    /// Sends it, requires success and exactly one row.
+    /// Sends a request, and requires success and exactly one row.
     async fn one(&self, done: &mut BTreeSet<String>, operation: &str, path: &str, body: Value) -> Value {
         let (method, _) = operation.split_once(' ').unwrap();
         let before = rows(&self.service).await;
@@ -178,7 +178,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     scene.one(done, "post /study-members/{id}/remove", &remove, json!({})).await;
     let restricted = json!({"restricted": true});
     scene.one(done, "put /studies/{id}/access", &format!("{of_finished}/access"), restricted).await;
-    // An invitation does three things, and each has its row.
+    // An invitation makes three changes, each with its own row.
     let invited = service.post(&format!("{of_finished}/invitations"), &json!({"name": "R7"})).await;
     assert!(invited.status.is_success(), "{}", invited.text);
     let newest = audit::page(&mut service.store.read().await.unwrap(), "", None, 3).await.unwrap();
@@ -252,7 +252,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     scene.service.stop().await;
 }
 
-/// What a study heard, without identifiers, times, and who said it.
+/// The feedback of a study, without identifiers, times and authors.
 fn essence(trials: &[Trial], heard: &[FeedbackRow]) -> Vec<String> {
     let number = |id: &str| trials.iter().find(|trial| trial.id.to_string() == id).map(|trial| trial.number);
     heard

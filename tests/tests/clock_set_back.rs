@@ -1,4 +1,5 @@
-//! A clock that is set back changes no order: alone in its process, because the clock is that of the process.
+//! Setting the clock back does not change the order of rows. This test has its own process, because the clock belongs
+//! to the process.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -1,4 +1,4 @@
-//! The command line: what it refuses, and that a refusal changes nothing.
+//! The command line: invalid input is refused, and a refusal changes nothing.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -149,7 +149,7 @@ fn file_that_is_no_database_is_refused_by_name_and_unchanged() {
     }
     refused_beside(&[], &["tune", "--database", "folder"], "folder is not a gaitwright database: it is a folder");
     refused_beside(&[], &["tune", "--database", "nowhere/a.db"], "Cannot open the database nowhere/a.db");
-    // The first bytes are right, the rest is not.
+    // Only the first bytes are valid.
     let folder = tempfile::tempdir().unwrap();
     let mut bytes = b"SQLite format 3\0".to_vec();
     bytes.resize(8192, b'x');
@@ -302,7 +302,7 @@ fn full_device_ends_printing_commands_with_a_message_and_code_1() {
             "{text}"
         );
     }
-    // Without a place for words either, the code is all that is left.
+    // If stderr cannot be written either, only the exit code reports the error.
     let output = cli::command(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &["openapi"])
         .stdout(full())
         .stderr(full())

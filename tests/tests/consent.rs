@@ -1,4 +1,4 @@
-//! A subject who withdraws: studies stop, nothing new is written or given out, the record is kept.
+//! Withdrawal of consent: studies stop, no data is added, shown or exported, and the record is kept.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -70,7 +70,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         assert!(service.trials(study).await.iter().all(|trial| !trial.state.is_open()));
     }
 
-    // Whichever way something new comes in.
+    // Every entry point for new data.
     let trials = service.trials(finished).await;
     let (heard, tried) = (service.feedback(finished).await, service.trials(running).await.len());
     let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"});
@@ -119,7 +119,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     assert_eq!(service.feedback(finished).await, heard);
     assert_eq!(service.trials(running).await.len(), tried);
 
-    // Nothing is shown or given out, whatever asks for it; the record is kept.
+    // No request shows or exports data; the record is kept.
     let heard_id = service.feedback(finished).await[0].id;
     let named = [
         ("/studies/{id}", finished.to_string()),
@@ -137,7 +137,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         let Some((of, id)) = named.iter().find(|(of, _)| path.starts_with(&format!("/api/v1{of}"))) else { continue };
         let name = of.rsplit('/').next().unwrap();
         let answer = service.fetch(&path.replace(name, id).replace("{file}", "a.svg").replace("{side}", "first")).await;
-        // None of these says what was computed or said of the subject.
+        // None of these responses has results or answers of the subject.
         let open = ["/api/v1/studies/{id}", "/api/v1/studies/{id}/access", "/api/v1/studies/{id}/members"];
         let open = open.contains(&path.as_str());
         let expected = if open { StatusCode::OK } else { StatusCode::CONFLICT };
@@ -181,7 +181,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let kinds: Vec<_> = said.as_array().unwrap().iter().map(|row| row["kind"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["given", "withdrawn"]);
 
-    // Who comes back, signs anew.
+    // A subject who rejoins gives a new consent.
     service.post(&format!("{of_subject}/consents"), &json!({"form": "version 4"})).await;
     let again = service.post("/api/v1/studies", &json!({"subject_id": person, "start": false})).await;
     assert_eq!(again.status, StatusCode::CREATED, "{}", again.text);
@@ -244,7 +244,7 @@ async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() 
     assert!(output.status.code() == Some(2) && text.contains("withdrew consent"), "{text}");
     assert!(!folder.path().join("study.gait").exists());
 
-    // Elsewhere, where the subject withdraws after a first study came in.
+    // In another record, in which the subject withdraws after the import of a first study.
     let other = gaitwright_store::Store::open(&folder.path().join("b.db")).await.unwrap();
     import(&other, &archives[0]).await.unwrap();
     other.close().await;

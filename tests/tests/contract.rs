@@ -1,4 +1,4 @@
-//! Shapes that scripts rely on: names and types, not values.
+//! Formats that scripts rely on: names and types, not values.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -59,7 +59,7 @@ async fn no_csv_endpoint_gives_a_formula() {
     }
     let retract = format!("/api/v1/preferences/{}/retract", given[0]);
     service.post(&retract, &json!({"reason": FORMULA})).await;
-    // What no way in brings may be here all the same: from a worker, from elsewhere.
+    // Text that no entry point accepts may still be in the record, from a worker or an archive.
     let mut writer = service.store.write().await.unwrap();
     sqlx::query("update trials set message = ? where state not in ('converged', 'not_converged')")
         .bind(FORMULA)

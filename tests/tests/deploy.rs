@@ -1,4 +1,4 @@
-//! What is said in `server/deploy`, as far as it can be tried without a container engine and without systemd running.
+//! The files of `server/deploy`, as far as they can be tested without a container engine and a running systemd.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -24,7 +24,7 @@ fn lines(word: &str) -> Vec<Vec<String>> {
     CONTAINER.lines().filter_map(|line| line.strip_prefix(word)?.strip_prefix(' ')).map(split).collect()
 }
 
-/// What goes into the stage that builds.
+/// The files that are copied into the build stage.
 fn copied() -> BTreeSet<String> {
     let of_context = lines("COPY").into_iter().filter(|words| !words[0].starts_with("--from"));
     of_context.flat_map(|words| words[..words.len() - 1].to_vec()).collect()
@@ -93,7 +93,7 @@ fn the_container_runs_what_it_builds() {
     assert_eq!(built[1], "/source/target/release/gaitwright");
     assert_eq!(lines("ENTRYPOINT"), [["gaitwright"]]);
 
-    // What the command relies on is what the image sets.
+    // The image sets everything that the command needs.
     let words = |word: &str| lines(word).concat();
     assert_eq!(lines("WORKDIR").last().unwrap(), &["/data"]);
     assert_eq!((words("VOLUME"), words("EXPOSE")), (vec!["/data".to_owned()], vec!["8080".to_owned()]));
@@ -158,13 +158,13 @@ fn systemd_finds_no_fault_in_the_unit() {
         skipped("there is no systemd-analyze on this machine");
         return;
     };
-    // Of other units of the machine it may complain.
+    // Complaints about other units of the machine are ignored.
     let ours = |output: &Output| {
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         text.lines().filter(|line| line.contains("gaitwright.service")).map(str::to_owned).collect::<Vec<_>>()
     };
     assert!(ours(&output).is_empty(), "{:?}", ours(&output));
-    // It finds faults here: one that cannot start at all would say nothing of our unit either.
+    // Checks that the tool reports errors on this machine, because a tool that cannot start would also report none.
     std::fs::write(&unit, UNIT.replace("/usr/local/bin/gaitwright", "bin/gaitwright")).unwrap();
     let faulty = Command::new("systemd-analyze").args(["verify", "--man=no"]).arg(&unit).output().unwrap();
     assert!(!ours(&faulty).is_empty(), "{}", String::from_utf8_lossy(&faulty.stderr));

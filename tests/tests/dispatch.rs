@@ -1,5 +1,5 @@
-//! The contract of an engine, held by threads of this process and by workers behind a broker: whatever happens to a
-//! worker, a result or the engine itself, nothing is lost and nothing counts twice.
+//! The contract of an engine, for threads of this process and for workers behind a broker: failures of a worker, of a
+//! delivery or of the engine itself neither lose a result nor count one twice.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -31,7 +31,7 @@ const TRIALS: u32 = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Worker {
     Steady,
-    /// Ends in the middle: a thread panics, a process is killed by the test.
+    /// Ends during the solve: a thread panics, or the test kills a process.
     Dies,
     Hangs,
 }
@@ -120,7 +120,7 @@ async fn wait_for_a_solve(service: &Service, study: StudyId) {
     panic!("no solve was begun");
 }
 
-/// What must not depend on what happened on the way.
+/// The parts of a trial that must not depend on failures.
 async fn essence(service: &Service, study: StudyId) -> Vec<String> {
     let trials = service.trials(study).await;
     let line = |t: &gaitwright_store::trials::Trial| {
@@ -139,7 +139,7 @@ async fn undisturbed() -> Vec<String> {
     expected
 }
 
-/// The study ends with the trials of an undisturbed run, each with one label and one result that counts.
+/// The study ends with the trials of an uninterrupted run, each with one label and one result that counts.
 async fn nothing_is_lost_or_doubled(service: &Service, study: StudyId) {
     service.wait_for(study, &[StudyState::Finished]).await;
     assert_eq!(essence(service, study).await, undisturbed().await);
@@ -258,18 +258,18 @@ async fn disturbed(mut rig: Rig, disturb: impl Fn(&mut Broker)) {
 
 #[derive(Debug, Clone, Copy)]
 enum Change {
-    /// Every result is brought a second time.
+    /// Every result is delivered twice.
     Twice,
-    /// The first result comes when another attempt is under way.
+    /// The first result arrives while another attempt is running.
     Late,
 }
 
-/// An engine whose results are brought in another way.
+/// An engine with modified delivery of results.
 struct Changed {
     engine: Arc<dyn Dispatch>,
     change: Change,
     held: Mutex<VecDeque<News>>,
-    /// What is held waits until another attempt is under way.
+    /// The held result waits until another attempt is running.
     holds_back: AtomicBool,
 }
 
@@ -294,7 +294,7 @@ impl Changed {
                     held.push_back(News::Ended { attempt, worker, finding, receipt });
                 }
                 (Change::Late, News::Ended { .. }) if attempt.number == 1 && self.holds_back.load(Ordering::SeqCst) => {
-                    // A broker brings again what is not signed for.
+                    // A broker delivers unacknowledged messages again.
                     held.clear();
                     held.push_back(news);
                     continue;

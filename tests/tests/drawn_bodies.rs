@@ -1,5 +1,5 @@
-//! The description states the rules: bodies that are drawn from it are accepted by every operation that takes one, unless
-//! the record is in a state against it, and bodies that go beyond it are refused, with 422 where the description has it.
+//! The description states the rules: every operation accepts bodies that are drawn from it, unless the state of the
+//! record forbids them, and refuses bodies that violate it, with 422 if the description lists that status.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -23,7 +23,7 @@ use tower::ServiceExt;
 /// Bodies drawn for each operation.
 const DRAWS: usize = 8;
 
-/// Operations that hardly ever succeed with a drawn body, because a value must be one of the record.
+/// Operations that hardly ever succeed with a drawn body, because a value must exist in the record.
 const SELDOM_FIT: [&str; 1] = ["post /studies/{id}/suggestions"];
 
 /// A rater who can become a member.
@@ -31,7 +31,7 @@ const MEMBER: &str = "a drawn member";
 
 struct Scene {
     service: Service,
-    /// One router for all requests: to build one takes longer than to answer.
+    /// One router for all requests, because building one takes longer than answering.
     router: Router,
     finished: StudyId,
     human: StudyId,
@@ -46,7 +46,7 @@ impl Scene {
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
         let finished = service.study(|new| (new.trial_budget, new.feedback_mode) = (18, FeedbackMode::Mixed)).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
-        // Of another subject: what is reported as unsafe there closes no gait here.
+        // Another subject, so that safety reports there do not affect gaits here.
         let own = service.subject().await;
         let subjects = service.fetch("/api/v1/subjects").await.items();
         let ids = subjects.as_array().unwrap().iter().map(|subject| subject["id"].as_str().unwrap().parse().unwrap());
@@ -123,11 +123,11 @@ impl Scene {
         id
     }
 
-    /// What stands for the parameter in the path of an operation: something in a state that the operation fits.
+    /// The value of the path parameter of an operation: an object in a suitable state.
     async fn target(&mut self, path: &str) -> Option<String> {
         Some(match path {
             "/blind-pairs/{token}/answer" => {
-                // After an answer, the study says that it waits until it has chosen the next comparison.
+                // After an answer, no comparison is pending until the study has chosen the next one.
                 let mut token = None;
                 for _ in 0..100 {
                     let next = self.post(&format!("/studies/{}/blind-pairs/next", self.human), json!({})).await;
@@ -183,7 +183,7 @@ impl Scene {
         })
     }
 
-    /// The answer to a body. A target that an operation refused to change serves the next body.
+    /// The response to a body. A target that was not changed is used for the next body.
     async fn send(&mut self, method: &str, path: &str, body: &Value, target: &mut Option<String>) -> Option<Answer> {
         if target.is_none() {
             *target = self.target(path).await;
@@ -198,7 +198,7 @@ impl Scene {
     }
 }
 
-/// What the fields of bodies refer to, and files of the laboratory.
+/// Valid values of fields that refer to objects of the record.
 async fn known(scene: &Scene) -> BTreeMap<&'static str, Vec<Value>> {
     let trials: Vec<Value> = scene.trials.iter().take(4).map(|id| json!(id)).collect();
     let devices = scene.service.fetch("/api/v1/devices").await.items();
@@ -210,17 +210,17 @@ async fn known(scene: &Scene) -> BTreeMap<&'static str, Vec<Value>> {
     known.insert("device_id", vec![devices[0]["id"].clone()]);
     known.insert("reference_gait_id", vec![json!(scene.service.reference().await)]);
     known.insert("rater", vec![rater[0]["rater"].clone()]);
-    // What is made here must not begin to run.
+    // Studies that are created here must not start.
     known.insert("start", vec![json!(false)]);
     known
 }
 
-/// What single operations refer to: files are no business of the description.
+/// Valid values for single operations, such as files, whose content the description does not define.
 fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>> {
     let reading = |kind: Value| ("reading", vec![kind]);
     let gaits = |trials: &[TrialId]| trials.iter().map(|id| json!(id)).collect();
     match path {
-        // What is reported as unsafe here is asked about nowhere else.
+        // These gaits may be reported as unsafe, so no other operation uses them.
         path if path.ends_with("/assessments") => {
             BTreeMap::from([("first", gaits(&trials[6..8])), ("second", gaits(&trials[8..10]))])
         }
@@ -245,13 +245,13 @@ fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>
     }
 }
 
-/// Whether the description says in words what the refusal is about: of the refused field, or of one that it is part of.
+/// Whether the description has a rule in `x-depends` for the refused field or for a field that contains it.
 fn is_said_in_words(drawn: &Drawn, schema: &Value, field: &str) -> bool {
     let mut here = drawn.resolved(schema);
     let mut said = here["x-depends"].is_string();
     for name in field.split('.') {
         let name = name.split('[').next().unwrap();
-        // A file is named by what it describes.
+        // An error in a file names a property of the file, not a field of the body.
         let Some(next) = here["properties"].get(name).cloned() else { continue };
         said |= next["x-depends"].is_string();
         here = drawn.resolved(&next);
@@ -266,7 +266,7 @@ async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut drawn = Drawn::from(document.clone());
     scene.post("/users", json!({"name": MEMBER, "role": "rater"})).await;
-    // The rater is known once a pair was drawn.
+    // A rater exists once a pair was drawn.
     scene.target("/blind-pairs/{token}/answer").await;
     let common = known(&scene).await;
     let (mut faults, mut never, mut accepted, mut refused) = (Vec::new(), Vec::new(), 0, 0);

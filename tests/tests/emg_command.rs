@@ -1,4 +1,4 @@
-//! `gaitwright emg`: a recording processed without the service, as the service does it.
+//! `gaitwright emg`: processes a recording without the service, with the same results.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -1,4 +1,4 @@
-//! Event streams before unblinding: neither what comes, nor when, tells an order.
+//! Event streams before unblinding: neither content nor timing reveals an allocation.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +20,7 @@ use tower::ServiceExt;
 /// Sessions that are watched.
 const SESSIONS: usize = 200;
 
-/// Events with the instants at which they came.
+/// Events with their times of arrival.
 type Heard = Arc<Mutex<Vec<(Instant, String)>>>;
 
 async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Answer {
@@ -106,7 +106,7 @@ async fn event_streams_reveal_no_allocation_by_content_or_timing() {
         truth.push(gait_one_first(&service.store, id.parse().unwrap()).await);
     }
     assert_eq!(looks.len(), 1, "{looks:#?}");
-    // Five standard deviations, which chance leaves less than once in a million.
+    // Five standard deviations, which chance exceeds less than once in a million.
     let limit = 2.5 * (SESSIONS as f64).sqrt();
     for (what, figures) in [("event", &until_event), ("answer", &until_answer), ("walks", &walks)] {
         let right = right_guesses(figures, &truth);

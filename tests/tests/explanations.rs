@@ -1,4 +1,4 @@
-//! Why trials have no gait: found out when somebody asks or their study has ended, kept, and said in words.
+//! Infeasibility explanations: computed on request or at the end of a study, stored, and shown as sentences.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -36,7 +36,7 @@ async fn without_gait(service: &Service, study: StudyId) -> Vec<Trial> {
     trials
 }
 
-/// Looks again until something holds.
+/// Polls until a condition holds.
 async fn until(what: &str, mut holds: impl AsyncFnMut() -> bool) {
     for _ in 0..2000 {
         if holds().await {
@@ -47,7 +47,7 @@ async fn until(what: &str, mut holds: impl AsyncFnMut() -> bool) {
     panic!("{what}");
 }
 
-/// The explanation of a trial, once it is there.
+/// Waits for the explanation of a trial.
 async fn explained(service: &Service, trial: TrialId) -> Value {
     until("the trial is explained", async || service.fetch(&address(trial)).await.status == StatusCode::OK).await;
     service.fetch(&address(trial)).await.json()
@@ -241,7 +241,7 @@ async fn refused_explanation_states_its_reason_and_is_not_retried() {
     service.stop().await;
 }
 
-/// The service and the command line find the same, and say it in the same words.
+/// The service and the command line give the same explanation, in the same words.
 #[tokio::test]
 async fn the_real_explanation_is_that_of_the_command_line() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {

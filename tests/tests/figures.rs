@@ -1,4 +1,4 @@
-//! Figures as files: every one that a page links is there in each form, stands alone, and holds the numbers.
+//! Figures as files: every figure that a page links exists in each format, is self-contained, and has its data.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -13,7 +13,7 @@ use http_body_util::BodyExt;
 use serde_json::json;
 use tower::ServiceExt;
 
-/// A file as it comes: kind and bytes.
+/// A downloaded file: media type and bytes.
 async fn file(service: &Service, path: &str) -> (String, Vec<u8>) {
     let request = Request::get(path).body(Body::empty()).unwrap();
     let answer = service.router().oneshot(request).await.unwrap();

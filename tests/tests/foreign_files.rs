@@ -1,4 +1,4 @@
-//! Files that are no record of this program, or the record under another name.
+//! Files that are not records of this program, and other names of a record.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -22,7 +22,7 @@ const LIST: &str = "create table _sqlx_migrations (version bigint primary key, d
 async fn the_database_of_another_program_is_refused_and_left_as_it_is() {
     let users = format!("{LIST}; insert into _sqlx_migrations values (1, 'users', '2026-01-01', true, x'00', 1)");
     let users: &'static str = users.leak();
-    for (sql, why) in [("create table notes (text)", "with a table \"notes\""), (users, "with migrations of its own")] {
+    for (sql, why) in [("create table notes (text)", "has the table \"notes\""), (users, "has its own migrations")] {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("other.db");
         write(&file, sql).await;
@@ -48,7 +48,7 @@ async fn the_database_of_another_program_is_refused_and_left_as_it_is() {
     }
 }
 
-/// What a process leaves that is killed while it makes a new file.
+/// The file that remains if a process is killed while creating a record.
 #[tokio::test]
 async fn a_record_that_was_hardly_begun_is_made_to_the_end() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Pages and forms through the router: what they refuse, what they keep, what they say.
+//! Pages and forms, through the router: refusals, stored values and messages.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -186,7 +186,7 @@ async fn an_answer_is_taken_back_in_its_own_study_only() {
     assert_eq!(read["retraction"], json!(null), "nothing was taken back");
     let answer = service.post_text(&format!("/studies/{study}/retract"), FORM, &form).await;
     assert_eq!(answer.status, StatusCode::SEE_OTHER);
-    // What was said is struck through, why it was taken back is not.
+    // A retracted answer is struck through; the reason for the retraction is not.
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     let struck = page.split("class=\"retracted\">").nth(1).unwrap().split("</span>").next().unwrap();
     assert!(struck.contains("trial") && !struck.contains("typo") && page.contains("retracted: typo"));
@@ -229,7 +229,7 @@ async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retrac
     let before = service.feedback(study).await.len();
     let first = send(&ahead, "a", 1).await;
     assert_eq!(first.status, StatusCode::SEE_OTHER);
-    // Another tab, also with the gaits the other way round, and also when it is pressed again.
+    // A second answer from another tab, with the gaits swapped, and by pressing the button again.
     for (pair, answer, number) in [(&ahead, "b", 2), (&turned, "a", 3), (&ahead, "cannot_tell", 4), (&ahead, "b", 2)] {
         let second = send(pair, answer, number).await;
         is_page(&second, StatusCode::CONFLICT, "in another tab or window");
@@ -244,7 +244,7 @@ async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retrac
     let retracted = service.post_text(&format!("/studies/{study}/retract"), FORM, &back).await;
     assert_eq!(retracted.status, StatusCode::SEE_OTHER);
     assert_eq!(send(&turned, "a", 5).await.status, StatusCode::SEE_OTHER, "the retracted answer is not in the way");
-    // Somebody else may answer, and a safety report is always taken.
+    // Another person may answer, and a safety report is always accepted.
     let other = format!("{ahead}&answer=b&source=clinician&author=L&note=&key={}", key(6));
     assert_eq!(service.post_text(&path, FORM, &other).await.status, StatusCode::SEE_OTHER);
     assert_eq!(send(&ahead, "unsafe_a", 7).await.status, StatusCode::SEE_OTHER);
@@ -361,7 +361,7 @@ async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_sid
         assert_eq!(history.last().unwrap()["iteration"], json!(budget));
         let iterations: Vec<_> = history.iter().map(|milestone| milestone["iteration"].as_u64()).collect();
         assert!(iterations.is_sorted_by(|a, b| a < b), "{iterations:?}");
-        // The best after some results is one of them.
+        // The best trial after some results is one of these results.
         for milestone in history {
             let there = usize::try_from(milestone["iteration"].as_u64().unwrap()).unwrap();
             let best = milestone["trial_id"].as_str().unwrap();
@@ -427,7 +427,7 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
             refused.text.split(" aria-invalid=\"true\" aria-describedby=\"refused\" autofocus").next().unwrap();
         assert_ne!(before.len(), refused.text.len(), "{field} is marked");
         assert!(before.rsplit("name=\"").next().unwrap().starts_with(&format!("{field}\"")), "{changed}: {field}");
-        // Where it was folded away, it is open.
+        // If the field is in a collapsed section, the section is open.
         let folded = before.matches("<details").count() > before.matches("</details>").count();
         assert!(!folded || before.rsplit("<details").next().unwrap().split('>').next().unwrap().contains(" open"));
     }
@@ -447,11 +447,11 @@ async fn script_trial_without_a_gait_offers_no_gait() {
         let shown = service.fetch(&page).await.text;
         assert!(shown.contains("the gait itself is not stored here"), "{shown}");
         for offered in
-            ["See this gait walk", "/gait.csv", "/controller.json", "/certify", "This gait has no certificate yet"]
+            ["Watch this gait", "/gait.csv", "/controller.json", "/certify", "This gait has no certificate yet"]
         {
             assert!(!shown.contains(offered), "{page}: {offered}");
         }
-        // Whatever is offered to load is there.
+        // Every offered link exists.
         let links =
             shown.split("href=\"").skip(1).map(|rest| rest.split(['"', '#']).next().unwrap().replace("&#38;", "&"));
         let is_text = |link: &String| ![".png", "/archive"].iter().any(|other| link.contains(other));

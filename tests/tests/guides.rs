@@ -1,5 +1,5 @@
-//! What README and guides say: links lead somewhere, commands and their flags exist, addresses are described, and the
-//! service shows every guide.
+//! README and guides: links work, commands and their flags exist, addresses are in the description, and the service
+//! shows every guide.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -284,7 +284,7 @@ async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_ef
             assert_eq!(service.post(&path, &body).await.status, StatusCode::CREATED);
         }
         through_form = !through_form;
-        // The scheduler hears of the answer a moment later.
+        // The scheduler reads the answer a moment later.
         while service.get(study).await.state == StudyState::Waiting && service.trials(study).await.len() == trials.len()
         {
             tokio::time::sleep(std::time::Duration::from_millis(2)).await;

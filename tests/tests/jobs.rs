@@ -1,4 +1,4 @@
-//! Jobs: what a request that takes long is answered with, followed to its end and cancelled.
+//! Jobs: the response to long-running requests, following a job to its end, and cancellation.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +20,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// A service whose study goes on while jobs are looked at; certificates take a while, and explanations for ever.
+/// A service with a running study, slow certificates, and explanations that never finish.
 async fn service() -> (TempDir, Service, StudyId, Clearance) {
     let folder = tempfile::tempdir().unwrap();
     let explainer = Clearance::slow(Duration::from_mins(10));
@@ -113,7 +113,7 @@ async fn a_certificate_that_was_requested_is_made_after_a_restart_unless_it_was_
         converged = service.trials(study).await;
         converged.retain(|trial| trial.state == TrialState::Converged);
     }
-    // A study that goes on would end and certify its best gaits by itself.
+    // If the study continued, it would end and certify its best gaits by itself.
     service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
     let (kept, cancelled) = (converged[0].id, converged[1].id);
     let mut jobs = Vec::new();
@@ -210,7 +210,7 @@ async fn a_solve_is_a_job_whose_end_is_that_of_its_trial() {
     let found = service.fetch(&job).await.json();
     assert_eq!((&found["study_id"], &found["kind"]), (&json!(study), &json!("solve")));
     assert!(listed(&service, "solve").await.iter().any(|job| job["study_id"] == json!(study)));
-    // It may have ended meanwhile; a younger one takes its place.
+    // The job may have ended meanwhile; a newer one takes its place.
     loop {
         let trial = first(&service, study, TrialState::Running).await;
         let job = format!("/api/v1/jobs/solve-{trial}");

@@ -1,6 +1,6 @@
-//! The process is killed (SIGKILL) at arbitrary instants, while others write too.
+//! The process is killed (SIGKILL) at arbitrary instants, during concurrent writes.
 //!
-//! `GAITWRIGHT_KILLS=200` makes it long.
+//! `GAITWRIGHT_KILLS=200` kills it more often.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -42,7 +42,7 @@ impl Drop for Process {
     }
 }
 
-/// Numbers that look random and are the same every time.
+/// Pseudo-random numbers, the same in every run.
 fn splitmix(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;
@@ -80,7 +80,7 @@ fn certificates_of(address: &str, study: &str) -> (Value, Value) {
     panic!("the gaits of the study are not certified");
 }
 
-/// What each trial without a gait is said to need, once the service is done.
+/// The explanations of all trials without a gait, once the service has finished.
 fn explained(address: &str, study: &str) -> Vec<String> {
     let trials = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().items();
     let without_gait = trials.as_array().unwrap().iter().filter(|trial| trial["state"] == "not_converged");

@@ -1,4 +1,4 @@
-//! Lab sessions: the order is drawn, kept, and told by an act alone; walks are recorded in their order.
+//! Lab sessions: the allocation is drawn, concealed, and revealed by unblinding only; walks are recorded in order.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -134,7 +134,7 @@ async fn lab_session_reveals_no_gait_before_unblinding() {
     for trial in &trials {
         assert!(!bytes.contains(&trial.id.to_string()) && !bytes.contains(&trial.id.short()));
     }
-    // Two sessions that differ in their order alone look alike to whoever may read.
+    // Two sessions that differ only in their allocation look the same to every reader.
     let mut seen = Vec::new();
     while seen.len() < 4 || seen.iter().all(|(order, _)| *order) || seen.iter().all(|(order, _)| !*order) {
         let session = planned(&service, study, &trials).await;
@@ -164,7 +164,7 @@ async fn each_walk_gets_the_controller_file_of_its_own_gait() {
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let gaits = converged(&trials);
-    // What moves the device; the rest of a file may say whose walk it is of.
+    // The content that drives the device; other parts of a file may name the walk.
     let moves = async |path: String| {
         let file = service.fetch(&path).await;
         assert_eq!(file.status, StatusCode::OK, "{path}: {}", file.text);
@@ -216,7 +216,7 @@ async fn walked(service: &Service, study: StudyId, trials: &[Trial]) -> (String,
     (lab, format!("/api/v1/lab-sessions/{}", id(&session)))
 }
 
-/// What people said, as heard by the learner.
+/// The answers of people, as the learner received them.
 async fn heard(service: &Service, study: StudyId) -> Vec<FeedbackRow> {
     let mut rows = service.feedback(study).await;
     rows.retain(|row| row.source == Source::Subject);
@@ -234,7 +234,7 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
         (json!({"number": 0, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 2, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 1, "answer": "first"}), StatusCode::OK),
-        // Sent twice it counts once; another one does not replace it.
+        // An answer that is sent twice counts once; a different one does not replace it.
         (json!({"number": 1, "answer": "first"}), StatusCode::OK),
         (json!({"number": 1, "answer": "second"}), StatusCode::CONFLICT),
     ] {
@@ -394,7 +394,7 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     import(&other, &file).await.unwrap();
     assert_eq!(lab_sessions::of_study(&mut other.read().await.unwrap(), study).await.unwrap(), before);
     assert_eq!(before[0].answers.iter().map(|answer| answer.taken_back).collect::<Vec<_>>(), [true, false]);
-    // From the files in the archive the same curves are made again.
+    // The files in the archive give the same curves.
     let mut computing = other.clone();
     let anew = lab::compute(&mut computing, before[0].id, EmgSettings::default()).await.unwrap();
     assert_eq!(serde_json::to_value(&anew).unwrap(), emg["result"]);
@@ -488,7 +488,7 @@ async fn a_recording_is_given_out_as_it_was_brought() {
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
     service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
-    // What reading drops is kept: comments, ends of lines, blank lines at the end.
+    // The stored file keeps what the parser ignores: comments, line ends and trailing blank lines.
     let file = format!("# Größe 1,8 m\r\n{}\r\n\r\n", electromyogram(1.0).trim_end().replace('\n', "\r\n"));
     let kept = service.post(&format!("{api}/measurement-files/emg"), &with_heel(1, &file)).await;
     assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);

@@ -1,4 +1,4 @@
-//! Ten thousand trials in one study: no page and no list is slow.
+//! A study with ten thousand trials: no page and no list is slow.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +20,7 @@ async fn ten_thousand_trials_slow_no_page_and_no_list() {
     let slow: Vec<_> = times.iter().filter(|(_, time)| *time > LIMIT).collect();
     assert!(slow.is_empty(), "{slow:?}");
     let api = format!("/api/v1/studies/{study}");
-    // Every trial can be had, page by page.
+    // Every trial can be fetched, page by page.
     let (mut cursor, mut seen) = (String::new(), 0);
     loop {
         let page = service.fetch(&format!("{api}/trials?limit=1000{cursor}")).await.json();
@@ -32,7 +32,7 @@ async fn ten_thousand_trials_slow_no_page_and_no_list() {
     }
     assert_eq!(seen, TRIALS as usize);
     service.stop().await;
-    // Opening verifies every row: the time is shown, and judged nowhere.
+    // Opening the record verifies every row. The time is printed, but not tested.
     let begun = Instant::now();
     let store = Store::open(&database).await.unwrap();
     println!("{:>6.1} ms  opening the record", begun.elapsed().as_secs_f64() * 1e3);

@@ -1,7 +1,8 @@
-//! Every way to ask a person, to walk or to reach a device keeps the same rules.
+//! Every entry point through which a gait reaches a person or a device applies the same rules.
 //!
-//! Doors are taken from the description of the REST interface, the page router and the commands: one that is added and not
-//! classified here fails the test. Every classified door is then tried under every condition that must close it.
+//! The entry points, here called doors, are taken from the description of the REST interface, the page router and the
+//! commands: a door that is not classified here fails the test. Every classified door is then tried under every
+//! condition that must close it.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -37,7 +38,7 @@ enum Door {
     Plan,
     /// The record of a walk.
     Walk,
-    /// What a walker says of two walks.
+    /// The answer of a subject about two walks.
     WalkAnswer,
     /// A controller file of a trial.
     DeviceFile,
@@ -45,20 +46,20 @@ enum Door {
     WalkFile,
     /// Bounds to take.
     Recommendation,
-    /// Nothing of these; why not.
+    /// None of these, with the reason.
     None(&'static str),
 }
 
 /// A condition that must close a door.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Rule {
-    /// One of the two gaits was reported unsafe.
+    /// One of the two gaits was reported as unsafe.
     Safety,
     /// One of the two gaits has no certificate.
     Certificate,
     /// The subject withdrew.
     Withdrawal,
-    /// The same person has answered.
+    /// The same person has already answered.
     Duplicate,
     /// Both trials gave the same gait, or are the same trial.
     EqualGaits,
@@ -125,7 +126,7 @@ fn door_of(operation: &str) -> Option<Door> {
     })
 }
 
-/// GETs that hand out nothing to walk with, each by name.
+/// GET operations that return nothing to walk with.
 const READ: &str = include_str!("one_door/reads.txt");
 
 fn reads(operation: &str) -> Option<Door> {
@@ -156,7 +157,7 @@ fn operations() -> Vec<String> {
     all
 }
 
-/// A service with a study that waits for an answer about its first two gaits, of which one is younger.
+/// A service with a study that waits for an answer about its first two gaits, one of which is newer.
 struct Scene {
     _folder: TempDir,
     service: Service,
@@ -244,7 +245,7 @@ impl Scene {
         }
     }
 
-    /// A session with the pair, after so many walks.
+    /// A session with the pair, after this number of walks.
     async fn session(&self, walks: u8) -> String {
         let body = json!({"gait_one": self.pair.0, "gait_two": self.pair.1});
         let planned = self.post(&format!("/api/v1/studies/{}/lab-sessions", self.study), &body).await.json();
@@ -565,7 +566,7 @@ async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned
     let before = scene.service.feedback(scene.study).await.len();
     scene.post(&format!("/api/v1/lab-sessions/{session}/answers"), &json!({"number": 1, "answer": "first"})).await;
     scene.post(&format!("/api/v1/lab-sessions/{session}/unblind"), &json!({"reason": "done"})).await;
-    assert_eq!(scene.service.feedback(scene.study).await.len(), before, "the learner hears nothing");
+    assert_eq!(scene.service.feedback(scene.study).await.len(), before, "nothing reaches the learner");
     let rows = lab_sessions::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
     assert!(rows[0].answer().is_some(), "what was said stays in the record");
     let audit = scene.service.fetch("/api/v1/audit").await.text;
@@ -573,7 +574,7 @@ async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned
     scene.service.stop().await;
 }
 
-/// The recommendation names walkable gaits alone.
+/// The recommendation names walkable gaits only.
 #[tokio::test]
 async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certificate() {
     for rule in [Rule::Safety, Rule::Certificate, Rule::Withdrawal] {
@@ -644,7 +645,7 @@ async fn a_plan_made_before_a_safety_report_is_not_written() {
     assert!(is_written().await);
     let feedback = scene.service.feedback(scene.study).await.len();
     scene.close(Rule::Safety).await;
-    assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: the learner hears nothing");
+    assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: nothing reaches the learner");
     assert!(!is_written().await, "and the plan is made anew all the same");
     scene.service.stop().await;
 }

@@ -1,7 +1,7 @@
-//! The description of the REST interface: complete, committed, and what the service really does.
+//! The description of the REST interface: complete, committed, and consistent with the service.
 //!
-//! `GAITWRIGHT_WRITE_OPENAPI=1 cargo test -p gaitwright-tests --test openapi` accepts additions: it writes the committed
-//! file anew. What breaks clients needs `GAITWRIGHT_WRITE_OPENAPI=breaks`.
+//! `GAITWRIGHT_WRITE_OPENAPI=1 cargo test -p gaitwright-tests --test openapi` accepts additions: it rewrites the
+//! committed file. Changes that break clients need `GAITWRIGHT_WRITE_OPENAPI=breaks`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -60,7 +60,7 @@ fn every_operation_describes_rights_parameters_and_responses() {
         }
     }
     assert!(operations > 30, "{operations}");
-    // Every reference leads somewhere.
+    // Every reference has a target.
     let text = document.to_string();
     for reference in text.split("\"$ref\":\"#/components/schemas/").skip(1) {
         let name = reference.split('"').next().unwrap();
@@ -200,7 +200,7 @@ async fn the_description_is_served_and_its_page_needs_nothing_from_elsewhere() {
     service.stop().await;
 }
 
-/// The description, and which of its schemas a real value was held against.
+/// The description, and the schemas that were checked against a real value.
 struct Description {
     document: Value,
     seen: BTreeSet<String>,
@@ -211,14 +211,14 @@ impl Description {
         Self { document: serde_json::from_str(&openapi::text().unwrap()).unwrap(), seen: BTreeSet::new() }
     }
 
-    /// Holds what the service answered to a `GET` against the schema of that answer.
+    /// Checks a response to a `GET` against its schema.
     fn hold(&mut self, path: &str, answer: &Value) {
         let pointer = format!("/paths/{}/get/responses/200/content/application~1json/schema", path.replace('/', "~1"));
         let schema = self.document.pointer(&pointer).unwrap_or_else(|| panic!("{path} is not described")).clone();
         self.fits(&schema, answer, path);
     }
 
-    /// Holds a value against a schema by name.
+    /// Checks a value against a named schema.
     fn hold_named(&mut self, name: &str, value: &Value) {
         self.fits(&json!({ "$ref": format!("#/components/schemas/{name}") }), value, name);
     }
@@ -297,7 +297,7 @@ impl Description {
             properties.extend(more);
             required.extend(needed);
         }
-        // One of several shapes: which one, the value says; all of their names are described.
+        // One of several schemas, chosen by the value. The description has the names of all of them.
         for alternative in schema["oneOf"].as_array().into_iter().flatten() {
             properties.extend(self.shape(alternative).0);
         }
@@ -368,14 +368,14 @@ async fn responses_have_the_described_properties() {
     // No analytic trial has rows that were not met and are shown: the shape is that of the library all the same.
     let row = Violation { row: "SS2_R node 3 C3".to_owned(), amount: 0.004, unit: "m".to_owned() };
     description.hold_named("Violation", &serde_json::to_value(row).unwrap());
-    // Every shape that is written down a second time was held against what it repeats.
+    // Every schema that is declared separately was checked against the type that it describes.
     for shape in ["Bounds", "SearchSpace", "Dimension", "Violation", "Iteration"] {
         assert!(description.seen.contains(shape), "{shape} was not seen among {:?}", description.seen);
     }
     service.stop().await;
 }
 
-/// Every list is a page, and every page is asked for in the same way.
+/// Every list is a page, and every page has the same parameters.
 #[test]
 fn every_list_has_the_same_envelope_and_the_same_parameters() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();

@@ -63,7 +63,7 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     commit(writer).await.unwrap();
     let file = exported(&service.store, study).await;
 
-    // Another record, with rows of its own.
+    // A second record with its own rows.
     let other = Service::start(&folder.path().join("b.db"), Consistent::default(), 1).await;
     let own = other.study(|new| (new.trial_budget, new.seed) = (3, 5)).await;
     other.wait_for(own, &[StudyState::Finished]).await;
@@ -82,7 +82,7 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     assert!(read_through(&file[..file.len() - 7]).is_err());
     assert!(read_through(&b""[..]).is_err());
     let mut reader = fresh.read().await.unwrap();
-    // What can be found out here is not believed.
+    // Certificates and explanations are not imported, because the service can compute them again.
     assert_eq!(certificates::find(&mut reader, certified).await.unwrap(), None);
     assert_eq!(explanations::find(&mut reader, explained).await.unwrap(), None);
     assert!(explanations::is_requested(&mut reader, explained).await.unwrap());
@@ -124,13 +124,13 @@ async fn old_trajectories_are_dropped_and_the_best_kept() {
     let mut writer = service.store.write().await.unwrap();
     certificates::keep(&mut writer, best, &certificate(true)).await.unwrap();
     commit(writer).await.unwrap();
-    // What it started from is kept with it: its problem can be solved again.
+    // Its warm start is kept, so its problem can be solved again.
     let started_from =
         service.trials(study).await.into_iter().find(|trial| trial.id == best).unwrap().warm_started_from;
     assert_eq!(prune(&mut service.store.clone(), 0).await.unwrap(), 5 - u64::from(started_from.is_some()));
     let mut reader = service.store.read().await.unwrap();
     assert!(gaits::get(&mut reader, best).await.is_ok());
-    // Nobody can certify what was dropped, so nobody walks with it.
+    // A pruned gait cannot be certified, so it is not walkable.
     let mut dropped = 0;
     for trial in trials.iter().filter(|trial| trial.id != best && trial.state == TrialState::Converged) {
         if gaits::find(&mut reader, trial.id).await.unwrap().is_none() {
@@ -174,7 +174,7 @@ async fn figures_for_prometheus_count_requests_by_route() {
 
 fn gaitwright(folder: &Path, arguments: &[&str]) -> (bool, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gaitwright-cli"));
-    // The switches of the tests are no settings of the program, which would say so.
+    // The program would report the switches of the tests as unknown settings.
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("GAITWRIGHT_")) {
         command.env_remove(name);
     }
@@ -261,7 +261,7 @@ async fn a_copy_is_restored_with_what_is_in_its_log() {
     let live = folder.path().join("live.db");
     let service = Service::start(&live, Analytic::default(), 1).await;
     service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
-    // By hand, as one should not, but with the log.
+    // A copy by hand, which is not recommended, but together with the log.
     for ending in ["", "-wal"] {
         std::fs::copy(folder.path().join(format!("live.db{ending}")), folder.path().join(format!("copy.db{ending}")))
             .unwrap();

@@ -1,5 +1,5 @@
-//! Whatever bytes come from outside: bodies, forms, headers, cursors, archives. Read or refused; never a failure of the
-//! program.
+//! Arbitrary bytes from outside, as bodies, forms, headers, cursors and archives, are read or refused, and never make
+//! the program fail.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -39,7 +39,7 @@ impl Target {
         Self { service, study: study.to_string(), trial, _folder: folder }
     }
 
-    /// Sends it and requires that the program did not fail.
+    /// Sends a request and requires that the program does not fail.
     async fn stands(&self, request: Request<Body>, what: &str) {
         let shown = format!("{what}: {} {}", request.method(), request.uri());
         let answer = self.service.send(request).await;
@@ -102,7 +102,7 @@ fn any_json() -> impl Strategy<Value = Value> {
     })
 }
 
-/// Draws that are the same every time.
+/// Pseudo-random draws, the same in every run.
 fn drawn<S: Strategy>(strategy: &S) -> Vec<S::Value> {
     let mut runner = TestRunner::deterministic();
     (0..CASES).map(|_| strategy.new_tree(&mut runner).unwrap().current()).collect()

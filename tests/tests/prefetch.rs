@@ -1,4 +1,5 @@
-//! While a person decides, what the study will need next is solved already; the trials are the same as without.
+//! Prefetching: while a person decides, the solves that may follow run already. The trials are the same as without
+//! prefetching.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -13,7 +14,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The trials of a study whose person takes so long for each answer, and who solved them.
+/// The trials of a study with this delay before each answer, and which of them were prefetched.
 async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(4)), 1).await;

@@ -1,5 +1,5 @@
-//! The Python client: every operation it knows is one of the description, and its example runs to the end.
-//! Without a python3 the test says so and is skipped.
+//! The Python client: the description has each of its operations, and its example runs to the end. Without python3 the
+//! test is skipped with a message.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -1,5 +1,5 @@
-//! The command line with the real optimizer, as a person starts it: coarse meshes and no muscles, so that it takes
-//! seconds. `GAITWRIGHT_LONG_TESTS=1` adds a gait with muscles.
+//! The command line with the real optimiser, on coarse meshes and without muscles, so that it takes seconds.
+//! `GAITWRIGHT_LONG_TESTS=1` adds a gait with muscles.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -94,16 +94,16 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     let rows: Vec<&str> = table.lines().collect();
     insta::assert_snapshot!("sweep_header", rows[0]);
     assert!(rows[1].starts_with(&format!("{},converged,", cli::action(reachable))), "{}", rows[1]);
-    // No posture meets these bounds: that is an answer, and one of the six words.
+    // No posture satisfies these bounds, which is a result with one of the six statuses.
     let status = rows[2].strip_prefix(&(cli::action(unreachable) + ",")).unwrap().split(',').next().unwrap();
     assert!(["infeasible", "stalled", "iteration_limit"].contains(&status), "{}", rows[2]);
     assert_eq!(cli::files(folder), ["actions.csv", "gait.json", "many.json", "out.csv"]);
 
-    // A gait of the other variant is refused in words, once for the whole table.
+    // A gait of the other variant is refused with one message for the whole table.
     let output = cli::run(BINARY, folder, &[&sweep[..], &["200", "--muscles", "on"]].concat());
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("it is without muscles, but the problem is with muscles"), "{text}");
+    assert!(text.contains("it was solved without muscles, but the problem is solved with muscles"), "{text}");
 }
 
 /// The answer of a solve as those that start from it name it.
@@ -130,7 +130,7 @@ fn a_gait_names_those_it_came_from() {
     assert_eq!(third["lineage"]["ancestors"], json!([ancestor(&second), ancestor(&first)]));
     assert_ne!(first["lineage"]["id"], second["lineage"]["id"]);
 
-    // For people the same, in words.
+    // The same in the text output.
     let output = gaitwright(folder, &[&["solve", "--warm", "second.json"][..], &COARSE].concat());
     let text = String::from_utf8_lossy(&output.stdout);
     for (words, gait) in [("started from", &second), ("which came from", &first)] {
@@ -179,7 +179,7 @@ fn settings_of_the_solver_are_taken_from_a_file() {
     assert_eq!(gait(&[]), usual);
 }
 
-/// A place that goes away while the solve runs: the figures are printed all the same.
+/// If the output folder is removed during the solve, the figures are still printed.
 #[test]
 fn the_figures_outlive_the_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -198,7 +198,7 @@ fn the_figures_outlive_the_file() {
     assert!(json_of(&output)["status"].is_string());
 }
 
-/// What a command must not write over it leaves as it was: its own input, and the file of a solve that was stopped.
+/// A command does not overwrite its own input, nor the output file of a stopped solve.
 #[cfg(unix)]
 #[test]
 fn a_file_that_is_there_is_not_lost() {
@@ -283,8 +283,8 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
     study.id
 }
 
-/// Ctrl-C ends a study with the usual code and a word on how to go on; the same command then goes on with that study
-/// and with no other.
+/// Ctrl-C ends a study with the usual exit code and a message on how to resume. The same command then resumes that
+/// study only.
 #[cfg(unix)]
 #[tokio::test]
 async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone() {
@@ -335,7 +335,7 @@ async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone
     store.close().await;
 }
 
-/// A trial that the program failed at is no success of the command; what it found is printed all the same.
+/// If a trial fails because of the program, the command fails, and still prints its results.
 #[tokio::test(flavor = "multi_thread")]
 async fn failed_trial_sets_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
@@ -355,7 +355,7 @@ async fn failed_trial_sets_the_exit_code() {
     assert_eq!((&json_of(&output)["study_id"], &json_of(&output)["state"]), (&json!(study), &json!("finished")));
 }
 
-/// Rows are written as they come: a process that is killed leaves what it had.
+/// Rows are written as they are computed, so a killed process leaves the finished rows.
 #[test]
 fn a_killed_sweep_leaves_its_rows() {
     let folder = tempfile::tempdir().unwrap();

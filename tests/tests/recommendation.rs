@@ -1,4 +1,4 @@
-//! What a study recommends, and what it says of the certificate of that gait.
+//! The recommendation of a study, and the certificate of the recommended gait.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -54,7 +54,7 @@ async fn a_study_without_a_gait_has_no_best_trial() {
     assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(!page.contains("the best so far") && !page.contains(">best<"), "{page}");
-    // Figures of a last iterate are no figures of a gait.
+    // The figures of a last iterate are not those of a gait.
     assert!(trials.iter().all(|trial| trial.report.is_some() && trial.gait_rmse_rad.is_none()), "{trials:?}");
     let table = service.fetch(&format!("{api}/trials.csv")).await.text;
     let column = table.lines().next().unwrap().split(',').position(|name| name == "gait_rmse_rad").unwrap();
@@ -129,7 +129,7 @@ fn only(bounds: Option<TunedBounds>) -> Verdicts<impl Fn(&Gait) -> bool> {
     Verdicts { pause: Duration::from_millis(200), passes: move |gait: &Gait| Some(gait.bounds) == bounds }
 }
 
-/// What is recommended once nothing is being certified any more.
+/// The recommendation after all certifications have ended.
 async fn settled(service: &Service, study: StudyId) -> Value {
     for _ in 0..1000 {
         let found = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;

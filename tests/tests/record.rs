@@ -1,4 +1,4 @@
-//! The record: append-only, chained, copied, and a repeated request has one effect.
+//! The record: append-only tables, hash chains, backups, and idempotent requests.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -33,7 +33,7 @@ async fn audit_rows(service: &Service) -> usize {
     audit::page(&mut service.store.read().await.unwrap(), "", None, 10_000).await.unwrap().len()
 }
 
-/// Another program that opens the file and does what it likes.
+/// Another program that opens the file and changes it.
 async fn intruder(database: &Path) -> SqlitePool {
     SqlitePool::connect_with(SqliteConnectOptions::new().filename(database)).await.unwrap()
 }
@@ -146,12 +146,13 @@ async fn evidence_is_append_only_even_for_other_programs() {
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
     let pool = intruder(&folder.path().join("a.db")).await;
-    // One without a result: the result of any other trial is fixed before its proposal is looked at.
+    // A trial without a result, because for any other trial the trigger that protects results fires before the one that
+    // protects proposals.
     let cancelled = "insert into trials (id, study_id, number, action_index, action, reason, state, created_at, \
                      finished_at) select 'X', study_id, 99, 1, action, reason, 'cancelled', created_at, created_at \
                      from trials limit 1";
     sqlx::query(cancelled).execute(&pool).await.unwrap();
-    // The reason matters: a statement that is wrong by itself would be refused, too.
+    // The test checks the reason, because an invalid statement would fail, too.
     for (sql, reason) in [
         ("update feedback set author = 'x'", "feedback is append-only"),
         ("delete from feedback", "feedback is append-only"),

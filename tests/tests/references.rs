@@ -107,7 +107,7 @@ async fn the_form_imports_and_comes_back_as_it_was_typed() {
     assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
     let page = service.fetch(imported.headers["location"].to_str().unwrap()).await;
     assert!(page.status == StatusCode::OK && page.text.contains("S03, level"), "{}", page.text);
-    // The forces in a file of their own; where something is wrong, both files come back.
+    // Forces in a separate file. If the form is refused, it keeps both files.
     let mut forces = "forces\nnRows=9001\nnColumns=2\nendheader\ntime\tground_force_vy\n".to_owned();
     for k in 0..9001 {
         let force = if k % 1000 < 600 { 700 } else { 0 };
@@ -164,7 +164,7 @@ async fn the_table_of_a_gait_comes_back_as_the_same_curves() {
             assert!((found - wanted).abs() < 1e-12, "{name} at {percent} %: {found} {wanted}");
         }
     }
-    // The name of the domain is no excuse for a time that goes back, and columns keep their numbers.
+    // Times must increase even at a change of domain, and errors have the right column number.
     let line = table.lines().nth(12).unwrap();
     let word = body_with(&body, &table.replacen(line, &line.replacen(",DS3_R,", ",DS3_R,x", 1), 1));
     let refused = service.post("/api/v1/reference-gaits", &word).await;

@@ -1,4 +1,4 @@
-//! Results that the broker or the record refuses: each side tries again for a while, and gives up.
+//! Results that the broker or the record refuses: each side retries for a while, then gives up.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -44,7 +44,7 @@ async fn result_that_is_never_recorded_is_delivered_ten_times_and_left_out() {
     let mut deliveries = 0;
     while stream.get_info().await.unwrap().state.messages > 0 {
         assert!(begun.elapsed() < LONGEST, "delivered {deliveries} times");
-        // Its receipt is dropped unsigned.
+        // The result is not acknowledged.
         if tokio::time::timeout(Duration::from_millis(50), engine.next()).await.is_ok() {
             deliveries += 1;
         }

@@ -112,7 +112,7 @@ fn a_short_comparison_ends_in_a_report_that_stands_alone() {
     assert_eq!(read("studies.csv").lines().count(), 3);
     assert_eq!(read("iterations.csv").lines().count(), 3);
     assert_eq!(read("angles.csv").lines().count(), 1 + 4 * 101);
-    // What is finished is not done again, and comes to the same.
+    // Finished studies are not repeated, and the results are the same.
     let again = cli::run(BINARY, folder.path(), &arguments);
     assert_eq!(first.stdout, again.stdout);
     assert_eq!(report, read("report.html"));

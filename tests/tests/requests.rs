@@ -1,4 +1,4 @@
-//! What a request says of itself: conditions, events that were seen, query strings, fields that cannot be read.
+//! Properties of requests: conditions, last received events, query strings, unreadable fields.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -126,7 +126,7 @@ fn the_answers_of_raters_are_described_as_they_are_taken() {
     assert!(words.contains(&json!("cannot_tell")) && words.contains(&json!("unsafe_first")), "{words:?}");
 }
 
-/// Every refusal and failure, whatever makes it: a problem document with the identifier that the header has.
+/// Every refusal and failure is a problem document with the request identifier of the header.
 fn is_complete_problem(answer: &Answer, status: u16, kind: &str) {
     assert_eq!(
         (answer.status.as_u16(), answer.content_type()),
@@ -245,7 +245,7 @@ async fn a_request_with_two_idempotency_keys_is_refused() {
     service.stop().await;
 }
 
-/// A service that believes a proxy on this machine and answers to one name.
+/// A service that trusts a proxy on this machine and accepts one host name.
 async fn behind_a_proxy() -> (TempDir, Service, Router) {
     let (folder, service) = callers::service().await;
     let mut state = service.state();

@@ -1,4 +1,4 @@
-//! What is kept for a while is dropped then, and nothing else.
+//! Expired data is deleted, and nothing else.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -79,7 +79,7 @@ async fn expired_keys_sessions_and_links_are_dropped_and_nothing_else() {
         let expected = match table.as_str() {
             "idempotency_keys" => 1,
             "sessions" | "sign_in_links" => 2,
-            // One of every row that is dropped.
+            // One row of every kind that is deleted.
             "checksums" => 5,
             _ => 0,
         };

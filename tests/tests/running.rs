@@ -1,4 +1,4 @@
-//! What the service does when computing takes long, a task of its own fails or the disk is full.
+//! The service during long computations, failures of background tasks, and with a full disk.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// The service on a port of its own, for clients that wait at the same time.
+/// The service on its own port, for concurrent clients.
 async fn listening(service: &Service) -> String {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -58,19 +58,19 @@ async fn health_answers_while_eight_requests_compute() {
     }
     let computing = begun.elapsed();
     for one in slow {
-        // Slower than the client waits is no fault here.
+        // A response after the time-out of the client is not a failure here.
         assert!(one.join().unwrap().is_ok_and(|status| status == 200) || computing > Duration::from_secs(9));
     }
     times.sort();
     println!("{} answers in {computing:?}, the slowest after {:?}", times.len(), times.last());
     assert!(times.len() > 5, "the learner was too fast to tell: {computing:?}");
-    // The machine may be busy with other things: most answers, and none that waits for a computation.
+    // The machine may be busy, so most responses must be fast, and none may wait for a computation.
     assert!(times[times.len() / 2] < Duration::from_millis(100), "{times:?}");
     assert!(times[times.len() - 1] < computing / 2, "{computing:?}: {times:?}");
     service.stop().await;
 }
 
-/// Sets something of the connection that writes.
+/// Sets a pragma of the writing connection.
 async fn set(service: &Service, pragma: &str) {
     let mut writer = service.store.write().await.unwrap();
     let pragma = sqlx::AssertSqlSafe(format!("pragma {pragma}"));
@@ -142,7 +142,7 @@ async fn full_file_system_loses_nothing_acknowledged_and_is_reported() {
     let mut refused = None;
     for number in 0..2000 {
         if number == 150 {
-            // Fails when nothing more fits. The write-ahead log has begun anew by now and still takes some changes.
+            // Fails when the disk is full. The write-ahead log was restarted and still accepts some changes.
             let _ = std::fs::write(&filler, vec![0; 16 << 20]);
             assert!(service.store.probe().await.is_err_and(|reason| reason.contains("full")));
         }
@@ -212,7 +212,7 @@ async fn studies_are_refused_and_answers_taken_when_space_runs_short() {
     service.stop().await;
 }
 
-/// An engine whose news panic as long as it is asked to.
+/// An engine that panics on receiving messages until told to stop.
 struct Breaks {
     inner: InProcess,
     broken: Arc<AtomicBool>,
@@ -261,7 +261,7 @@ async fn a_panic_of_a_task_is_reported_and_the_task_begun_again() {
     assert_eq!(seen.status, StatusCode::SERVICE_UNAVAILABLE);
     assert!(seen.text.contains("listening to workers") && seen.text.contains("the engine broke"), "{}", seen.text);
     broken.store(false, Ordering::SeqCst);
-    // A study runs to its end after the task was begun again.
+    // A study runs to its end after the task was restarted.
     let study = service.study(|new| new.trial_budget = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
@@ -289,7 +289,7 @@ async fn page_of_a_study_with_7300_answers_stays_small_and_fast() {
     }
     println!("{bytes} bytes in {fastest:?}");
     assert!(bytes < 100_000, "{bytes} bytes");
-    // Four times the limit of a release build: this one is not optimised.
+    // Four times the limit of a release build, because test builds are not optimised.
     assert!(fastest < Duration::from_millis(400), "{fastest:?}");
     service.stop().await;
 }

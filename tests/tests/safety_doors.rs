@@ -1,5 +1,5 @@
-//! A safety report closes a motion: for every trial of the subject that has it, from the moment it is acknowledged,
-//! whatever the clock says, and wherever it can be given.
+//! A safety report applies to every trial of the subject with the same motion, from its acknowledgement on, whatever
+//! the clock, and from every entry point.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -72,7 +72,7 @@ async fn a_report_closes_every_trial_of_the_subject_with_the_same_motion() {
     assert_eq!(planned.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", planned.text);
     let page = service.fetch(&format!("/trials/{}", best.id)).await.text;
     assert!(page.contains("Do not walk with it") && !page.contains("controller.json"), "{page}");
-    // The report is reviewed where it was given.
+    // The report is reviewed in the study in which it was made.
     let review = json!({"verdict": "walkable", "reason": "r"});
     let there = service.post(&format!("/api/v1/trials/{}/safety-reviews", best.id), &review).await;
     assert!(there.status == StatusCode::CONFLICT && there.text.contains("Review the report there"), "{}", there.text);
@@ -93,7 +93,7 @@ async fn one_gait_is_reported_without_another_to_compare_it_with() {
     assert_eq!(controller(&service, &trials[1]).await, StatusCode::CONFLICT);
     let listed = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
     assert_eq!(listed.as_array().unwrap().len(), 2);
-    // The learner hears nothing of it.
+    // The report does not reach the learner.
     assert!(service.feedback(study).await.iter().all(|row| row.author != "K1"));
     service.stop().await;
 }

@@ -1,5 +1,4 @@
-//! What was called unsafe waits for somebody of the staff, who decides with a reason; what was said stays in the
-//! record.
+//! Safety reviews: staff decide about a safety report, with a reason, and the report stays in the record.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -69,7 +68,7 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
     assert_eq!((&said[0]["stands"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(!shown.contains("Do not walk with it") && shown.contains("cleared the gait for walking"), "{shown}");
-    // The rater's answer stands as it was given; that the other gait is better was never said.
+    // The answer of the rater is unchanged, and does not imply that the other gait is better.
     let mut reader = service.store.read().await.unwrap();
     // On which side it was shown is drawn anew each time; the record has it as said of the pair.
     let shown = presentations::of_study(&mut reader, study).await.unwrap().remove(0);
@@ -87,7 +86,7 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
         taken_back.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
         [("K2", "the video was cut")]
     );
-    // So it is asked about again.
+    // The pair can be compared again.
     service.wait_for(study, &[StudyState::Waiting]).await;
     let again = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     assert!(again["pair"].is_object(), "{again}");
@@ -115,7 +114,7 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     assert_eq!(late.status, StatusCode::CONFLICT);
     assert!(late.text.contains("reported as unsafe again, by K3"), "{}", late.text);
 
-    // By the form, which sends what its page has shown.
+    // By the form, which sends the time of the newest report on its page.
     let page = service.fetch(&format!("/trials/{best_id}")).await.text;
     let seen = page.split("name=\"said_until\" value=\"").nth(1).unwrap().split('"').next().unwrap();
     let form = format!("verdict=walkable&author=K2&reason=tried+slowly&said_until={}", seen.replace(':', "%3A"));

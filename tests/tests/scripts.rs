@@ -26,7 +26,7 @@ async fn script_study(service: &Service, trials: u32, parallel: u32) -> StudyId 
         .await
 }
 
-/// What a script of a lab does: ask, measure, tell.
+/// The loop of a lab script: ask, measure, tell.
 async fn run(service: &Service, study: StudyId, worker: &str, trials: usize) -> Vec<(u64, f64)> {
     let mut done = Vec::new();
     for _ in 0..trials {
@@ -94,7 +94,7 @@ async fn a_suggestion_is_sticky_and_each_worker_has_its_own() {
     );
     assert_ne!(service.post(&ask, &of("left")).await.json()["id"], left["id"]);
 
-    // What failed is cancelled, never told, and never reaches the learner.
+    // A failed evaluation is cancelled rather than reported, and does not reach the learner.
     let cancel = format!("/api/v1/trials/{}/cancel", right["id"].as_str().unwrap());
     assert_eq!(service.post(&cancel, &json!({})).await.json()["state"], "cancelled");
     assert_eq!(service.feedback(study).await.len(), 1);
@@ -166,7 +166,7 @@ async fn a_finished_study_is_extended_forked_and_compared() {
 #[tokio::test]
 async fn time_and_a_settled_best_end_a_study() {
     let (_folder, service) = service().await;
-    // Every analytic solve says that it took 0.01 s; a budget is at least one second.
+    // Every analytic solve reports 0.01 s; a budget is at least one second.
     let timed = service.study(|new| (new.trial_budget, new.solve_seconds_budget) = (400, Some(1.0))).await;
     let settled = service.study(|new| (new.trial_budget, new.unchanged_limit) = (400, Some(6))).await;
     let settled = service.wait_for(settled, &[StudyState::Finished]).await;

@@ -1,4 +1,4 @@
-//! Every row that says something is sealed, and what another hand touches is found.
+//! Every row with evidence is sealed, and changes outside the program are detected.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -19,7 +19,7 @@ async fn verify(database: &Path) -> SealCheck {
     seals::verify(&mut pool.acquire().await.unwrap()).await.unwrap()
 }
 
-/// A copy of the record in which somebody who knows `SQLite` did this, and left no other trace.
+/// A copy of the record after this change with SQLite, without any other trace.
 async fn touched(database: &Path, sql: &str) -> PathBuf {
     let copy = database.with_file_name("touched.db");
     std::fs::copy(database, &copy).unwrap();
@@ -92,7 +92,7 @@ async fn seals_and_audit_rows_that_are_missing_are_found_at_the_end_too() {
     assert!(matches!(found, audit::ChainCheck::Broken { .. }), "{found:?}");
 }
 
-/// A row like another one, with a key of its own.
+/// A copy of a row with a different key.
 async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) -> String {
     // Empty where nobody signs in.
     let whole_row = match table {

@@ -1,4 +1,4 @@
-//! `gaitwright serve` as a process: the sign-in link, HTTPS from files, the end.
+//! `gaitwright serve` as a process: the sign-in link, HTTPS from files, shutdown.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -19,9 +19,9 @@ use std::time::Duration;
 /// A service as a process, killed when dropped.
 struct Process {
     child: Child,
-    /// What it said until it was ready.
+    /// Its output until it was ready.
     said: Vec<String>,
-    /// What it says from then on.
+    /// Its output from then on.
     later: Option<JoinHandle<Vec<String>>>,
     origin: String,
 }
@@ -40,7 +40,7 @@ impl Process {
         while !said.last().is_some_and(|line: &String| line.contains(ready)) {
             said.push(lines.next().expect("it ended before it was ready").unwrap());
         }
-        // Whatever it says later must not fill the pipe.
+        // Reads later output, so that the pipe does not fill up.
         let later = std::thread::spawn(move || lines.map_while(Result::ok).collect());
         let listening = said.iter().find(|line| line.contains("listening on ")).unwrap();
         let origin = listening.split("listening on ").nth(1).unwrap().split_whitespace().next().unwrap().to_owned();
@@ -51,7 +51,7 @@ impl Process {
         self.origin.split("://").nth(1).unwrap()
     }
 
-    /// Ends it: everything that it said after it was ready.
+    /// Stops the service and returns its output after it was ready.
     fn end(mut self) -> Vec<String> {
         self.child.kill().unwrap();
         self.later.take().unwrap().join().unwrap()
@@ -136,7 +136,7 @@ fn term_signal_shuts_the_service_down_cleanly() {
     assert!(killed.success());
     assert!(process.child.wait().unwrap().success());
     let log = folder.path().join("gaitwright.db-wal");
-    assert!(!log.exists(), "the write-ahead log is folded into the file");
+    assert!(!log.exists(), "the write-ahead log is merged into the file");
 }
 
 #[test]
@@ -232,7 +232,7 @@ async fn busy_connections_of_nine_addresses_leave_another_address_room() {
         }
     }
     tokio::time::sleep(Duration::from_secs(1)).await;
-    // The other threads of the runtime go on dripping.
+    // The other threads of the runtime continue to send single bytes.
     for call in 0..8 {
         let begun = std::time::Instant::now();
         assert_eq!(get(process.address(), "/health").unwrap().status, 200, "call {call}");

@@ -1,4 +1,4 @@
-//! Signing in: back-off, passwords, sessions and their end, roles, and what ends with a user.
+//! Signing in: back-off, passwords, sessions and their end, roles, and disabling of users.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -50,7 +50,7 @@ async fn change(service: &Service, who: &As, method: &Method, path: &str, body: 
     (answer.status, serde_json::from_str(&answer.text).unwrap_or_default())
 }
 
-/// A service on the record of one that has ended, when what that one wrote last lets go of it.
+/// A service on the record of a stopped one, as soon as that one has released the record.
 async fn start_anew(database: &Path) -> Service {
     for _ in 0..500 {
         if Store::open(database).await.is_ok() {
@@ -66,7 +66,7 @@ async fn trail(service: &Service, action: &str) -> Vec<AuditRow> {
     rows.into_iter().filter(|row| row.action == action).collect()
 }
 
-/// Attempts that were begun and never came to an end, as when the client goes away.
+/// Attempts that were started and never finished, as when the client disconnects.
 async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<Item = String>) {
     let mut writer = service.store.write().await.unwrap();
     let at = now();
@@ -77,7 +77,7 @@ async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<I
     commit(writer).await.unwrap();
 }
 
-/// Signing in by a clock that stands still: no wait is over before the next attempt, however slow the machine is.
+/// Sign-in with a stopped clock, so that no wait ends before the next attempt, however slow the machine is.
 fn standing_still() -> Arc<Access> {
     let at = now();
     Arc::new(Access { clock: Clock::over(move || at), ..Access::by_sign_in(3600.0) })
@@ -121,7 +121,7 @@ async fn known_browser_does_not_wait_for_others_in_its_network() {
     let known = sign_in_from(&service, OWNER, Some(&browser), "Ada", RIGHT).await;
     assert_eq!(known.status, StatusCode::SEE_OTHER);
     assert_eq!(cookie_of(&known, "gaitwright_browser"), browser);
-    // It is known for who signed in there, and its own failures count.
+    // The browser is known for the user who signed in there; its own failures count.
     let other = sign_in_from(&service, OWNER, Some(&browser), "Bob", RIGHT).await.status;
     assert_eq!(other, StatusCode::TOO_MANY_REQUESTS);
     let mut own = Vec::new();
@@ -175,7 +175,7 @@ async fn thirty_thousand_attempts_are_visible_with_their_number() {
     assert_eq!(noted[0].detail["failed_attempts_of_network"], 20_000);
     assert!(noted.len() < 20, "{}", noted.len());
 
-    // What is a day old leaves its number in the trail when it is forgotten.
+    // Counts that are a day old are deleted, and their number is written to the audit trail.
     let mut writer = service.store.write().await.unwrap();
     let origin = Origin { network: "10.0.0.9".to_owned(), known: None };
     let tomorrow = now().plus_seconds(25 * 3600);
@@ -220,7 +220,7 @@ async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
         assert_eq!(refused, StatusCode::CONFLICT, "{path}");
         assert!(problem["detail"].as_str().unwrap().contains("last administrator who can sign in"), "{problem}");
     }
-    // A session without a password is less than the password that would be lost.
+    // A session of a user without a password does not count as an administrator who can sign in.
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
     let ada_session = session_of(&come);
     assert_eq!(post(&service, &me, &disable, &json!({})).await.0, StatusCode::CONFLICT);
@@ -269,7 +269,7 @@ async fn role_changes_hold_from_the_next_request_and_are_audited() {
     service.stop().await;
 }
 
-/// A token that this user made.
+/// A token that this user created.
 async fn token_by(service: &Service, id: UserId, name: &str, role: Role) -> As {
     let actor = Caller::person(id, name, role).actor;
     let mut writer = service.store.write().await.unwrap();
@@ -290,7 +290,7 @@ async fn tokens_and_sessions_end_with_the_user_who_made_them() {
         let session = session_of(&sign_in_from(&service, OWNER, None, name, RIGHT).await);
         made.push((id, session, token_by(&service, id, name, Role::Admin).await));
     }
-    // As an older version wrote it: the maker by name alone.
+    // As an older version wrote it: with only the name of the creator.
     let mut writer = service.store.write().await.unwrap();
     let id = made[2].0;
     sqlx::query("update tokens set maker = null where maker = ?").bind(id).execute(&mut **writer).await.unwrap();
@@ -305,7 +305,7 @@ async fn tokens_and_sessions_end_with_the_user_who_made_them() {
     for ended in [0, 2] {
         assert_eq!([status(&service, &made[ended].1).await, status(&service, &made[ended].2).await], both, "{ended}");
     }
-    // Who administers no more keeps the session, with less, and no token.
+    // A former administrator keeps the session with fewer rights, and loses the tokens.
     assert_eq!(
         send(&service, &root, &Method::PUT, &to(1, "role"), "application/json", "{\"role\": \"rater\"}").await.status,
         StatusCode::OK
@@ -347,7 +347,7 @@ async fn sessions_are_listed_and_ended_one_by_one() {
     let page = send(&service, &desk, &Method::POST, "/account/sessions", FORM, &form).await;
     assert_eq!(page.status, StatusCode::NOT_FOUND);
     assert_eq!(status(&service, &admin).await, StatusCode::OK);
-    // One's own, on the page; and an administrator any, in REST or on the page.
+    // Users end their own sessions on the page; an administrator ends any, over REST or on the page.
     let account = send(&service, &desk, &Method::GET, "/account", "", "").await.text;
     assert!(
         account.contains(&phone_id) && account.contains("this session") && !account.contains(&desk_id),
@@ -412,7 +412,7 @@ async fn clock_that_is_set_back_revives_no_session_token_or_link() {
         async move { router.oneshot(request).await.unwrap().status() }
     };
     assert_eq!([status(&service, &ada).await, status(&service, &script).await], [StatusCode::OK; 2]);
-    // Two days later all are over, and that was seen.
+    // Two days later all sessions have expired, and the service has recorded that time.
     offset.store(2 * 24 * 3600, Ordering::SeqCst);
     let over = [StatusCode::UNAUTHORIZED; 3];
     let all = async |service: &Service| {
@@ -425,7 +425,7 @@ async fn clock_that_is_set_back_revives_no_session_token_or_link() {
     let mut service = start_anew(&folder.path().join("a.db")).await;
     service.access = access(LIMITS, &offset);
     assert_eq!(all(&service).await, over, "and the service started anew");
-    // Whoever comes now has all the time that there is, and time passes.
+    // New sessions have their full lifetime, and time continues.
     let (_, fresh) = user(&service, "Cy", Role::Clinician).await;
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{fresh}"), FORM, "").await;
     assert_eq!(status(&service, &session_of(&come)).await, StatusCode::OK);
@@ -437,7 +437,7 @@ async fn clock_that_is_set_back_revives_no_session_token_or_link() {
     service.stop().await;
 }
 
-/// Reads an event stream until it ends: what came.
+/// Reads an event stream until it ends, and returns its text.
 async fn read_to_end(mut body: axum::body::BodyDataStream) -> String {
     let mut text = Vec::new();
     let all = async {
@@ -510,7 +510,7 @@ async fn event_streams_end_with_what_allowed_them() {
     offset.store(3700, Ordering::SeqCst);
     read_to_end(idle).await;
 
-    // The subject withdraws: no stream of the study goes on, whoever listens.
+    // The subject withdraws consent, which ends every stream of the study.
     let root = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
     let stream = listen(&service, &root, &path).await;
     let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
@@ -525,7 +525,7 @@ fn event_streams_are_made_in_one_place_that_asks_who_listens() {
     let found = sources::of_server();
     let makes = |text: &str| ["Sse::new", "Body::from_stream", "StreamBody"].iter().any(|way| text.contains(way));
     let makers: Vec<&str> = found.iter().filter(|(_, text)| makes(text)).map(|(path, _)| path.as_str()).collect();
-    // An archive is a file that ends.
+    // An archive is a finite response.
     let (files, makers): (Vec<&str>, Vec<&str>) = makers.iter().partition(|path| **path == "http/src/api/archive.rs");
     assert_eq!(files.len(), 1);
     assert!(found.len() > 100 && makers.len() == 1 && makers[0] == "http/src/event_stream.rs", "{makers:?}");

@@ -1,5 +1,5 @@
-//! The statuses that the description names are those that operations give: each refusal that needs no particular state of
-//! the record is provoked here, for every operation.
+//! The statuses in the description are those of the operations. Every refusal that does not depend on the state of the
+//! record is provoked here, for every operation.
 //!
 //! Rights are in `access.rs`, withdrawn consent is in `consent.rs`, bodies beyond the description in `drawn_bodies.rs`.
 
@@ -15,7 +15,7 @@ use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// A service with one thing of most kinds, and their identifiers by the start of their addresses.
+/// A service with one object of most kinds, and their identifiers by the start of their addresses.
 struct Scene {
     _folder: tempfile::TempDir,
     service: Service,

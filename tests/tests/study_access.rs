@@ -1,4 +1,5 @@
-//! Who reaches which study: raters their own, staff those that are open, members those that are restricted.
+//! Access to studies: raters access those they are assigned to, staff access open studies, and members access
+//! restricted ones.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -91,7 +92,7 @@ impl Closed {
         Self { _folder: folder, service, admin, study, names }
     }
 
-    /// Everybody who may do something, and is no member.
+    /// Every caller with rights who is not a member.
     async fn outsiders(&self) -> Vec<(As, &'static str, MemberKind, String)> {
         let mut all = Vec::new();
         for (role, name) in [(Role::Clinician, "a clinician"), (Role::Rater, "a rater")] {
@@ -105,7 +106,7 @@ impl Closed {
     }
 }
 
-/// What the whole service shares: it reveals no study.
+/// Addresses of the whole service, which reveal no study.
 const SHARED: [&str; 7] = ["backups", "subjects", "devices", "reference-gaits", "users", "tokens", "sessions"];
 /// The same of pages.
 const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "reference-gaits"];
@@ -180,7 +181,7 @@ async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() 
             *refused.entry(*name).or_insert(0) += usize::from(there.status == StatusCode::NOT_FOUND);
         }
     }
-    // Who has a right is refused by the study, and not by the right alone.
+    // Callers with the right are refused because of the study, not for lack of a right.
     assert!(refused.values().all(|count| *count > 0) && refused["a clinician"] > 90, "{refused:?}");
     assert_eq!(newest_act(&closed.service).await, before, "nothing was changed");
 
@@ -248,7 +249,7 @@ async fn lists_show_a_restricted_study_to_its_members_alone() {
     everywhere.sort();
     assert_eq!(to_member, everywhere);
 
-    // What the query names is not reached either.
+    // Studies in the query string are not accessible either.
     let (other, who) = (open, &outsiders.iter().find(|(_, name, ..)| *name == "read").unwrap().0);
     let study = closed.study;
     for path in [
@@ -307,7 +308,7 @@ async fn rater_reaches_assigned_studies_alone_until_removed() {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::OK, "{path}");
     }
 
-    // Removed, the rater does not reach the pair in hand either.
+    // A removed rater cannot access the open pair either.
     let remove = format!("/api/v1/study-members/{}/remove", added["id"].as_str().unwrap());
     post(&service, &clinician, &remove, &json!({})).await;
     let twice = send(&service, &clinician, &Method::POST, &remove, JSON, "{}").await;
@@ -325,7 +326,7 @@ async fn rater_reaches_assigned_studies_alone_until_removed() {
     let saved = send(&service, &rater, &Method::GET, &format!("/rate?saved={token}"), "", "").await;
     assert_eq!(saved.status, StatusCode::NOT_FOUND);
 
-    // Assigned anew, the pair is there again.
+    // After a new assignment, the pair is accessible again.
     member(&service, study, MemberKind::User, "a rater").await;
     post(&service, &rater, &answer, &json!({"answer": "first"})).await;
     service.stop().await;

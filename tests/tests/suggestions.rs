@@ -1,4 +1,4 @@
-//! Suggestions, what waits to be solved, and copies asked for by REST.
+//! Suggestions, queued solves, and backups over REST.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

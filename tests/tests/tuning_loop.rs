@@ -1,4 +1,4 @@
-//! The automatic tuning loop: what it records, and that it goes on after an end at any point.
+//! The automatic tuning loop: the rows it records, and resumption after an interruption at any point.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -100,7 +100,7 @@ async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
         }
     }
     assert!(compared > 5, "{compared}");
-    // Whoever starts warm starts from a converged gait.
+    // Every warm start begins at a converged gait.
     assert!(trials.iter().filter(|trial| trial.warm_started_from.is_some()).count() > 5, "{trials:?}");
     for trial in &trials {
         if let Some(from) = trial.warm_started_from {
@@ -186,7 +186,7 @@ async fn several_workers_and_studies_share_the_pool_without_doing_anything_twice
     service.stop().await;
 }
 
-/// Waits until an engine has so many jobs.
+/// Waits until an engine has this number of jobs.
 async fn handed_over(engine: &Away, jobs: usize) -> Vec<Attempt> {
     for _ in 0..2000 {
         let present = engine.jobs.lock().unwrap().clone();
@@ -277,7 +277,7 @@ async fn trial_whose_workers_vanish_is_lost_and_can_be_retried() {
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0);
     assert_eq!(trial.state, TrialState::Lost);
-    assert!(trial.message.contains("lease of its worker ended"), "{}", trial.message);
+    assert!(trial.message.contains("worker's lease expired"), "{}", trial.message);
     assert!(service.feedback(study).await.is_empty(), "what was lost is no result");
 
     let path = format!("/api/v1/studies/{study}/extend");

@@ -74,14 +74,14 @@ async fn rows(database: &Path, layout: &BTreeMap<String, Vec<String>>) -> BTreeM
     all
 }
 
-/// Everything that the old version wrote is there, and the record is whole.
+/// All rows of the old version exist, and the record is intact.
 async fn assert_upgraded(database: &Path, old: &Path) {
     let old_layout = layout(old).await;
     let (before, after) = (rows(old, &old_layout).await, rows(database, &old_layout).await);
     for (table, rows) in &before {
         assert!(!rows.is_empty() || OF_SIGN_IN.contains(&table.as_str()), "{table} has rows");
         let missing: Vec<_> = rows.iter().filter(|row| !after[table].contains(row)).collect();
-        // What the new version adds at start, and how far the database has counted.
+        // Rows that the new version adds at start, and the counters of the database.
         assert!(missing.is_empty() || table == "sqlite_sequence", "{table}: {missing:?}");
     }
     assert_eq!(versions(database).await.last(), Some(&FORM));

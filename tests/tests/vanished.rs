@@ -1,4 +1,4 @@
-//! Files of the record that are deleted, replaced or cut while it is open, and records that lost their end.
+//! Files of an open record that are deleted, replaced or truncated, and records whose end is missing.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -22,7 +22,7 @@ async fn service() -> (TempDir, PathBuf, Service) {
     (folder, database, service)
 }
 
-/// Adds subjects, and says how many were acknowledged and how many refused with 503.
+/// Adds subjects, and returns how many were acknowledged and how many refused with 503.
 async fn add_subjects(service: &Service, name: &str, count: usize) -> (usize, usize) {
     let (mut added, mut refused) = (0, 0);
     for number in 0..count {
@@ -116,7 +116,7 @@ async fn log_that_is_cut_within_a_commit_is_noticed_and_never_reaches_the_file()
         sqlx::query(SUBJECT).execute(&mut **writer).await.unwrap();
         let log = std::fs::OpenOptions::new().write(true).open(beside(&database, "-wal")).unwrap();
         let length = log.metadata().unwrap().len();
-        // SQLite calls this when it was told to commit, before it writes.
+        // SQLite calls this hook at a commit, before it writes.
         writer.lock_handle().await.unwrap().set_commit_hook(move || {
             log.set_len(if lost == 9999 { 100 } else { length - lost }).unwrap();
             true
@@ -149,7 +149,7 @@ async fn changes_in_a_deleted_log_are_saved_when_its_loss_is_noticed() {
     assert_eq!(add_subjects(&service, "S", 40).await, (40, 0));
     std::fs::remove_file(beside(&database, "-wal")).unwrap();
     assert_eq!(add_subjects(&service, "T", 1).await, (0, 1));
-    // As the disk has it when the process is killed now.
+    // The state of the disk if the process were killed at this point.
     let killed = folder.path().join("killed.db");
     for ending in ["", ".anchor"] {
         std::fs::copy(beside(&database, ending), beside(&killed, ending)).unwrap();
@@ -169,7 +169,7 @@ async fn changes_in_a_deleted_log_are_saved_when_its_loss_is_noticed() {
 async fn a_record_that_lost_its_end_is_refused_and_named_by_audit_verify() {
     let (folder, database, service) = service().await;
     assert_eq!(add_subjects(&service, "S", 40).await, (40, 0));
-    // As after a kill with the log deleted: what was folded into the file is there, the rest is not.
+    // As after a kill with a deleted log: only checkpointed changes are in the file.
     let cut = folder.path().join("cut.db");
     for ending in ["", ".anchor"] {
         std::fs::copy(beside(&database, ending), beside(&cut, ending)).unwrap();
@@ -217,7 +217,7 @@ async fn an_earlier_state_of_the_record_is_refused_by_each_anchor_until_it_is_re
     let restored =
         cli::run(binary, folder.path(), &["restore", "early.db", "--database", "a.db", "--anchor", "elsewhere.anchor"]);
     assert!(restored.status.success(), "{restored:?}");
-    // Another past of the same length.
+    // A different history of the same length.
     add("S3").await;
     let other = folder.path().join("other.db");
     std::fs::copy(&database, &other).unwrap();
@@ -334,7 +334,7 @@ async fn verify_backup_and_export_work_on_a_read_only_mount() {
 async fn a_backup_is_finished_without_its_requester_and_refused_when_it_cannot_be_recorded() {
     let (folder, database, service) = service().await;
     let path = "/api/v1/backups";
-    // Whoever asked goes away at once.
+    // The client disconnects at once.
     let nothing = json!({});
     assert_eq!(service.post(path, &nothing).await.status, StatusCode::ACCEPTED);
     let copies = || cli::files(folder.path()).into_iter().filter(|name| name.contains("backup-")).collect::<Vec<_>>();

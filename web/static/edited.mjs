@@ -3,7 +3,7 @@
 
 const FIELDS = "input:not([type=hidden]), select, textarea";
 
-/** @type {(field: Element) => boolean} Whether a field has the focus or another value than it came with. */
+/** @type {(field: Element) => boolean} Whether a field has the focus or a value other than its initial one. */
 function isEdited(field) {
   if (field === document.activeElement) return true;
   if (field instanceof HTMLSelectElement) {

@@ -1,12 +1,12 @@
 // @ts-check
-// How far each of several strides is by one clock: at the same share of the gait cycle, or by time.
+// The positions of several strides on one clock: at the same share of the gait cycle, or at the same time.
 
 /** @typedef {"share" | "time"} Pace */
 
 export class Clocks {
   /**
-   * @param {number[]} seconds What each stride takes.
-   * @param {number} together What a stride takes where all are at the same share.
+   * @param {number[]} seconds Duration of each stride, s.
+   * @param {number} together Duration of the common gait cycle, s, for strides at the same share.
    */
   constructor(seconds, together) {
     this.seconds = seconds;
@@ -17,7 +17,7 @@ export class Clocks {
     this.at = 0;
   }
 
-  /** What the scrubber goes over: one stride, by time the longest one. */
+  /** The range of the scrubber: one stride; by time, the longest one. */
   get round() {
     return this.pace === "share" ? this.together : Math.max(...this.seconds);
   }

@@ -472,7 +472,7 @@ mod tests {
         }
     }
 
-    /// Multipliers by a faulty factorisation, and how often was factorised.
+    /// Multipliers by a faulty factorisation, and the number of factorisations.
     fn multipliers(factor: f64, miscounted: usize, has_another_method: bool) -> (Option<Vec<f64>>, usize) {
         let pattern = |rows, column_starts: &[usize], row_indices: &[usize]| SparsityPattern {
             rows,

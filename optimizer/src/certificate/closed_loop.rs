@@ -22,7 +22,7 @@ const TORQUE: Quantity = Quantity::judged("torques", "N m", 5.0);
 const ANGLE: Quantity = Quantity::judged("joint angles", "rad", 0.01);
 const SPEED: Quantity = Quantity::judged("velocities", "rad/s", 0.2);
 const DEPTH: Quantity = Quantity::judged("feet above the ground", "m", 1e-3);
-const IMPULSE: Quantity = Quantity::judged("landing impulse pulls", "N s", 0.0);
+const IMPULSE: Quantity = Quantity::judged("tensile landing impulse", "N s", 0.0);
 
 /// Simulates [`STRIDES`] strides from the first state of the gait, and measures the distance to it after each stride.
 pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Check>, Fall> {

@@ -36,7 +36,7 @@ const FIELDS: [(&str, &str); 29] = [
         "domains.name",
         "DS2 and DS3: double support; SS2 and SS1: single support on the flat foot and on the toe; R or L: the stance leg",
     ),
-    ("domains.stance", "the stance leg; in double support, the leg that becomes it"),
+    ("domains.stance", "the stance leg; in double support, the leg that becomes the stance leg"),
     ("domains.duration_s", "planned duration, s"),
     ("domains.ends", "the event that ends the domain"),
     (

@@ -24,13 +24,13 @@ pub struct MuscleOverride {
     /// Tendon slack length, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slack_length_m: Option<f64>,
-    /// Largest lever arm at the hip, m.
+    /// Largest moment arm at the hip, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hip_lever_m: Option<f64>,
-    /// Largest lever arm at the knee, m.
+    /// Largest moment arm at the knee, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub knee_lever_m: Option<f64>,
-    /// Largest lever arm at the ankle, m.
+    /// Largest moment arm at the ankle, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ankle_lever_m: Option<f64>,
 }
@@ -97,21 +97,21 @@ impl MuscleOverride {
         ),
         field(
             "hip_lever_m",
-            "largest lever arm at the hip, m",
+            "largest moment arm at the hip, m",
             LEVER_RANGE_M,
             |g| g.hip_lever_m,
             |m| lever(m, Joint::Hip),
         ),
         field(
             "knee_lever_m",
-            "largest lever arm at the knee, m",
+            "largest moment arm at the knee, m",
             LEVER_RANGE_M,
             |g| g.knee_lever_m,
             |m| lever(m, Joint::Knee),
         ),
         field(
             "ankle_lever_m",
-            "largest lever arm at the ankle, m",
+            "largest moment arm at the ankle, m",
             LEVER_RANGE_M,
             |g| g.ankle_lever_m,
             |m| lever(m, Joint::Ankle),
@@ -119,7 +119,7 @@ impl MuscleOverride {
     ];
 }
 
-/// Largest lever arm of a muscle at a joint, m; `None` if the muscle does not span it.
+/// Largest moment arm of a muscle at a joint, m; `None` if the muscle does not span it.
 fn lever(muscle: &Muscle, joint: Joint) -> Option<f64> {
     muscle.attachments.iter().flatten().find(|attachment| attachment.joint() == joint).map(|found| found.lever_m)
 }
@@ -128,7 +128,7 @@ fn lever(muscle: &Muscle, joint: Joint) -> Option<f64> {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MuscleParameters {
-    /// Whether lengths and lever arms scale with body height, and forces with body mass, from the 1.8 m and 80 kg of
+    /// Whether lengths and moment arms scale with body height, and forces with body mass, from the 1.8 m and 80 kg of
     /// the table. Overrides are not scaled.
     pub scaled_to_body: bool,
     /// Hamstrings.
@@ -166,7 +166,7 @@ impl MuscleParameters {
         ]
     }
 
-    /// Checks the range of each override, and that lever arms exist only at joints that the muscle spans.
+    /// Checks the range of each override, and that moment arms exist only at joints that the muscle spans.
     ///
     /// # Errors
     /// [`ModelError`] with the field.

@@ -1,4 +1,4 @@
-//! The ten muscle-tendon units: parameters, attachments, length and lever arms.
+//! The ten muscle-tendon units: parameters, attachments, length and moment arms.
 //!
 //! Parameters are those of the model file of Geyer and Herr 2010 (IEEE TNSRE 18:263). In Geyer's convention, hip and
 //! knee are at 180° when straight and the ankle is at 90°; angles increase with extension and plantarflexion. As
@@ -34,11 +34,11 @@ impl Joint {
 pub struct Attachment {
     /// Index of the joint angle in q: 3 hip_L, 4 knee_L, 5 ankle_L, 6 hip_R.
     pub coordinate: usize,
-    /// Largest lever arm r0, m.
+    /// Largest moment arm r0, m.
     pub lever_m: f64,
     /// Factor rho of the length change.
     pub rho: f64,
-    /// Geyer angle of the largest lever arm, rad; `None` for the constant lever arm at the hip.
+    /// Geyer angle of the largest moment arm, rad; `None` for the constant moment arm at the hip.
     pub angle_of_largest_lever: Option<f64>,
     /// Geyer angle at which the unit has the length l_opt + l_slack, rad.
     pub reference_angle: f64,
@@ -65,7 +65,7 @@ pub struct Muscle {
     pub attachments: [Option<Attachment>; 2],
 }
 
-/// Length contribution and lever arm of an attachment at a joint angle, with derivatives with respect to the angle.
+/// Length contribution and moment arm of an attachment at a joint angle, with derivatives with respect to the angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttachmentValue {
     /// Contribution to the length of the unit, m.
@@ -83,7 +83,7 @@ pub struct AttachmentValue {
 }
 
 impl Attachment {
-    /// Length contribution and lever arm at a joint angle in rad, in the convention of the walker.
+    /// Length contribution and moment arm at a joint angle in rad, in the convention of the walker.
     #[inline]
     pub fn at(&self, angle: f64) -> AttachmentValue {
         let phi = if self.coordinate == 5 { FRAC_PI_2 - angle } else { PI - angle };

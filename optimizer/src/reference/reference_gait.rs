@@ -4,7 +4,7 @@ use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// The built-in reference gait. Its header has citation, licence and processing.
+/// The built-in reference gait. Its header states the source, the licence and the processing.
 const BUILTIN_CSV: &str = include_str!("../../data/reference_gait.csv");
 /// Largest plausible joint angle, rad. Angles in degrees exceed it.
 pub(crate) const LARGEST_ANGLE_RAD: f64 = PI;

@@ -40,7 +40,7 @@ pub(super) fn on_mesh_of(
 ) -> Result<MeshStart, SolveError> {
     if warm.muscles != problem.muscles {
         return Err(SolveError::WarmStartShape(format!(
-            "it is {} muscles, but the problem is {} muscles",
+            "it was solved {} muscles, but the problem is solved {} muscles",
             if warm.muscles { "with" } else { "without" },
             if problem.muscles { "with" } else { "without" }
         )));

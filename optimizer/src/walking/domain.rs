@@ -22,7 +22,8 @@ pub enum DomainKind {
     Ss1,
 }
 
-/// A domain: its contact configuration and its stance leg, in double support the leg that becomes it.
+/// A domain: its contact configuration and its stance leg. In double support this is the leg that becomes the stance
+/// leg.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Domain {
     /// Contact configuration.

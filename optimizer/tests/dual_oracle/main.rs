@@ -10,7 +10,7 @@
 //! | `walker` | bodies, kinematics of chains, inverse dynamics body by body |
 //! | `domains` | the eight domains: contacts, outputs, targets |
 //! | `variables` | the order and the scales of the variables |
-//! | `muscles` | muscle table, length, lever arms, curves |
+//! | `muscles` | muscle table, length, moment arms, curves |
 //! | `rows` | the rows of the gait problem |
 //! | `objective` | cost of transport, regularisation, tracking |
 //! | `comparison` | tests: values, Jacobian, gradient and Hessian |

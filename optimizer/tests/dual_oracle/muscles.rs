@@ -1,9 +1,9 @@
-//! Ten Hill-type muscles after Geyer and Herr 2010: table, length, lever arms, smoothed curves.
+//! Ten Hill-type muscles after Geyer and Herr 2010: table, length, moment arms, smoothed curves.
 
 use crate::{Scalar, constant};
 use std::f64::consts::PI;
 
-/// A spanned joint: index in q, r0 (m), angle of the largest lever arm (degrees; hip: constant arm), reference angle
+/// A spanned joint: index in q, r0 (m), angle of the largest moment arm (degrees; hip: constant arm), reference angle
 /// (degrees), rho, +1 for extensors and -1 for flexors.
 pub(crate) type Joint = (usize, f64, Option<f64>, f64, f64, f64);
 

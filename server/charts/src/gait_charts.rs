@@ -54,7 +54,7 @@ impl Group {
     }
 }
 
-/// So many points are drawn for each of a gait's own.
+/// Number of drawn points for each node of a gait.
 const DRAWN_PARTS: usize = 6;
 
 /// A gait as it is drawn: smooth between its nodes.
@@ -114,7 +114,7 @@ pub fn tiles(figures: Vec<StickFigure>) -> Figure {
     Figure::tiles("The stride", figures)
 }
 
-/// Everything that is drawn of a gait.
+/// All figures of a gait.
 ///
 /// # Errors
 /// When its subject or device is invalid.
@@ -130,7 +130,7 @@ pub fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Mod
     Ok(groups)
 }
 
-/// Phase and hip velocity, which the virtual constraints of most domains hold.
+/// Phase and hip velocity, which the virtual constraints control in most domains.
 fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, ModelError> {
     let made = progress(gait)?;
     let over = |value: fn(&Progress) -> f64| {
@@ -227,7 +227,7 @@ fn portraits(cycle: &Cycle<'_>) -> Group {
         Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, cycle.orbit(q))
     };
     let charts = COORDINATES.iter().enumerate().map(draw).collect();
-    let hint = "Joint angle and velocity over the stride. A closed curve is periodic; a gap is an impact.";
+    let hint = "Joint angle and velocity over the stride. A closed curve is a periodic motion; a gap is an impact.";
     Group::new("portraits", "Phase portraits", hint, charts)
 }
 
@@ -255,7 +255,7 @@ pub fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
     ANGLES.iter().map(chart).collect()
 }
 
-/// The human joint angles of gaits over a reference: name and gait.
+/// The human joint angles of gaits and of a reference. Each gait comes with its name.
 pub fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
     let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |&(title, q, column): &(&str, usize, usize)| {
@@ -268,7 +268,7 @@ pub fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> V
     ANGLES.iter().map(draw).collect()
 }
 
-/// The orbit of each joint, of gaits one over the other: name and gait.
+/// The orbits of each joint, with the orbits of all gaits in one chart. Each gait comes with its name.
 pub fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
     let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |(place, title): (usize, &&str)| {
@@ -286,7 +286,7 @@ pub fn orbit(gait: &Gait, coordinate: usize) -> Vec<(f64, f64)> {
     Cycle::of(&drawn(gait)).orbit(coordinate)
 }
 
-/// Of the first gait and of another one.
+/// Stroke of a gait: solid for the first one, dashed for the others.
 fn stroke(place: usize) -> Stroke {
     if place == 0 { Stroke::Solid } else { Stroke::Dashed }
 }
@@ -308,7 +308,7 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
     let mut starts = Vec::new();
     let mut last = None;
     for (i, r) in iterations.iter().enumerate() {
-        // A phase that begins again (a cold start after a warm one) counts its iterations from a new beginning.
+        // A phase that runs again, in a cold start after a warm one, counts its iterations from zero.
         let again = i > 0 && r.iteration < iterations[i - 1].iteration;
         if last == Some((r.guess, r.phase)) && !again {
             continue;
@@ -322,14 +322,14 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
     starts
 }
 
-/// How the solve went; none before its first iterations.
+/// The progress of a solve; `None` before its second iteration.
 pub fn solve(iterations: &[IterationRecord]) -> Option<Figure> {
     // One point is no line.
     (iterations.len() > 1).then(|| Figure::chart("solve", of_iterations(iterations)))
 }
 
 fn of_iterations(iterations: &[IterationRecord]) -> Chart {
-    // Guesses that ran side by side are shown one after the other.
+    // Guesses that were solved in parallel are drawn one after the other.
     let mut iterations: Vec<&IterationRecord> = iterations.iter().collect();
     iterations.sort_by_key(|r| r.guess);
     let line = |f: fn(&IterationRecord) -> f64| -> Vec<(f64, f64)> {

@@ -1,4 +1,4 @@
-//! A reference gait under what is measured by it, with the band of its standard deviation where it has one.
+//! A reference gait below the curves that are compared with it, with the band of its standard deviation if it has one.
 
 use super::{Chart, Stroke};
 use gait_optimizer::ReferenceGait;
@@ -23,7 +23,7 @@ pub fn over_reference(chart: Chart, reference: &ReferenceGait, column: usize) ->
     chart.with("reference", COLOUR, Stroke::Dotted, rows.map(|row| (row as f64, mean(row))).collect())
 }
 
-/// What is to be known of the band, in words.
+/// A sentence that explains the band.
 pub fn band_in_words(reference: &ReferenceGait) -> &'static str {
     if reference.standard_deviation_rad.is_some() {
         "The band is one standard deviation of the reference gait over its strides."

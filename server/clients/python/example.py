@@ -2,7 +2,7 @@
 
     python3 server/clients/python/example.py http://127.0.0.1:8080 [TOKEN]
 
-`measure` stands for the treadmill: here it likes a foot clearance of 0.026 m and a torso lean of 0.3 rad.
+`measure` stands in for the treadmill. Its Gait RMSE is lowest at a foot clearance of 0.026 m and a torso lean of 0.3 rad.
 """
 
 import sys
@@ -25,7 +25,7 @@ def main():
         try:
             trial = client.ask(study, worker="treadmill")
         except Problem as problem:
-            # Every trial was given out, or the study has ended.
+            # All trials have been handed out, or the study has ended.
             if problem.status == 409:
                 break
             raise

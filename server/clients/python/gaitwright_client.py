@@ -1,4 +1,4 @@
-"""A thin client for scripts of the lab: Python 3.9 or newer, the standard library alone.
+"""A thin client for lab scripts. Needs Python 3.9 or newer, and only the standard library.
 
 Each method is one operation of server/openapi.json; OPERATIONS names them, and a test compares the two.
 """
@@ -41,7 +41,7 @@ OPERATIONS = {
 
 
 class Problem(Exception):
-    """A refusal of the service (RFC 9457): status, detail, and the field where there is one."""
+    """A request that the service refused (RFC 9457): status, detail, and the field if one is named."""
 
     def __init__(self, status, document):
         self.status = status
@@ -51,7 +51,7 @@ class Problem(Exception):
 
 
 class Client:
-    """Talks to one service. A request that changes something is repeated safely when the connection breaks."""
+    """Talks to one service. A request that changes something is safely repeated if the connection breaks."""
 
     def __init__(self, address="http://127.0.0.1:8080", token=None, tries=5, timeout_s=60):
         self.address = address.rstrip("/")
@@ -60,7 +60,7 @@ class Client:
         self.timeout_s = timeout_s
 
     def call(self, name, id=None, body=None, query=None, headers=None):
-        """One operation by its name in OPERATIONS."""
+        """Calls an operation by its name in OPERATIONS."""
         method, path = OPERATIONS[name]
         address = self.address + path.replace("{id}", urllib.parse.quote(str(id), safe=""))
         if query:
@@ -72,7 +72,7 @@ class Client:
         if method != "get":
             data = json.dumps(body or {}).encode()
             sent["content-type"] = "application/json"
-            # The same key in every try: whatever arrived, it counts once.
+            # Every attempt has the same key, so the change is made once, however many requests arrive.
             sent["idempotency-key"] = str(uuid.uuid4())
         request = urllib.request.Request(address, data=data, headers=sent, method=method.upper())
         for attempt in range(self.tries):
@@ -164,7 +164,7 @@ class Client:
 
     # evaluating trials oneself
     def ask(self, study, worker=None):
-        """A trial to evaluate; asking again before telling gives the same one."""
+        """A trial to evaluate. Returns the same trial until its outcome is reported."""
         return self.call("ask", study, {"worker": worker} if worker else {})
 
     def tell_converged(self, trial, gait_rmse_rad=None, cost_of_transport=None):
@@ -186,5 +186,5 @@ class Client:
         return self.call("retract", preference, {"reason": reason})
 
     def suggest(self, study, over, bounds, note=""):
-        """With these bounds it would have been better than in the trial `over`."""
+        """States that a gait with these bounds would have been better than that of the trial `over`."""
         return self.call("suggest", study, {"over": over, "bounds": bounds, "note": note})

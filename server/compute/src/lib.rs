@@ -54,7 +54,7 @@ impl Pool {
     }
 
     /// Computes as soon as a thread is free. Work that has started continues, and keeps its slot, even if the caller
-    /// goes away.
+    /// drops the future.
     ///
     /// # Errors
     /// [`ComputeError`] if the work panics or the process ends.

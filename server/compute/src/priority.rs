@@ -3,11 +3,11 @@
 use std::io;
 use tokio::sync::oneshot;
 
-/// Of threads that compute what somebody waits for: they give way to those that answer.
+/// Threads that compute for a waiting caller; they yield to threads that answer requests.
 pub const COMPUTING: i32 = 5;
-/// Of threads that solve: they give way to whoever waits for an answer.
+/// Threads that solve; they yield to everything that a caller waits for.
 pub const SOLVER: i32 = 10;
-/// Of threads that look into what was solved: they give way to every solve, too.
+/// Threads that certify and explain; they yield to solves, too.
 pub const AFTERWARDS: i32 = 19;
 /// Stack size of solver threads. Block factorisations recurse deeper than the default allows.
 pub const STACK_BYTES: usize = 16 << 20;

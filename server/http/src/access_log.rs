@@ -1,7 +1,7 @@
 //! The layer that writes the access log: views and exports of subjects' data, and refusals.
 //!
-//! It logs every route that is not listed as one without data of subjects, so a new route is logged by default. Views
-//! are collected and written within a second, and repeated views once a minute with their number. An export is written
+//! It logs every route except those listed as free of subject data, so a new route is logged by default. Views are
+//! collected and written within a second, and repeated views once a minute with their number. An export is written
 //! before the response is sent.
 
 use super::AppState;
@@ -92,7 +92,7 @@ impl AccessLog {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts an access; whether the task that writes is still to be started.
+    /// Counts an access. Returns whether the writing task must be started.
     fn count(&self, mut access: Access) -> bool {
         let mut waiting = self.waiting();
         if waiting.rows.len() >= MOST_WAITING && access.kind == Kind::Refused && !waiting.rows.contains_key(&access) {
@@ -145,7 +145,7 @@ impl AccessLog {
     }
 }
 
-/// Rows that wait again where writing them fails, panics or is given up.
+/// Rows that are put back if writing them fails, panics or is cancelled.
 struct Unwritten<'a> {
     log: &'a AccessLog,
     rows: Vec<(Access, Tally)>,
@@ -165,7 +165,7 @@ async fn append(store: &Store, rows: &[(Access, Tally)]) -> StoreResult<()> {
     commit(writer).await
 }
 
-/// Writes what waits, as a task of the service.
+/// Writes pending rows, as a background task of the service.
 async fn keep_writing(app: AppState) {
     let scheduler = app.scheduler.clone();
     scheduler.keep("writing the access log", |task| write_what_waits(app.clone(), task)).await;
@@ -180,7 +180,7 @@ async fn write_what_waits(app: AppState, task: Task) -> Result<(), Error> {
                 task.works();
                 failing = false;
             }
-            // The record takes no changes, as `/ready` says: nothing is lost, and the log says so once.
+            // The record accepts no changes, which `/ready` reports. The rows are kept, and the failure is logged once.
             Err(error) if error.is_of_machine() => {
                 if !std::mem::replace(&mut failing, true) {
                     tracing::error!(%error, "cannot write the access log; keeping its rows");

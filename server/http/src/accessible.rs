@@ -90,8 +90,8 @@ shared!(UserId, "user");
 shared!(TokenId, "token");
 shared!(SessionId, "session");
 
-/// The study of an object, if the caller can access it. What is missing and what is out of reach is refused in the same
-/// words.
+/// The study of an object, if the caller can access it. Missing and inaccessible objects are refused with the same
+/// message.
 async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result<Option<StudyId>, Error> {
     let missing = || StoreError::Missing { what: T::WHAT, id: id.to_string() };
     let study = match id.study(db).await {
@@ -106,7 +106,8 @@ async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result
     Ok(study)
 }
 
-/// The study of what the path names, for [`Idempotent`](super::idempotent::Idempotent), which reads the request afterwards.
+/// The study of the object that the path names, for [`Idempotent`](super::idempotent::Idempotent), which reads the
+/// request afterwards.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OfStudy(pub(super) Option<StudyId>);
 

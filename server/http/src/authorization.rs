@@ -63,7 +63,7 @@ impl<P: Permission, S: Send + Sync> FromRequestParts<S> for Authorized<P> {
     }
 }
 
-/// Who has signed in; none: nobody.
+/// The signed-in user; `None` if nobody is signed in.
 #[derive(Debug)]
 pub(crate) struct SignedIn(pub(crate) Option<Caller>);
 

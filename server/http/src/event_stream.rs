@@ -126,7 +126,7 @@ impl<P: Permission> Sender<P> {
         self.events.send(event).await.map_err(|_| Gone)
     }
 
-    /// Waits until the listener goes away.
+    /// Waits until the listener disconnects.
     pub(crate) async fn closed(&self) {
         self.events.closed().await;
     }

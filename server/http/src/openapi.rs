@@ -1,8 +1,8 @@
 //! Generates the OpenAPI 3.1 description of the REST interface from the handlers.
 //!
-//! What holds for every operation is added here, so that no handler can forget it: the problem documents, the
-//! parameters of pages, the Idempotency-Key of every change whose answer holds no secret, the rules of values, the ways
-//! to say who calls.
+//! The parts that all operations share are added here, so that no handler can omit them: problem documents, paging
+//! parameters, the Idempotency-Key of every change whose response contains no secret, rules of values, and security
+//! schemes.
 
 use super::paging::{DEFAULT_LIMIT, LARGEST_LIMIT};
 use super::problem::{PROBLEM_JSON, Problem};
@@ -19,8 +19,8 @@ use utoipa_axum::router::OpenApiRouter;
         title = "Gaitwright",
         description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
                        not a medical device.\n\nLengths are in metres, masses in kilograms and angles in radians, unless \
-                       a name says otherwise. Times are RFC 3339 in UTC. Whole numbers have no fraction.\n\nLists \
-                       come in pages: `items` has the entries, and `next` is the `cursor` of the next page.",
+                       a name says otherwise. Times are RFC 3339 in UTC. Whole numbers are written without a fraction: 10, \
+                       not 10.0.\n\nLists come in pages: `items` has the entries, and `next` is the `cursor` of the next page.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/"))
@@ -30,7 +30,7 @@ struct Described;
 /// Marks an operation whose response contains a secret. It takes no Idempotency-Key.
 const SHOWN_ONCE: &str = "x-shown-once";
 
-/// The start of the name that a page has in the description as utoipa makes it: `Page_Trial`.
+/// Prefix of the names that utoipa gives to pages, such as `Page_Trial`.
 const PAGE: &str = "Page_";
 
 /// Every route below `/api/v1` as its handler describes it.
@@ -74,7 +74,7 @@ pub fn text() -> Result<String, serde_json::Error> {
     Ok(text)
 }
 
-/// A page has its entries by name, and not once more in full.
+/// Makes pages refer to the schema of their entries instead of repeating it.
 fn refer_to_entries(document: &mut Value) {
     for (name, schema) in document["components"]["schemas"].as_object_mut().into_iter().flatten() {
         if let (Some(entry), Some(items)) = (name.strip_prefix(PAGE), schema.pointer_mut("/properties/items/items")) {
@@ -83,7 +83,7 @@ fn refer_to_entries(document: &mut Value) {
     }
 }
 
-/// Calls a page of trials `TrialPage`, as a programmer would.
+/// Renames the schemas of pages: a page of trials is `TrialPage`.
 fn name_pages(value: Value) -> Value {
     let named = |name: &str| name.strip_prefix(PAGE).map(|entry| format!("{entry}Page"));
     match value {
@@ -113,7 +113,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     if is_page {
         parameters.push(json!({
             "name": "cursor", "in": "query", "required": false, "schema": { "type": "string" },
-            "description": "`next` of the page before; the first page without it"
+            "description": "`next` of the previous page; omit it for the first page"
         }));
         parameters.push(json!({
             "name": "limit", "in": "query", "required": false,

@@ -8,20 +8,22 @@ const GAIT: &str = "A trial of this study with a walkable gait: converged, certi
 const GAIT_OF_STUDY: &str =
     "A converged trial of this study. For `cannot_tell`, its gait is walkable. The two trials have different gaits.";
 const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more.";
-const SPACE: &str = "Each bound has one dimension or none. Its values increase, each within the range of the bound. Its lengthscale lies \
-                     between a hundredth of their smallest step and 10,000 times their range. The smallest a4 exceeds the largest \
-                     a3 by 0.001 or more.";
-const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noises and `tie_width` are 1e-3 to 1e3 times, and the threshold is \
-                       at most 10 times its square root. `additive_share` and `pairwise_share` add up to at most 1. \
-                       `expectation_propagation` needs the link `probit`.";
+const SPACE: &str = "Each bound has at most one dimension. The values of a dimension increase, each within the range of the \
+                     bound. Its lengthscale lies between a hundredth of the smallest step between the values and 10,000 times \
+                     their range. The smallest a4 exceeds the largest a3 by 0.001 or more.";
+const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise scales and `tie_width` are 1e-3 to 1e3 times the \
+                       square root of `signal_variance`, and the threshold is at most 10 times that square root. \
+                       `additive_share` and `pairwise_share` add up to at most 1. `expectation_propagation` needs the link \
+                       `probit`.";
 const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
-const EMG_FILE: &str = "A file of the given form with the columns of the muscles, sampled at 100 Hz or more, with one whole stride or more. \
-                        It has all columns and heel strikes that the request names.";
+const EMG_FILE: &str = "A file of the given form with the columns of the muscles, sampled at 100 Hz or more, with one whole \
+                        stride or more. It has all columns and heel strikes that are named in the request.";
 const MOTION_FILE: &str = "A file of the given form with the angle of one joint or more over several strides, as optimizer/data/README.md \
                            describes it.";
-const REFERENCE_FILE: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five joint angles over at \
-                              least one whole stride of a walking person. It has all columns and heel strikes that the request names.";
+const REFERENCE_FILE: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five \
+                              joint angles over at least one whole stride of a walking person. It has all columns and heel \
+                              strikes that are named in the request.";
 
 /// Component, field, and the rule.
 const RULES: [(&str, &str, &str); 27] = [
@@ -45,11 +47,7 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewStudy", "search_space", SPACE),
     ("NewStudy", "gait_settings", LIMITS),
     ("NewStudy", "learner", LEARNER),
-    (
-        "Extend",
-        "trial_budget",
-        "More than the number of trials begun. For a study that has ended, more than its current budget.",
-    ),
+    ("Extend", "trial_budget", "More than the current budget."),
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
     ("Invitation", "name", "The name of a rater, or one that is not taken."),
     ("Unblind", "rater", "A rater who was shown a pair of this study."),
@@ -66,7 +64,8 @@ const RULES: [(&str, &str, &str); 27] = [
     (
         "Processing",
         "settings",
-        "`band_high_hz` exceeds `band_low_hz` by 1 or more. It is at most 0.495 times the sampling rate; the others, 0.45 times.",
+        "`band_high_hz` exceeds `band_low_hz` by 1 or more, and is at most 0.495 times the sampling rate. The other \
+         frequencies are at most 0.45 times the sampling rate.",
     ),
     ("NewLabAnswer", "number", "At most the number of the current question."),
 ];

@@ -76,7 +76,7 @@ pub(super) fn state(document: &mut Value) {
         for component in ["NewSubject", "NewSession"] {
             add(schemas, component, "notes", &json!({ "pattern": optional }));
         }
-        // A code of the site, without addresses, dates and long numbers.
+        // A code assigned by the site, without addresses, dates and long numbers.
         let pseudonym = r"^(?!(.*[0-9]){6})[A-Za-z0-9_.:/#+()\-][A-Za-z0-9 _.:/#+()\-]*$";
         add(schemas, "NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
@@ -346,7 +346,7 @@ fn add(schemas: &mut Map<String, Value>, component: &str, field: &str, rule: &Va
     }
 }
 
-/// Puts a schema in place of that of a field; what is said of the field stays.
+/// Replaces the schema of a field, and keeps its description.
 fn set(schemas: &mut Map<String, Value>, component: &str, field: &str, mut schema: Value) {
     let Some(present) = property(schemas, component, field) else { return };
     let nested = present.get("oneOf").and_then(|parts| parts.get(0)).and_then(|part| part.get("description"));
@@ -358,7 +358,7 @@ fn set(schemas: &mut Map<String, Value>, component: &str, field: &str, mut schem
     }
 }
 
-/// Puts a schema in place of a component; what is said of the component stays.
+/// Replaces the schema of a component, and keeps its description.
 fn put(schemas: &mut Map<String, Value>, component: &str, mut schema: Value) {
     let Some(present) = schemas.get_mut(component) else { return };
     schema["description"] = present["description"].take();
@@ -379,8 +379,8 @@ fn device(name: &str) -> Value {
     json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
 }
 
-/// The schema of muscle parameters: what is left out stays as in the published table, and a muscle has lever arms only at
-/// the joints that it spans.
+/// The schema of muscle parameters: omitted values are those of the published table, and a muscle has moment arms only
+/// at the joints that it spans.
 fn muscles() -> Value {
     let published = MuscleParameters::default();
     let mut properties = Map::new();

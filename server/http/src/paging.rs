@@ -35,7 +35,7 @@ impl<T> Page<T> {
         (self.items, self.next)
     }
 
-    /// A page of entries that were made of another one's.
+    /// A page whose entries were made from those of another page.
     pub(crate) fn of_parts(items: Vec<T>, next: Option<String>) -> Self {
         Self { items, next }
     }
@@ -76,7 +76,7 @@ pub(crate) struct Unfiltered {}
 /// The page that a request asks for: `cursor` and `limit` of its query, and the rest of it as a filter.
 #[derive(Debug)]
 pub(crate) struct Paging<K, F = Unfiltered> {
-    /// Key of the last entry of the page before; none on the first page.
+    /// Key of the last entry of the previous page; `None` for the first page.
     pub(crate) after: Option<K>,
     /// Which entries.
     pub(crate) filter: F,
@@ -89,7 +89,7 @@ impl<K: Serialize, F> Paging<K, F> {
         self.limit + 1
     }
 
-    /// The page whose entries, and the first one of the next page, were read.
+    /// Makes the page from its entries and, if there is a next page, the first entry of that page.
     pub(crate) fn page<T>(&self, mut rows: Vec<T>, key: impl Fn(&T) -> K) -> Result<Page<T>, Error> {
         let limit = self.limit as usize;
         let last = if rows.len() > limit { rows.get(limit - 1).map(key) } else { None };
@@ -108,7 +108,7 @@ impl<K: Serialize, F> Paging<K, F> {
 }
 
 impl<F> Paging<usize, F> {
-    /// The page of a computed list, whose entries have no keys but their places.
+    /// The page of a computed list, whose entries are identified by their positions.
     pub(crate) fn cut_by_place<T>(&self, rows: Vec<T>) -> Result<Page<T>, Error> {
         Ok(self.cut(rows.into_iter().enumerate().collect(), |(place, _)| *place)?.map(|(_, row)| row))
     }
@@ -146,7 +146,7 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
 
 fn read_cursor<K: DeserializeOwned>(text: &str) -> Result<K, Error> {
     let key = hex::decode(text).ok().and_then(|key| serde_json::from_slice(&key).ok());
-    key.ok_or_else(|| Error::invalid("cursor", text, "`next` of the page before"))
+    key.ok_or_else(|| Error::invalid("cursor", text, "`next` of the previous page"))
 }
 
 fn read_limit(text: &str) -> Result<u32, Error> {

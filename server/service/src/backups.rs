@@ -149,7 +149,7 @@ pub async fn cancel(writer: &mut Writer, actor: &Actor, id: BackupId) -> Result<
 }
 
 impl Requested {
-    /// Begins the backup. Its end does not wait for whoever asked.
+    /// Starts the backup, which finishes even if the caller disconnects.
     pub fn begin(mut self, store: Store, actor: Actor) -> JoinHandle<()> {
         self.begun = true;
         tokio::spawn(async move {

@@ -1,5 +1,5 @@
-//! Gaitwright without HTTP: who may do what ([`access`]), the rules of studies and the tuning loop ([`studies`]), and the
-//! engines that solve ([`workers`]).
+//! Gaitwright without HTTP: access control ([`access`]), the rules of studies and the tuning loop ([`studies`]), and
+//! the engines that solve ([`workers`]).
 //!
 //! Arrows point down: [`access`], [`studies`] -> [`workers`] -> the record.
 

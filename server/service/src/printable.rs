@@ -57,7 +57,7 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
     Ok(text)
 }
 
-/// What tells a person from others by name: neither upper and lower case nor spaces do.
+/// The form of a name that identifies a person: upper and lower case and spaces make no difference.
 pub(crate) fn person(name: &str) -> String {
     name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
 }

@@ -36,7 +36,7 @@ pub(super) struct Restore {
     /// SQLite file to replace; the current one is kept next to it.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
-    /// Second anchor file of the service, which is updated to the backup.
+    /// Second anchor file of the service, which is updated to match the backup.
     #[arg(long, env = "GAITWRIGHT_ANCHOR", value_name = "FILE")]
     anchor: Option<PathBuf>,
 }

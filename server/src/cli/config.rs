@@ -40,7 +40,7 @@ const KNOWN: &[(&str, &str, &str)] = &[
     (
         "proxy_headers",
         "x-forwarded",
-        "headers of these proxies: x-forwarded (X-Forwarded-For, -Proto, -Host) or forwarded",
+        "headers of the trusted proxies: x-forwarded (X-Forwarded-For, -Proto, -Host) or forwarded",
     ),
     ("connections", "1000", "maximum number of open connections, if the system has enough file descriptors"),
     ("connections_per_address", "100", "maximum number of connections from one address; trusted proxies are exempt"),

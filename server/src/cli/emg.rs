@@ -109,7 +109,7 @@ impl Emg {
             Some(path) => {
                 let (normal, strikes) = self.read(path, &self.normal_heel_strikes_s)?;
                 if normal == recording {
-                    let allowed = "a recording other than the one that is compared with it";
+                    let allowed = "a recording other than the one that is processed";
                     return Err(Error::invalid("normal", path.display().to_string(), allowed));
                 }
                 Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?

@@ -103,7 +103,7 @@ enum Command {
     SigningKey(study::NewKey),
     /// List users or create sign-in links for them.
     Users(users::Users),
-    /// Delete old trajectories. Figures, answers and recommended gaits are kept.
+    /// Delete old trajectories. Results, answers and recommended gaits are kept.
     Prune(study::Prune),
 }
 

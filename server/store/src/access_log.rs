@@ -83,7 +83,7 @@ pub struct AccessRow {
     pub created_at: Instant,
     /// Time of the last access.
     pub last_at: Instant,
-    /// Number of equal accesses within a minute.
+    /// Number of identical accesses within a minute.
     pub times: u32,
     /// Kind of the access.
     pub kind: Kind,

@@ -60,7 +60,7 @@ pub struct NewAssessment<'a> {
 /// Adds an assessment.
 ///
 /// # Errors
-/// A violated constraint or trigger, or what the database reports.
+/// A violated constraint or trigger, or errors of the database.
 pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult<AssessmentId> {
     let id = AssessmentId::fresh();
     sqlx::query(
@@ -82,10 +82,10 @@ pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult
     Ok(id)
 }
 
-/// Takes an assessment back. `false`: it was taken back already.
+/// Retracts an assessment. Returns `false` if it was already retracted.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn retract(db: &mut Connection, id: AssessmentId, author: &str, reason: &str) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into remark_retractions (remark_id, author, reason, created_at) values (?, ?, ?, ?) \
@@ -107,7 +107,7 @@ const SELECT: &str = "select m.*, r.author as retracted_by, r.reason as retracte
 /// The assessment with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`], or errors of the database.
 pub async fn get(db: &mut Connection, id: AssessmentId) -> StoreResult<Assessment> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.id = ?"));
     let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
@@ -115,10 +115,10 @@ pub async fn get(db: &mut Connection, id: AssessmentId) -> StoreResult<Assessmen
     row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
 }
 
-/// Every assessment of a study, by time, those that were taken back included.
+/// Every assessment of a study, by time, including retracted ones.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Assessment>> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.study_id = ? order by m.id"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;

@@ -77,11 +77,11 @@ pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bo
     Ok(found.await?.is_some())
 }
 
-/// The trials whose explanations were asked for and are not there, of studies that a caller reaches and of subjects who did
-/// not withdraw, with their studies.
+/// The trials with a requested explanation that is not stored yet, and their studies. Only studies that the caller can
+/// access, of subjects who have not withdrawn consent.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(TrialId, StudyId)>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(
@@ -99,8 +99,8 @@ pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(Tr
     rows.iter().map(|row| Ok((row.try_get("trial_id")?, row.try_get("study_id")?))).collect()
 }
 
-/// The trial whose explanation was asked for first, of those that have none and whose subjects did not withdraw; none of
-/// `refused`.
+/// The trial whose explanation was requested first and is not stored yet. Skips trials in `refused` and of subjects who
+/// have withdrawn consent.
 ///
 /// # Errors
 /// Errors of the database.

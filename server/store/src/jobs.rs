@@ -60,7 +60,7 @@ pub struct OpenSolve {
 /// The solves that have not ended, of studies that a caller reaches.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn open(db: &mut Connection, reach: Reach) -> StoreResult<Vec<OpenSolve>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(
@@ -78,7 +78,7 @@ pub async fn open(db: &mut Connection, reach: Reach) -> StoreResult<Vec<OpenSolv
 /// The solve of a trial, unless it has ended.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn open_of(db: &mut Connection, trial: TrialId) -> StoreResult<Option<OpenSolve>> {
     let sql = "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id \
                where j.state <> 'done' and j.trial_id = ?";
@@ -101,7 +101,7 @@ fn open_solve(row: &SqliteRow) -> StoreResult<OpenSolve> {
 /// How many jobs each worker has.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn by_worker(db: &mut Connection) -> StoreResult<BTreeMap<String, u32>> {
     let sql = "select worker, count(*) as jobs from jobs where state <> 'done' and worker is not null group by worker";
     let rows = sqlx::query(sql).fetch_all(db).await?;

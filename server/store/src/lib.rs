@@ -301,8 +301,7 @@ impl Store {
         if self.writing.space().holds(to) { self.writing.space().room_for(bytes) } else { Ok(()) }
     }
 
-    /// Writes durably, and changes nothing: whether the record takes changes. Asked often, it answers what it found within
-    /// the last second.
+    /// Tests whether the record accepts changes, by a durable write without effect. The result is cached for a second.
     ///
     /// # Errors
     /// Why the record cannot be written.

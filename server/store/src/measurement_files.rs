@@ -134,7 +134,7 @@ const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, crea
 /// The file with this identifier, without its content.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`], or errors of the database.
 pub async fn get(db: &mut Connection, id: MeasurementFileId) -> StoreResult<MeasurementFile> {
     let sql = AssertSqlSafe(format!("{SELECT} where id = ?"));
     let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
@@ -144,7 +144,7 @@ pub async fn get(db: &mut Connection, id: MeasurementFileId) -> StoreResult<Meas
 /// Every file of a session, oldest first, without content.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<MeasurementFile>> {
     let sql = AssertSqlSafe(format!("{SELECT} where session_id = ? order by id"));
     sqlx::query(sql).bind(session).fetch_all(db).await?.iter().map(from_row).collect()
@@ -157,7 +157,7 @@ fn missing(id: MeasurementFileId) -> StoreError {
 /// The content of a file, and how to read it.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`], or errors of the database.
 pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: MeasurementFileId) -> StoreResult<(T, PackedText)> {
     let row = sqlx::query("select reading, raw, raw_sha256 from lab_recordings where id = ?")
         .bind(id)

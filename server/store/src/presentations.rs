@@ -337,7 +337,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Pr
 /// The presentations of a study whose answer is an assessment and was not retracted, in the order of the draws.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
     let assessments: Vec<&str> =
         Judgement::ALL.iter().filter(|said| said.is_assessment()).map(|said| said.as_str()).collect();

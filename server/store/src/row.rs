@@ -202,7 +202,7 @@ impl<'de> Visitor<'de> for CellVisitor {
         };
         match map.next_key::<Name>()? {
             None => Ok(Cell::Blob(bytes)),
-            Some(_) => Err(A::Error::custom("an object has more than a binary value")),
+            Some(_) => Err(A::Error::custom("an object has other fields besides its binary value")),
         }
     }
 }
@@ -317,7 +317,7 @@ mod tests {
             (r#"{"a": {"b": 1}}"#.to_owned(), "invalid type: integer"),
             (r#"{"a": {"b": "00"}}"#.to_owned(), "is not a binary value"),
             (r#"{"a": {"hexadecimal": "0"}}"#.to_owned(), "not hexadecimal"),
-            (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "more than a binary value"),
+            (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "other fields besides its binary value"),
             (r#"{"a": 1, "a": 2}"#.to_owned(), "twice"),
             (r#"{"a": 18446744073709551615}"#.to_owned(), "too large"),
             (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a text has"),

@@ -122,8 +122,8 @@ pub struct GivenBound {
     pub value: f64,
 }
 
-/// Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait was found with all of them, and
-/// one was found without any single one of them.
+/// Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait was found with all of these, but
+/// relaxing any one of them gave a gait.
 #[derive(Debug, ToSchema)]
 pub struct Conflict {
     /// The bounds. Empty if the fixed constraints conflict with each other.
@@ -132,7 +132,8 @@ pub struct Conflict {
     pub without: Option<Vec<String>>,
     /// Naturalness terms that take part, if fixed constraints conflict; absent: none.
     pub naturalness_terms: Option<Vec<String>>,
-    /// What is violated where the search for a gait came nearest, all other tuned bounds at their loosest, worst first.
+    /// Violations of the nearest motion that the search found, with all other tuned bounds at their loosest, worst
+    /// first.
     pub violations: Vec<Violation>,
     /// Number of starting points of the search.
     pub starts: u64,
@@ -149,9 +150,9 @@ pub struct Relaxation {
     pub meaning: String,
     /// Given value.
     pub from: f64,
-    /// The tried value nearest to it that gives a gait. Null if not even the loosest one does.
+    /// The value nearest to the given one that was found to give a gait. Null if not even the loosest value does.
     pub to: Option<f64>,
-    /// The loosest tried value that gives none.
+    /// The loosest tried value that does not give a gait.
     pub not_with: f64,
     /// Whether a solve with that value gave up, so that infeasibility is not certain.
     pub undecided: bool,
@@ -170,9 +171,10 @@ pub struct RelaxedBound {
     pub meaning: String,
     /// Given value.
     pub from: f64,
-    /// The value nearest to it that gives a gait together with the others. Null if not even the loosest one does.
+    /// The value nearest to the given one that gives a gait together with the others. Null if not even the loosest
+    /// value does.
     pub to: Option<f64>,
-    /// The loosest value that gives none together with the others.
+    /// The loosest value that does not give a gait together with the others.
     pub not_with: f64,
 }
 
@@ -307,7 +309,7 @@ pub struct SolveAttempt {
     pub gait_rmse_rad: f64,
     /// Reason if it could not be completed; otherwise empty.
     pub reason: String,
-    /// Which local optimum it ended in, from 1; null where it did not converge.
+    /// Which local optimum it ended in, from 1; null if it did not converge.
     pub basin: Option<u64>,
     /// Whether its gait is the result of the solve.
     pub chosen: bool,
@@ -352,7 +354,7 @@ pub struct Certificate {
     pub objections: Vec<String>,
     /// Every quantity with its worst value and its limit.
     pub checks: Vec<CertificateCheck>,
-    /// How the simulation ended early; null where it did not.
+    /// How the simulation ended early; null if it did not.
     pub fall: Option<String>,
     /// The stride-to-stride map.
     pub return_map: Option<ReturnMap>,
@@ -369,7 +371,7 @@ pub struct CertificateCheck {
     pub name: String,
     /// Unit of value and limit; empty: dimensionless.
     pub unit: String,
-    /// Worst value; null where it could not be determined, which does not pass.
+    /// Worst value; null if it could not be determined, which counts as failed.
     pub value: Option<f64>,
     /// Largest allowed value; null: reported without a judgement.
     pub limit: Option<f64>,
@@ -492,7 +494,7 @@ pub struct ModelActivity {
     pub activation: Vec<f64>,
     /// RMS difference of activation and measured activity.
     pub rms_difference: f64,
-    /// Correlation over the cycle; null where one of them is constant.
+    /// Correlation of both activities over the cycle; null if one of them is constant.
     pub correlation: Option<f64>,
 }
 

@@ -51,13 +51,16 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
         // A process that was killed while creating the file may leave only the list of migrations.
         let other = "select name from sqlite_master where type = 'table' and name not glob '_sqlx*' limit 1";
         if let Some(row) = sqlx::query(other).fetch_optional(pool).await? {
-            return foreign(format!("it is another program's, with a table {:?}", row.try_get::<String, _>(0)?));
+            return foreign(format!(
+                "it belongs to another program: it has the table {:?}",
+                row.try_get::<String, _>(0)?
+            ));
         }
     } else {
         let first = "select description from _sqlx_migrations where version = 1";
         let first: Option<String> = sqlx::query_scalar(first).fetch_optional(pool).await?;
         if first.as_deref() != Some(FILES[0].1) {
-            return foreign("it is another program's, with migrations of its own".to_owned());
+            return foreign("it belongs to another program, which has its own migrations".to_owned());
         }
     }
     if found > known {

@@ -37,7 +37,7 @@ impl Space {
         self.room_for(0)
     }
 
-    /// Refuses where less than the reserve would be free after so many bytes were written.
+    /// Refuses if less than the reserve would be free after writing this number of bytes.
     pub(super) fn room_for(&self, bytes: u64) -> StoreResult<()> {
         let reserve = self.reserve.load(Ordering::Relaxed).max(ONE_CHANGE_BYTES);
         match self.free_bytes() {

@@ -100,7 +100,7 @@ impl FromStr for FeedbackMode {
 pub enum Evaluation {
     /// The service, by optimisation.
     Optimizer,
-    /// Scripts of the lab, which ask for trials and tell their outcomes.
+    /// Lab scripts, which ask for trials and report their outcomes.
     Script,
 }
 
@@ -310,7 +310,7 @@ impl Chosen {
 /// Studies that a caller reaches, newest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn page(db: &mut Connection, reach: Reach, chosen: Chosen) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!(

@@ -97,7 +97,8 @@ pub struct Trial {
     /// How the solve ended.
     #[schema(value_type = Option<schema::SolveStatus>)]
     pub status: Option<SolveStatus>,
-    /// Gait RMSE of a converged gait, rad. The report has that of a last iterate.
+    /// Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
+    /// iterate.
     pub gait_rmse_rad: Option<f64>,
     /// Cost of transport of a converged gait, dimensionless.
     pub cost_of_transport: Option<f64>,
@@ -155,7 +156,7 @@ pub struct TrialEnd {
     pub message: String,
 }
 
-/// Outcome of a trial as told by a script.
+/// Outcome of a trial as reported by a script.
 #[derive(Debug, Clone)]
 pub struct ScriptOutcome {
     /// Converged or not converged.
@@ -341,7 +342,7 @@ pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> Store
     Ok(row.map(|row| row.try_get(0)).transpose()?)
 }
 
-/// Records the outcome told by a script.
+/// Records the outcome that a script reported.
 ///
 /// # Errors
 /// A refusal by a trigger if the trial already has a result; errors of the database.

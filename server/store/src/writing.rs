@@ -19,7 +19,7 @@ use tokio_util::task::AbortOnDropHandle;
 /// The connection, which is lent in the order of requests; `None` after closing.
 type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
 
-/// A log with so many frames goes into the database file.
+/// A log with this number of frames is checkpointed into the database file.
 const LONGEST_LOG: u32 = 1000;
 
 /// Pause before a restart of the flushing task.

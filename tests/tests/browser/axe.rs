@@ -1,14 +1,14 @@
-//! axe-core: accessibility rules that are not ours.
+//! Accessibility checks with axe-core.
 
 use crate::chromium::Tab;
 use gaitwright_tests::skipped::skipped;
 use std::path::{Path, PathBuf};
 
-/// The rules as a script. It is not ours to give on: `.ci/run` brings it.
+/// The script of axe-core. Its licence prevents including it here, so `.ci/run` downloads it.
 pub(crate) struct Axe(String);
 
 impl Axe {
-    /// `None`: it is not here, and none is required.
+    /// `None` if axe-core is not installed and not required.
     pub(crate) fn find() -> Option<Self> {
         let default = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/axe/node_modules/axe-core/axe.min.js");
         let file = std::env::var_os("GAITWRIGHT_AXE").map_or(default, PathBuf::from);
@@ -20,7 +20,7 @@ impl Axe {
         None
     }
 
-    /// What it has against a page, in light and in dark.
+    /// The findings on a page, in light and in dark colours.
     pub(crate) async fn complaints(&self, page: &Tab) -> Vec<String> {
         let mut complaints = Vec::new();
         for scheme in ["light", "dark"] {

@@ -1,4 +1,4 @@
-//! A real Chromium, driven over its own protocol.
+//! Drives Chromium over the DevTools protocol.
 
 use chromiumoxide::Page;
 use chromiumoxide::browser::{Browser, BrowserConfig};
@@ -23,7 +23,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::task::JoinHandle;
 
-/// So often an element is clicked that goes away meanwhile.
+/// Number of attempts to click an element that is replaced meanwhile.
 const CLICKS: u32 = 20;
 /// Where a Chromium may be.
 const PLACES: [&str; 4] =
@@ -56,7 +56,7 @@ pub(crate) struct Chromium {
 }
 
 impl Chromium {
-    /// Starts one, or says why the test is skipped.
+    /// Starts Chromium, or reports why the test is skipped.
     pub(crate) async fn launch() -> Option<Self> {
         let Some(executable) = PLACES.into_iter().find(|place| Path::new(place).exists()) else {
             assert!(std::env::var_os("GAITWRIGHT_REQUIRE_BROWSER").is_none(), "no Chromium is installed");
@@ -121,7 +121,7 @@ impl Tab {
                 list.lock().unwrap().push(event.request.url.clone());
             }
         });
-        // What the console shows: script errors, refused resources, violations of the content policy.
+        // Messages of the console: script errors, refused resources, violations of the content policy.
         let mut logged = page.event_listener::<EventEntryAdded>().await.unwrap();
         let list = Arc::clone(&complaints);
         tokio::spawn(async move {
@@ -145,7 +145,7 @@ impl Tab {
         Self { page, requests, complaints }
     }
 
-    /// Waits until an element is there.
+    /// Waits until an element exists.
     pub(crate) async fn wait_for(&self, selector: &str) {
         for _ in 0..400 {
             if self.page.find_element(selector).await.is_ok() {
@@ -159,7 +159,7 @@ impl Tab {
     /// Waits until an expression is true.
     pub(crate) async fn wait_until(&self, expression: &str) {
         for _ in 0..400 {
-            // While a page gives way to the next one there is nothing to ask.
+            // During navigation no page can evaluate the expression.
             let value = self.page.evaluate(expression.to_owned()).await.ok();
             if value.is_some_and(|v| v.value().and_then(serde_json::Value::as_bool) == Some(true)) {
                 return;
@@ -179,18 +179,18 @@ impl Tab {
         self.page.reload().await.unwrap();
     }
 
-    /// Sets what the person prefers: `prefers-color-scheme`, `prefers-reduced-motion`.
+    /// Emulates preferences of the user: `prefers-color-scheme`, `prefers-reduced-motion`.
     pub(crate) async fn prefer(&self, feature: &str, value: &str) {
         let media = SetEmulatedMediaParams::builder().feature(MediaFeature::new(feature, value)).build();
         self.page.execute(media).await.unwrap();
     }
 
-    /// From now on the page looks as it is printed.
+    /// Emulates print media from here on.
     pub(crate) async fn be_paper(&self) {
         self.page.execute(SetEmulatedMediaParams::builder().media("print").build()).await.unwrap();
     }
 
-    /// By how many pixels the page is wider than the window.
+    /// Number of pixels by which the page is wider than the window.
     pub(crate) async fn beyond(&self) -> String {
         self.value(
             "(() => {
@@ -221,7 +221,7 @@ impl Tab {
 
     /// Clicks an element with the mouse.
     pub(crate) async fn click(&self, selector: &str) {
-        // What a live update replaces between finding and clicking is found again.
+        // Finds the element again if a live update replaces it before the click.
         for _ in 0..CLICKS {
             self.wait_for(selector).await;
             if let Ok(element) = self.page.find_element(selector).await
@@ -246,7 +246,7 @@ impl Tab {
         self.page.find_element(selector).await.unwrap().hover().await.unwrap();
     }
 
-    /// From now on the screen is one to touch.
+    /// Emulates a touch screen from here on.
     pub(crate) async fn become_touch_screen(&self) {
         self.page.execute(SetTouchEmulationEnabledParams::new(true)).await.unwrap();
     }
@@ -272,12 +272,12 @@ impl Tab {
         self.type_text(text).await;
     }
 
-    /// Types into whatever has the focus.
+    /// Types into the focused element.
     pub(crate) async fn type_text(&self, text: &str) {
         self.page.execute(InsertTextParams::new(text)).await.unwrap();
     }
 
-    /// Presses a key; while a page gives way to the next one, a moment later.
+    /// Presses a key, after navigation if a page is loading.
     pub(crate) async fn press(&self, key: &str) {
         for _ in 0..100 {
             if let Ok(body) = self.page.find_element("body").await
@@ -301,7 +301,7 @@ impl Tab {
         self.value(&format!("document.querySelector({selector:?})?.innerText ?? ''")).await
     }
 
-    /// Runs a script; while a page gives way to the next one, a moment later.
+    /// Runs a script, after navigation if a page is loading.
     pub(crate) async fn run(&self, script: &str) {
         for _ in 0..100 {
             if self.page.evaluate(format!("(() => {{ {script} }})()")).await.is_ok() {
@@ -317,8 +317,8 @@ impl Tab {
         self.page.evaluate(script.to_owned()).await.unwrap();
     }
 
-    /// The value of an expression, of a promise its outcome, as JSON text or bare string; while a page gives way to the next
-    /// one, a moment later.
+    /// The value of an expression, or the result of a promise, as JSON text or plain string. Waits for navigation if a
+    /// page is loading.
     pub(crate) async fn value(&self, expression: &str) -> String {
         for _ in 0..100 {
             match self.page.evaluate(expression.to_owned()).await {

@@ -1,4 +1,4 @@
-//! What holds of every page: it fits, it is clean, it can be used by everybody.
+//! Checks of every page: size, contrast and accessibility.
 
 use crate::axe::Axe;
 use crate::chromium::{Chromium, Tab};
@@ -32,14 +32,14 @@ async fn people(site: &Site) {
     }
 }
 
-/// A study that a script evaluates, and its trial that has figures and no gait.
+/// A study that a script evaluates, and its trial that has results but no gait.
 async fn by_script(site: &Site) -> (StudyId, String) {
     let study = site.service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3)).await;
     let ask = async || site.service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
     let trial = ask().await["id"].as_str().unwrap().to_owned();
     let told = json!({"outcome": "converged", "gait_rmse_rad": 0.21});
     site.service.post(&format!("/api/v1/trials/{trial}/tell"), &told).await;
-    // One that is being evaluated.
+    // A trial that is being evaluated.
     ask().await;
     (study, trial)
 }
@@ -68,7 +68,7 @@ async fn withdrawn(site: &Site) -> (String, StudyId) {
     (subject, study)
 }
 
-/// Every page with something on it: name and address.
+/// Every page, with content: name and address.
 async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let study = site.service.study(|new| (new.trial_budget, new.name) = (24, Some(LONG_WORD.to_owned()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
@@ -95,7 +95,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let joints = json!({"walk": 2, "recording": motion()});
     site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &joints).await;
     site.service.post(&format!("/api/v1/lab-sessions/{session}/emg-results"), &json!({})).await;
-    // One that waits for what the person who walked says, and one in which that was said.
+    // A session that waits for the answer of the subject, and one with an answer.
     let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
     let mut walked = Vec::new();
     for _ in 0..2 {
@@ -172,7 +172,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Trials without a gait: one that nobody explained, one that is being explained, and one that was.
+/// Trials without a gait: not explained, being explained, and explained.
 async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
     let study =
         site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits().into()))).await;
@@ -188,11 +188,11 @@ async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
     [trials[0].id, trials[1].id, *id]
 }
 
-/// Names as long as people make them: one word of 60 letters, and 86 characters.
+/// Long names: one word of 60 letters, and 86 characters.
 const LONG_WORD: &str = "Prothesengangoptimierungsverlaufsbeobachtungswiederholungen1";
 const LONG_NAME: &str = "A second tuning of the person with the powered prosthesis, treadmill at 1.1 m/s, shoes";
 const WIDTHS: [i64; 3] = [1280, 768, 320];
-/// What A4 is wide between margins of 1 cm, in pixels of a style sheet.
+/// Width of A4 between margins of 1 cm, in CSS pixels.
 const PAPER: i64 = 718;
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,4 +1,4 @@
-//! In the lab: walks are recorded, and the person who walked says which was better.
+//! The lab pages: walks are recorded, and the subject answers which was better.
 
 use crate::chromium::Chromium;
 use crate::site::Site;
@@ -20,7 +20,7 @@ async fn planned(site: &Site) -> (StudyId, String) {
     (study, session["id"].as_str().unwrap().to_owned())
 }
 
-/// What the subject said, as the learner heard it.
+/// The answer of the subject, as the learner received it.
 async fn heard(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
     let mut rows = site.service.feedback(study).await;
     rows.retain(|row| row.source == Source::Subject);
@@ -36,9 +36,9 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     page.resize(768, 1024).await;
     for walk in 1..=3 {
         page.wait_until(&format!("document.querySelector('h1').innerText.startsWith('Walk {walk}')")).await;
-        // A slip of the finger records nothing.
+        // An accidental tap records nothing.
         page.run("document.querySelector('main button').click()").await;
-        // Clicked twice it is recorded once, and the page goes on.
+        // A double click records one walk, and the page shows the next one.
         page.run("document.querySelector('main [type=checkbox]').checked = true; const b = document.querySelector('main button'); b.click(); b.click()").await;
     }
     page.wait_until("document.querySelector('h1').innerText === 'Which walk was better?'").await;
@@ -51,7 +51,7 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
     }
 
-    // With a finger; taken back; then with the keyboard.
+    // Answers by touch, retracts the answer, then answers with the keyboard.
     page.become_touch_screen().await;
     page.touch("input[value=first]").await;
     page.wait_until("document.querySelector('input:checked')?.value === 'first'").await;
@@ -130,7 +130,7 @@ async fn browser_in_the_lab_answers_without_scripts_and_in_two_tabs() {
     other.click("main form button").await;
     other.wait_for("[role=alert]").await;
     assert!(other.text(".notice.good").await.contains("walk 2 was unsafe"));
-    // Both gaits are closed until the order says which one it was.
+    // Both gaits are unsafe until unblinding shows which one was meant.
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     assert_eq!(page.count(".trials .tag.bad").await, 2);
     assert_eq!(page.count("[data-part=state] [role=alert]").await, 2);
@@ -161,7 +161,7 @@ async fn browser_staff_call_a_gait_unsafe_and_cannot_retract_it() {
     compare.click("main form[method=post] button[type=submit]").await;
     compare.wait_for(".notice.good").await;
     assert!(compare.text(".notice.good").await.contains(&format!("{best} is unsafe")));
-    // The study's page hears of it without being loaded anew, and recommends another one.
+    // The study page updates without reloading, and recommends another gait.
     page.wait_for("[data-part=state] [role=alert]").await;
     page.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;
     assert_eq!(page.count(".trials .tag.bad").await, 1);

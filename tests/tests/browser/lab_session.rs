@@ -1,4 +1,4 @@
-//! A whole lab session, clicked through as a laboratory does it: planned, walked, answered, closed, told.
+//! A whole lab session in the browser: planned, walked, answered, closed and unblinded.
 
 use crate::axe::Axe;
 use crate::chromium::{Chromium, Tab};
@@ -7,7 +7,7 @@ use gaitwright_store::lab_sessions;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 
-/// What axe-core has against the page that is shown, where axe-core is here.
+/// The findings of axe-core on the current page, if axe-core is installed.
 async fn is_for_everybody(axe: Option<&Axe>, page: &Tab, what: &str) {
     if let Some(axe) = axe {
         let complaints = axe.complaints(page).await;
@@ -24,7 +24,7 @@ async fn browser_clicks_through_a_lab_session_from_plan_to_unblinding() {
     let study = site.service.study(|new| new.trial_budget = 6).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
 
-    // Planned from the study's page; the order is drawn and told to nobody.
+    // Planned from the page of the study. The allocation is concealed.
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.click("a[href$='/lab']").await;
     page.wait_for("#gait_one").await;
@@ -38,7 +38,7 @@ async fn browser_clicks_through_a_lab_session_from_plan_to_unblinding() {
     is_for_everybody(axe, &page, "planned").await;
     let at = page.address().await;
 
-    // Walked: the page in the lab knows numbers alone.
+    // Walked: the page in the lab shows only the numbers of walks.
     page.click("main a[href^='/lab/']").await;
     for walk in 1..=3 {
         page.wait_until(&format!("document.querySelector('h1').innerText.startsWith('Walk {walk}')")).await;
@@ -57,7 +57,7 @@ async fn browser_clicks_through_a_lab_session_from_plan_to_unblinding() {
     is_for_everybody(axe, &page, "answered").await;
     page.is_clean(&site.origin).await;
 
-    // Closed, and only then told.
+    // Closed, then unblinded.
     let page = browser.open(&at).await;
     for walk in 1..=3 {
         assert!(page.text("main table").await.contains(&format!("note of walk {walk}")));
@@ -81,7 +81,7 @@ async fn browser_clicks_through_a_lab_session_from_plan_to_unblinding() {
     assert!(!page.text("main table").await.contains("blinded"));
     is_for_everybody(axe, &page, "told").await;
 
-    // The study has heard that the gait of walk 3 was better, and its page says so.
+    // The study has the preference for the gait of walk 3, and its page shows it.
     let session = lab_sessions::of_study(&mut site.service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let (second, third) = session.walked().unwrap();
     let trials = site.service.trials(study).await;

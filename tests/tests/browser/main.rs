@@ -1,5 +1,5 @@
-//! The pages in a real browser. Every name contains `browser`; without a Chromium they say so and are skipped,
-//! unless `GAITWRIGHT_REQUIRE_BROWSER` is set.
+//! The pages in a real browser. Every test name contains `browser`. Without Chromium the tests are skipped with a
+//! message, unless `GAITWRIGHT_REQUIRE_BROWSER` is set.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

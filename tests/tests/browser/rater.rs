@@ -1,4 +1,4 @@
-//! A rater compares two gaits blindly: with whatever is at hand, and when things go wrong.
+//! A rater compares two gaits blind: with mouse, touch and keyboard, and after failures.
 
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
@@ -14,7 +14,7 @@ async fn waiting(site: &Site) -> StudyId {
     study
 }
 
-/// Answers of people, also those that were taken back.
+/// Answers of people, retracted ones included.
 async fn answers(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
     let mut rows = site.service.feedback(study).await;
     rows.retain(|row| row.source == Source::Clinician);
@@ -48,7 +48,7 @@ async fn browser_rater_answers_with_the_mouse_and_takes_it_back() {
     page.click(".notice.good button").await;
     page.wait_until("document.querySelector('.notice.good').textContent.includes('retracted')").await;
     assert!(answers(&site, study).await[0].retraction.is_some());
-    // What was asked is open again.
+    // The retracted comparison is pending again.
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     page.click("main form[action^='/rate/'] button").await;
     page.wait_until("document.querySelector('h1').textContent === 'Pair 2'").await;
@@ -64,7 +64,7 @@ async fn browser_rater_sees_everything_on_a_tablet_either_way_up() {
     let page = at_the_pair(&browser, &site).await;
     for (width, height) in [(768, 1024), (1024, 768)] {
         page.resize(width, height).await;
-        // Both gaits and the three answers can be seen without moving the page.
+        // Both gaits and the three answers are visible without scrolling.
         let bottom = "Math.max(...[...document.querySelectorAll('canvas, .verdict')].map(e => e.getBoundingClientRect().bottom))";
         let bottom: f64 = page.value(bottom).await.parse().unwrap();
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
@@ -128,7 +128,7 @@ async fn browser_rater_reloads_in_the_middle_and_sees_the_same_pair() {
     page.click("input[value=first]").await;
     page.reload().await;
     assert_eq!(page.address().await, pair);
-    // Also from the beginning: what is open comes back.
+    // The rater page also returns to the pending pair.
     let again = at_the_pair(&browser, &site).await;
     assert_eq!(again.address().await, pair);
     assert!(answers(&site, study).await.is_empty());
@@ -195,7 +195,7 @@ async fn browser_rater_who_wants_no_motion_gets_none() {
     browser.close().await;
 }
 
-/// What is chosen and written on the page of a pair.
+/// The chosen answer and the note on the page of a pair.
 const GIVEN: &str = "`${document.querySelector('input:checked')?.value} ${document.querySelector('#note')?.value}`";
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,4 +1,4 @@
-//! Signing in, and what an administrator does.
+//! Signing in, and administration.
 
 use crate::chromium::Chromium;
 use crate::site::Site;
@@ -13,7 +13,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use std::sync::Arc;
 
-/// A service where everybody signs in, and the link of its first administrator.
+/// A service that requires sign-in, and the link of its first administrator.
 async fn guarded() -> (Site, String) {
     let site = Site::start_with(Analytic::default(), |service| {
         service.access = Arc::new(Access::by_sign_in(3600.0));
@@ -37,7 +37,7 @@ async fn browser_signs_in_by_link_then_by_password() {
     page.goto(&site.at(&format!("/sign-in/{link}"))).await;
     page.click("main button").await;
     page.wait_for("a[href='/studies/new']").await;
-    // The link was used up: a password is the next way in, and the page says so.
+    // The link cannot be used again, so the page asks for a password to be set.
     page.click("main .notice a[href='/account']").await;
     page.wait_for("#password").await;
     assert_eq!(
@@ -77,7 +77,7 @@ async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
     page.fill("#token-name", "treadmill").await;
     page.click("button[value=make_token]").await;
     page.wait_until("document.querySelector('.secret')?.textContent.startsWith('gait_') ?? false").await;
-    // The same name again is refused, and says so.
+    // The same name is refused with a reason.
     page.fill("#token-name", "treadmill").await;
     page.click("button[value=make_token]").await;
     page.wait_for(".notice.bad").await;
@@ -91,11 +91,11 @@ async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
     page.wait_for("main h1").await;
     page.wait_until("location.pathname === '/rate'").await;
     assert_eq!(page.count("nav").await, 0);
-    // Without a password there is no way back in: that is said before it is too late.
+    // Without a password the rater could not sign in again, so the page warns in time.
     page.click("main .notice a[href='/account']").await;
     page.wait_for("#password").await;
     assert_eq!(page.value("[...document.querySelectorAll('nav a')].map(a => a.pathname).join()").await, "/rate");
-    // What is for the staff leads back to what is for raters.
+    // Pages for staff redirect raters to their own page.
     page.goto(&site.at("/studies/new")).await;
     page.click("main a").await;
     page.wait_until("location.pathname === '/rate'").await;

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 
-/// A service on a port of its own.
+/// A service on its own port.
 pub(crate) struct Site {
     pub(crate) service: Service,
     pub(crate) origin: String,
@@ -27,7 +27,7 @@ impl Site {
         Self::of(folder, service).await
     }
 
-    /// Of a service that explains why there are no gaits.
+    /// The same for a service that explains trials without a gait.
     pub(crate) async fn start_explaining(solver: Analytic, explain: impl Explain) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start_explaining(&folder.path().join("a.db"), solver, explain).await;
@@ -42,7 +42,7 @@ impl Site {
         Self { service, origin: format!("http://{address}"), address, answering, database, _folder: folder }
     }
 
-    /// With a change to the service before it answers.
+    /// The same with a change to the service before it accepts requests.
     pub(crate) async fn start_with(solver: Analytic, change: impl FnOnce(&mut Service)) -> Self {
         let mut site = Self::start(solver).await;
         site.answering.abort();
@@ -77,7 +77,7 @@ fn answer(service: &Service, listener: TcpListener) -> JoinHandle<()> {
     tokio::spawn(async move { axum::serve(listener, router).await.unwrap() })
 }
 
-/// The port is free again a moment after the one who had it has gone.
+/// The port becomes free a moment after the previous service has stopped.
 async fn bind(address: SocketAddr) -> TcpListener {
     for _ in 0..100 {
         if let Ok(listener) = TcpListener::bind(address).await {

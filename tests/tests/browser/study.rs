@@ -1,4 +1,4 @@
-//! Studies: making one, watching it, answering, asking the learner.
+//! Studies: creation, progress, answers, and the page of the learner.
 
 use crate::chromium::Chromium;
 use crate::site::Site;
@@ -23,7 +23,7 @@ async fn browser_from_nothing_to_a_finished_study_in_three_clicks() {
     page.wait_until("document.querySelectorAll('.trials tbody tr').length === 3").await;
     assert!(!page.text("#trials").await.contains("No trials yet") && page.count("#trials form.filter").await == 1);
     assert_eq!(page.count("[data-part=history] svg.chart").await, 1);
-    // What is recommended can be taken along.
+    // The recommendation can be downloaded.
     let bounds = "document.querySelector('[data-part=best] a[download$=\".json\"]').getAttribute('href')";
     let bounds = page.value(bounds).await;
     let told = site.service.fetch(&bounds).await.json();
@@ -104,7 +104,7 @@ async fn browser_sorts_and_filters_trials_with_and_without_scripts() {
     .await;
     page.wait_until(&format!("{rows} < {all} && {rows} > 0")).await;
     assert_eq!(page.value("document.querySelectorAll('.trials .state:not(.not_converged)').length").await, "0");
-    // The address says what is shown: it can be sent to somebody.
+    // The address contains the selection, so that it can be shared.
     assert!(page.value("location.search").await.contains("state=not_converged"));
     page.is_clean(&site.origin).await;
 
@@ -164,7 +164,7 @@ async fn browser_checks_a_new_study_while_it_is_typed() {
     page.wait_for("#trial_budget[aria-invalid=true]").await;
     page.wait_for("[data-outlook].bad").await;
     page.fill("#trial_budget", "2").await;
-    // What is refused is shown, also where it was folded away.
+    // A refused field is shown, even if its section was collapsed.
     page.run("document.querySelector('#seed').value = 'x'").await;
     page.fill("#name", "a seed that is none").await;
     page.wait_for("details[open] #seed[aria-invalid=true]").await;
@@ -175,7 +175,7 @@ async fn browser_checks_a_new_study_while_it_is_typed() {
     page.fill("[name=values_a5]", "0, 0.02").await;
     page.wait_until("document.querySelector('[data-outlook]').textContent.includes('2 of 2')").await;
     assert_eq!(page.count("[aria-invalid]").await, 0);
-    // Nothing was made by asking.
+    // The check created nothing.
     assert_eq!(site.service.fetch("/api/v1/studies").await.items().as_array().unwrap().len(), 0);
     page.click("button[type=submit]").await;
     page.wait_for("[data-part=state] .state.finished").await;
@@ -243,7 +243,7 @@ async fn browser_hears_of_trials_again_after_the_service_restarted() {
     page.wait_until("document.querySelectorAll('.trials tbody .converged').length >= 1").await;
     let away = |_| tokio::time::sleep(Duration::from_millis(300));
     let site = site.restart(Analytic::slow(Duration::from_millis(60)), away).await;
-    // The same page, not loaded anew.
+    // The same page, without a reload.
     page.run("window.same = true").await;
     page.wait_for("[data-part=state] .state.finished").await;
     assert_eq!(page.value("window.same ?? false").await, "true");
@@ -318,10 +318,10 @@ async fn browser_reports_lost_and_restored_connection() {
         .await;
     page.wait_for("[data-connection][hidden]").await;
     page.wait_for("#live:not(.stale)").await;
-    // What changes is announced.
+    // Changes are announced to screen readers.
     site.service.post(&format!("/api/v1/studies/{study}/pause"), &serde_json::json!({})).await;
     page.wait_until("document.querySelector('[data-announced]').textContent === 'The study is now: paused.'").await;
-    // Ending a study is asked once more.
+    // Stopping a study needs a confirmation.
     page.click("[data-part=state] details summary").await;
     page.click("[data-part=state] button[value=stop]").await;
     page.wait_for("[data-part=state] .state.stopped").await;

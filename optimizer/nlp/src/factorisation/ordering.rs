@@ -20,10 +20,10 @@ pub(crate) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Re
     let count = blocks.parent.len();
     if blocks.block_of_variable.len() != form.n || blocks.block_of_row.len() != form.m {
         return fail(format!(
-            "cover {} variables and {} rows of {} and {}",
+            "they cover {} of {} variables and {} of {} rows",
             blocks.block_of_variable.len(),
-            blocks.block_of_row.len(),
             form.n,
+            blocks.block_of_row.len(),
             form.m
         ));
     }

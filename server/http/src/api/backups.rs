@@ -17,7 +17,7 @@ use gaitwright_store::BackupId;
 
 /// Back up the record
 ///
-/// Writes a backup next to the database and checks it. It is made to its end, even if the caller goes away.
+/// Writes a backup next to the database and checks it. The backup is completed even if the caller disconnects.
 #[utoipa::path(
     post,
     path = "/backups",
@@ -27,7 +27,7 @@ use gaitwright_store::BackupId;
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn create(State(app): State<AppState>, request: Idempotent<Administer>) -> Result<Response, Refusal> {
-    // A task of its own, so that a request whose caller goes away cannot end between its commit and the backup.
+    // A separate task, so that a request whose caller disconnects cannot end between its commit and the backup.
     let accepted = tokio::spawn(async move {
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,

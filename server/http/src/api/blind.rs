@@ -154,7 +154,7 @@ pub(super) async fn answer(
 
 /// Get the reliability of raters
 ///
-/// Agreement with their own earlier answers, position bias of unblinded raters, and unblinded answers.
+/// Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",

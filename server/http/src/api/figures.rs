@@ -52,7 +52,7 @@ pub(super) async fn of_study(
 
 /// Download a figure of a trial
 ///
-/// While the solve is running, its progress. With another trial, the joint angles of both.
+/// While the solve is running, shows its progress. With another trial, shows the joint angles of both.
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",

@@ -22,7 +22,7 @@ use utoipa::ToSchema;
 
 /// List lab sessions of a study
 ///
-/// Without blinded data.
+/// The response omits blinded data.
 #[utoipa::path(
     get,
     path = "/studies/{id}/lab-sessions",
@@ -73,7 +73,7 @@ pub(super) async fn create(
 
 /// Get a lab session
 ///
-/// Without blinded data.
+/// The response omits blinded data.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}",

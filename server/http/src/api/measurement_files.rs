@@ -118,7 +118,7 @@ pub(super) async fn emg(
 
 /// Upload joint angles of a walk
 ///
-/// For limit cycles.
+/// Limit cycles are computed from the file.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/measurement-files/motion",

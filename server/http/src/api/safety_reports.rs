@@ -74,7 +74,7 @@ pub(super) async fn of_study(
 /// Report a gait as unsafe
 ///
 /// The gait, and every trial of the subject with the same motion, is not recommended, compared or walked until staff
-/// have reviewed the report. The learner hears nothing of it.
+/// have reviewed the report. The report does not reach the learner.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reports",

@@ -45,7 +45,7 @@ pub(super) async fn list(
 
 /// End a session
 ///
-/// Of the caller, or of any user for an administrator.
+/// Ends a session of the caller or, for an administrator, of any user.
 #[utoipa::path(
     post,
     path = "/sessions/{id}/end",

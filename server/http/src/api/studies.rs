@@ -109,7 +109,7 @@ pub(super) async fn get(
 
 /// Create a study
 ///
-/// Starts it, unless `start` is false.
+/// Starts the study, unless `start` is false.
 #[utoipa::path(
     post,
     path = "/studies",
@@ -250,7 +250,7 @@ async fn act(
 
 /// Update a study
 ///
-/// Changes its name, priority or number of parallel trials.
+/// Changes the name, priority or number of parallel trials.
 #[utoipa::path(
     patch,
     path = "/studies/{id}",

@@ -36,7 +36,7 @@ fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
     let (descending, name) = sort.strip_prefix('-').map_or((false, sort), |name| (true, name));
     let column = SORTS.into_iter().find(|column| *column == name);
     let column = column.ok_or_else(|| {
-        Error::invalid("sort", sort, &format!("{}; after a minus the largest first", SORTS.join(", ")))
+        Error::invalid("sort", sort, &format!("one of {}, with a leading minus for descending order", SORTS.join(", ")))
     })?;
     Ok((column, descending))
 }
@@ -128,7 +128,7 @@ pub(super) async fn get(
 
 /// Cancel a trial
 ///
-/// Its solve stops within one iteration.
+/// The solve stops within one iteration.
 #[utoipa::path(
     post,
     path = "/trials/{id}/cancel",
@@ -180,7 +180,7 @@ pub(super) async fn retry(
 
 /// List iterations of a solve
 ///
-/// Of the running solve, or as recorded.
+/// The iterations of the running solve so far, or the recorded ones of a solve that has ended.
 #[utoipa::path(
     get,
     path = "/trials/{id}/iterations",

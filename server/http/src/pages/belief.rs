@@ -38,7 +38,7 @@ pub(crate) struct Choice {
 #[template(path = "belief.html")]
 struct BeliefPage {
     study: Study,
-    /// Why nothing is shown; none: it is.
+    /// Why no belief is shown; `None` if it is shown.
     absent: Option<String>,
     shown: Option<Everything>,
 }
@@ -116,10 +116,10 @@ pub(super) async fn get(
     })
 }
 
-/// Every figure of the page; none: there is nothing to believe yet.
+/// Every figure of the page; empty if the page shows no belief.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a bound that is not tuned, [`Error::NotFound`], or what the database and the learner report.
+/// [`Error::Invalid`] for a bound that is not tuned, [`Error::NotFound`], or errors of the database and the learner.
 pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: Choice) -> Result<Vec<Figure>, Error> {
     let Believed::There(snapshot, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
     let draw = move |_: &OnPool| {
@@ -194,7 +194,7 @@ fn show(
     })
 }
 
-/// The two dimensions of the maps: those asked for, else the first two; none where there is one dimension only.
+/// The two dimensions of the maps: the requested ones, by default the first two; `None` if there is only one dimension.
 fn chosen(space: &SearchSpace, choice: &Choice) -> Result<Option<(usize, usize)>, Error> {
     let names: Vec<&str> = space.dimensions().iter().map(|d| d.name.as_str()).collect();
     if names.len() < 2 {
@@ -292,7 +292,7 @@ fn maps(belief: &Belief, snapshot: &StudySnapshot, chosen: Option<(usize, usize)
     Ok(Maps { dimensions, held, figures })
 }
 
-/// What stands below each map.
+/// The text below each map.
 const MAP_NOTES: [&str; 2] = [
     "Mean ± standard deviation. The frame marks the best action.",
     "The small print counts the trials with these two values: yes, converged; no, not converged.",

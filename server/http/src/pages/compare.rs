@@ -338,7 +338,7 @@ impl Submitted {
         Ok((said, identifier("key", &self.key)?))
     }
 
-    /// A digest that tells this answer from another one with the same key.
+    /// A digest that distinguishes this answer from another one with the same key.
     fn fingerprint(&self, study: StudyId) -> String {
         let Self { a, b, answer, source, author, note, key } = self;
         let said = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
@@ -347,7 +347,7 @@ impl Submitted {
 }
 
 fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
-    text.parse().map_err(|_| Error::invalid(field, text, "an identifier of this form"))
+    text.parse().map_err(|_| Error::invalid(field, text, "an identifier from this form"))
 }
 
 /// The outcome of a submitted form.

@@ -90,7 +90,7 @@ pub(super) async fn get(
     page(&DevicePage::of(device, authorized.caller.may(Run::NEEDED)))
 }
 
-/// `POST /devices/{id}`: another device, made of this one.
+/// `POST /devices/{id}`: adds a device that is derived from this one.
 pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,

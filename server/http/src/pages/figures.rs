@@ -130,7 +130,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
         Section {
             id: study::COURSE,
             heading: "Gait RMSE of the best action by iteration",
-            hint: "Figure 3b of the paper; there, a study with muscles and one without.".to_owned(),
+            hint: "Figure 3b of the paper, which compares a study with muscles and one without.".to_owned(),
             figures: charts(study::COURSE, study::course(&snapshots).into_iter().collect()),
         },
         Section {

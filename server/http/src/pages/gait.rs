@@ -87,9 +87,8 @@ pub(super) async fn get(
     };
     let reports = SafetyReports::read(&mut reader, study.id).await?;
     let elsewhere = reports.standing(&trial).and_then(|closed| closed.other_trial(&trial));
-    let unsafe_elsewhere = elsewhere.map(|other| {
-        format!("This gait is also that of {other}, where it was reported as unsafe. Do not walk with it.")
-    });
+    let unsafe_elsewhere =
+        elsewhere.map(|other| format!("The same gait was reported as unsafe in {other}. Do not walk with it."));
     let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = reports;
     for said in [&mut unsafe_by, &mut lifted] {
         said.retain(|closed| closed.trial == id);

@@ -60,7 +60,7 @@ struct Waiting {
     link: String,
 }
 
-/// `GET /`: the studies; for whoever may compare gaits and nothing else, that.
+/// `GET /`: the studies; for raters, their page.
 pub(super) async fn get(
     SignedIn(caller): SignedIn,
     authorized: Result<Authorized<Read>, Refused>,

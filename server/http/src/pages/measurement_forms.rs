@@ -1,4 +1,4 @@
-//! The forms of a lab session for measurement files and filter settings, as typed, and what they say.
+//! The forms of a lab session for measurement files and filter settings, as typed, and their parsed values.
 
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::error::Error;

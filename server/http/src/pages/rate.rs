@@ -35,9 +35,9 @@ struct RatePage {
     nothing: bool,
     /// The answer just given, or else the newest one that can be retracted.
     saved: Option<Saved>,
-    /// Whether whoever asks may read, and so could know which gait is which.
+    /// Whether the caller may read the study, and so could know which gait is which.
     not_blind: bool,
-    /// Whoever asks came by a link that works once, and has no other way in.
+    /// The caller signed in with a one-time link, and has no password.
     no_password: bool,
 }
 
@@ -66,7 +66,7 @@ impl Saved {
 struct PairPage {
     token: String,
     number: u32,
-    /// Whether whoever asks may read, and so could know which gait is which.
+    /// Whether the caller may read the study, and so could know which gait is which.
     not_blind: bool,
     /// The answer, if there is one.
     saved: Option<Saved>,

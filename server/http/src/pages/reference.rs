@@ -1,7 +1,7 @@
 //! The reference page of the REST interface, generated from its description, with a form for each operation.
 //!
-//! Ready-made viewers bring megabytes of script and inline styles, which the content policy refuses. This page is complete
-//! without scripts and loads nothing from other origins.
+//! Ready-made viewers add megabytes of script and inline styles, which the content policy refuses. This page is
+//! complete without scripts and loads nothing from other origins.
 
 use super::error::{Page, page};
 use crate::openapi;

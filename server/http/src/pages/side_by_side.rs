@@ -71,7 +71,7 @@ pub(super) async fn get(
     let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
     let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {
-            return Err(Error::invalid("b", b.to_string(), "a study other than a").into());
+            return Err(Error::invalid("b", b.to_string(), "a study other than study A").into());
         }
         (Some(a), Some(b)) => {
             let (a, b) = (Side::read(&mut reader, a).await?, Side::read(&mut reader, b).await?);

@@ -158,7 +158,7 @@ pub(super) async fn post(
     Ok((StatusCode::UNAUTHORIZED, page(&SignInPage { refused, name, unsent: form.unsent })?).into_response())
 }
 
-/// `GET /sign-in/{link}`: a button, so that whatever only looks at the link does not use it up.
+/// `GET /sign-in/{link}`: a button, so that programs that only preview the link do not use it up.
 pub(super) async fn link(Path(link): Path<String>) -> Page {
     page(&LinkPage { link })
 }

@@ -80,7 +80,7 @@ struct SubjectPage {
     may_run: bool,
     /// The newest ones.
     studies: Vec<StudyRow>,
-    /// Lab sessions of these studies; none after a withdrawal.
+    /// Lab sessions of these studies; empty after a withdrawal.
     sessions: Vec<SessionRow>,
     /// The newest consent row that the form knows, so that a repeated form is recorded once.
     after: i64,

@@ -23,7 +23,7 @@ struct SystemPage {
     /// Version of the database schema.
     form: i64,
     workers: Workers,
-    /// What became of the backup that was just requested.
+    /// The outcome of the backup that was just requested.
     backup: Option<BackupNotice>,
     /// Backups in the folder of the record, newest first: name and bytes.
     copies: Vec<(String, i64)>,
@@ -62,7 +62,7 @@ pub(super) async fn get(authorized: Authorized<Read>, State(app): State<AppState
     show(&app, &authorized.caller, None).await
 }
 
-/// What became of a requested backup.
+/// The outcome of a requested backup.
 enum BackupNotice {
     Complete { file: String },
     Running,
@@ -79,7 +79,7 @@ pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): 
     let requested = app.backups.request(app.store(), &mut writer, actor).await?;
     commit(writer).await?;
     let id = requested.id;
-    // It goes on if it takes longer.
+    // A backup that takes longer continues in the background.
     let _ = tokio::time::timeout(PATIENCE, requested.begin(app.store().clone(), actor.clone())).await;
     let mut reader = app.read().await?;
     let notice = match app.backups.find(&mut reader, id).await? {

@@ -55,7 +55,7 @@ struct UsersPage {
 struct Refused {
     /// Which form.
     act: String,
-    /// Which field; none if no single field is at fault.
+    /// The refused field; `None` if no single field is at fault.
     field: Option<&'static str>,
     message: String,
 }
@@ -161,7 +161,7 @@ impl Asked {
     }
 
     fn id<T: FromStr>(&self) -> Result<T, Error> {
-        self.id.parse().map_err(|_| Error::invalid("id", self.id.as_str(), "an identifier of this page"))
+        self.id.parse().map_err(|_| Error::invalid("id", self.id.as_str(), "an identifier from this page"))
     }
 }
 

@@ -218,7 +218,7 @@ pub fn check(password: &str, name: &str) -> Result<(), Error> {
     }
     if unpredictable(password, name) < LEAST_UNPREDICTABLE {
         let allowed = "hard to guess, such as three unrelated words. Your name, common words, keyboard rows, sequences such as \
-                       1234 and repetitions hardly count";
+                       1234 and repetitions add little";
         return Err(Error::invalid("password", "easy to guess", allowed));
     }
     Ok(())

@@ -4,7 +4,7 @@ use gaitwright_store::rights::Right;
 
 /// A right as a type: what a handler asks for in its arguments.
 pub trait Permission: Send + Sync + 'static {
-    /// The right; none: it is enough to have signed in.
+    /// The right; `None` if being signed in is sufficient.
     const NEEDED: Option<Right>;
 }
 
@@ -20,7 +20,7 @@ macro_rules! permission {
     };
 }
 
-/// Asks for no right: whoever has signed in, and every token.
+/// Asks for no right: any signed-in user and any token qualify.
 #[derive(Debug, Clone, Copy)]
 pub struct Anything;
 

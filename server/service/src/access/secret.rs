@@ -69,7 +69,7 @@ impl Turns {
 pub async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
     let failed = |reason: String| Error::Internal(format!("password hashing failed: {reason}"));
     let turn = AT_ONCE.acquire().await.map_err(|e| failed(e.to_string()))?;
-    // The permit ends with the work, even if the caller goes away earlier.
+    // The permit ends with the work, even if the caller disconnects earlier.
     let work = move || {
         let _turn = turn;
         work()

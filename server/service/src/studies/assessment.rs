@@ -72,7 +72,7 @@ pub async fn give(
     Ok(id)
 }
 
-/// Adds an assessment, tells the learner what follows from it, and tells open pages.
+/// Adds an assessment and the preference derived from it, and notifies open pages.
 ///
 /// # Errors
 /// As [`preference::hear`].
@@ -86,7 +86,7 @@ pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) ->
     Ok(id)
 }
 
-/// Takes an assessment back, and what the learner heard of it.
+/// Retracts an assessment, and the preference that was derived from it.
 ///
 /// # Errors
 /// [`Error::NotFound`], also for an assessment of another study. [`Error::Conflict`] if it was already retracted, or if

@@ -87,7 +87,7 @@ pub struct Beliefs {
 }
 
 impl Beliefs {
-    /// The posterior of a study, computed anew if the log has changed. CPU-bound.
+    /// The posterior of a study, recomputed if the log has changed. CPU-bound.
     ///
     /// # Errors
     /// When the learner cannot work with the log.
@@ -120,7 +120,7 @@ impl Beliefs {
         learner
     }
 
-    /// The belief of a study, computed anew if the log has changed. CPU-bound.
+    /// The belief of a study, recomputed if the log has changed. CPU-bound.
     ///
     /// # Errors
     /// When the learner cannot work with the log.

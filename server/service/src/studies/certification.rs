@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub enum Certification {
     /// The certificate is on record.
     Made(Box<Certificate>),
-    /// The gait that is to be certified.
+    /// There is no certificate yet; the gait to certify.
     Ahead(Packed<Gait>),
 }
 
@@ -43,7 +43,7 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
     Ok(Certification::Ahead(gaits::get(reader, trial).await?))
 }
 
-/// Asks for the certificate of a trial's gait. `None`: it is to be made.
+/// Requests the certificate of a trial's gait. Returns `None` if it does not exist yet.
 ///
 /// # Errors
 /// As [`begin`].

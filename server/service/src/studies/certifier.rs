@@ -72,7 +72,7 @@ impl Certifier {
         }
     }
 
-    /// The gaits that somebody asked for, and where each stands.
+    /// The gaits whose certificates were requested, each with the state of its job.
     pub(super) fn jobs(&self) -> Vec<(TrialId, JobState)> {
         let state = self.state();
         let running = state.running.as_ref().map(|(trial, _)| *trial);

@@ -38,7 +38,7 @@ pub enum Effort {
     Running,
     /// Somebody cancelled it.
     Cancelled,
-    /// It tried, and why it could not.
+    /// The explanation failed, for this reason.
     Refused(String),
 }
 

@@ -101,10 +101,10 @@ async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) 
     })
 }
 
-/// The jobs that have not ended, of studies that a caller reaches, in the order of their identifiers.
+/// The jobs that have not ended, of studies that a caller can access, in the order of their identifiers.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Result<Vec<JobStatus>, Error> {
     let status = |id, study, state, solve| JobStatus { id, study, state, reason: None, solve };
     let mut all: Vec<JobStatus> = runners

@@ -24,7 +24,7 @@ pub struct NewMember {
 /// Who can access a study.
 #[derive(Debug, Clone)]
 pub struct StudyAccess {
-    /// Whether only members and administrators reach it.
+    /// Whether only members and administrators can access the study.
     pub restricted: bool,
     /// Members, in the order in which they were added.
     pub members: Vec<Member>,
@@ -90,7 +90,7 @@ pub async fn end(writer: &mut Writer, actor: &Actor, id: MemberId) -> Result<Mem
 /// member.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn restrict(writer: &mut Writer, caller: &Caller, study: StudyId, restricted: bool) -> Result<(), Error> {
     if members::is_restricted(writer, study).await? != restricted {
         members::set_restricted(writer, study, restricted, caller.actor.as_str()).await?;

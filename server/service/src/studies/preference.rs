@@ -113,7 +113,7 @@ pub enum StandingAnswer {
     Suggestion(FeedbackId),
 }
 
-/// The newest answer of a person to a comparison, through whichever door it came, without retracted answers.
+/// The newest answer of a person to a comparison, whichever entry point it came through, without retracted answers.
 ///
 /// # Errors
 /// Errors of the database.
@@ -143,7 +143,7 @@ pub async fn standing_answer(
     standing_suggestion(db, study, (one, other), author).await
 }
 
-/// Whether a rater's answer counts: staff can retract what the learner heard of it.
+/// Whether a rater's answer counts: staff can retract the preference derived from it.
 async fn stands(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
     if shown.answer.is_none_or(|said| said == Judgement::Withdrawn) {
         return Ok(false);
@@ -196,7 +196,7 @@ pub(super) async fn suggest(
         grounds.admit(trial).map_err(|reason| refuse(format!("the bounds of a walkable gait. {reason}")))?;
         if is_same_gait(trial, over) {
             return Err(refuse(format!(
-                "those of a different gait: trial {} has them, and the same gait",
+                "the bounds of a different gait, but trial {} has these bounds and the same gait",
                 trial.number
             )));
         }

@@ -96,7 +96,7 @@ pub struct SafetyReports {
     motions: Vec<ClosedMotion>,
     /// Reports after which staff decided that the gait may be walked again.
     pub lifted: Vec<Closed>,
-    /// Pairs of which somebody could not tell which gait is better.
+    /// Pairs with an answer "cannot tell".
     pub skipped: Vec<(TrialId, TrialId)>,
 }
 
@@ -210,7 +210,7 @@ impl SafetyReports {
         self.standing(trial).is_some()
     }
 
-    /// Whether somebody could not tell which of the two gaits is better.
+    /// Whether an answer about the two gaits is "cannot tell".
     pub fn is_skipped(&self, (a, b): (TrialId, TrialId)) -> bool {
         self.skipped.iter().any(|pair| *pair == (a, b) || *pair == (b, a))
     }

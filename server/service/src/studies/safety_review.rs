@@ -104,7 +104,7 @@ async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<
     match said {
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
-        // The learner receives what a subject says only at unblinding, and nothing of a report about one gait.
+        // The learner receives the answer of a subject only at unblinding, and does not receive reports about one gait.
         SafetyReportSource::Subject | SafetyReportSource::Alone => Ok(None),
     }
 }

@@ -166,7 +166,7 @@ impl Scheduler {
         self.0.after_solves.as_ref().map(|(certifier, _)| certifier.ask_for(trial)).is_some()
     }
 
-    /// The gaits whose certificates somebody asked for, and where each stands.
+    /// The gaits whose certificates were requested, each with the state of its job.
     pub fn certifying(&self) -> Vec<(TrialId, JobState)> {
         self.0.after_solves.as_ref().map(|(certifier, _)| certifier.jobs()).unwrap_or_default()
     }
@@ -181,7 +181,7 @@ impl Scheduler {
         }
     }
 
-    /// Takes up the explanation of a trial again that somebody had cancelled.
+    /// Resumes the explanation of a trial whose explanation was cancelled.
     pub fn explain_again(&self, trial: TrialId) {
         if let Some((_, explainer)) = &self.0.after_solves {
             explainer.again(trial);

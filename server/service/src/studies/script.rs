@@ -1,7 +1,7 @@
-//! Trials that a lab script evaluates: the script asks for a trial and tells its outcome.
+//! Trials that a lab script evaluates: the script asks for a trial and reports its outcome.
 //!
-//! Asking again before telling returns the same trial. Proposals are computed before the transaction, and written only
-//! if the study has not changed.
+//! Asking again before the report returns the same trial. Proposals are computed before the transaction, and written
+//! only if the study has not changed.
 
 use super::belief::Beliefs;
 use super::choice::{self, ChoiceError};

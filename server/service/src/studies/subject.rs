@@ -146,7 +146,7 @@ fn check_pseudonym(pseudonym: &str) -> Result<(), Error> {
     }
     let digits = pseudonym.chars().filter(|c| c.is_numeric()).count();
     if pseudonym.contains('@') || digits > 5 {
-        return refuse("a code of the site such as S01, not an address, a date or a long number");
+        return refuse("a code assigned by the site, such as S01, not an address, a date or a long number");
     }
     if !pseudonym.chars().all(is_visible) {
         return refuse("made of letters, digits, spaces and the characters - _ . : / # + ( )");

@@ -74,7 +74,7 @@ pub async fn ended(
         return Ok(true);
     }
     // The worker is free already, so the trial is solved again, at most twice.
-    broke(store, lease, "Answers arrived faster than the result could be compared with them.").await
+    broke(store, lease, "New answers kept arriving before the result could be compared with them.").await
 }
 
 /// Records an engineering failure: the job is retried at most twice, then the trial is `failed`.
@@ -99,7 +99,7 @@ pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
     let before = jobs::troubles(&mut writer, lease.job).await?;
     let after = Troubles { losses: before.losses + 1, ..before };
-    let reason = "The lease of its worker ended.";
+    let reason = "The worker's lease expired.";
     let recorded = give_up_or_requeue(&mut writer, lease, Happening::Silent(before), after, reason).await?;
     commit(writer).await?;
     Ok(recorded)

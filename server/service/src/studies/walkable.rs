@@ -106,8 +106,8 @@ pub enum NotWalkable {
     },
     /// Another trial of the subject has the same gait, which has an open safety report.
     #[error(
-        "The gait of trial {number} is also that of {other}, where it was reported as unsafe by {by}. It must not be walked \
-         until staff have cleared it there."
+        "Trial {number} has the same gait as {other}, which was reported as unsafe by {by}. It must not be walked until staff \
+         have cleared it there."
     )]
     SameGaitReportedUnsafe {
         /// Number of the trial.

@@ -55,7 +55,7 @@ fn stable(outcomes: &[Outcome]) -> Statement {
     let fallback = outcomes.iter().filter(|outcome| outcome.passing.is_some()).count();
     let others = match with_gait - passed {
         0 => String::new(),
-        failed => format!("; where it failed, a gait further down passes in {fallback} of {failed} studies"),
+        failed => format!("; where it failed, a lower-ranked gait passes in {fallback} of {failed} studies"),
     };
     Statement {
         paper: "Both gaits walk in stable limit cycles (figure 5)".to_owned(),

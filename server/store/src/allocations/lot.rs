@@ -47,8 +47,8 @@ impl Lot {
         hex::encode(self.nonce)
     }
 
-    /// Whether gait one comes first, if gait one came first in so many unblinded sessions more than gait two. The coin is
-    /// fair up to a lead of two; from three on, the rarer order has a probability of three quarters.
+    /// Whether gait one comes first. `lead` is how many more unblinded sessions gait one came first in than gait two.
+    /// The coin is fair up to a lead of two; from three on, the rarer order has a probability of three quarters.
     pub(super) fn one_first(self, lead: i64) -> bool {
         if lead.unsigned_abs() < TOLERANCE {
             return self.coin();

@@ -32,9 +32,9 @@ pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32,
     Ok(())
 }
 
-/// In how many unblinded sessions of this number gait one came first, less those in which gait two did. A concealed
-/// allocation does not count: the next ones would tell it once they are unblinded. Nor does an imported one, which
-/// another service balanced.
+/// The number of unblinded sessions with this number in which gait one came first, less those in which gait two did. A
+/// concealed allocation does not count, because later ones would reveal it once they are unblinded. Nor does an
+/// imported one, which another service balanced.
 async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
     let row = sqlx::query(
         "select coalesce(sum(2 * a.gait_one_first - 1), 0) from lab_sessions l \

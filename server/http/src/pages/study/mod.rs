@@ -487,7 +487,7 @@ fn view(
     }
 }
 
-/// Warm-start tree; none before the first warm start.
+/// Warm-start tree; `None` before the first warm start.
 pub(super) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>) -> Option<Figure> {
     let places: HashMap<TrialId, usize> = snapshot.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
     let node = |trial: &Trial| Node {

@@ -43,7 +43,7 @@ impl Choice {
             "" => None,
             text => Some(text.parse().map_err(|_| {
                 let known = TrialState::ALL.map(TrialState::as_str).join(", ");
-                Error::invalid("state", text, &format!("nothing, {known}"))
+                Error::invalid("state", text, &format!("empty or one of {known}"))
             })?),
         };
         if !["ascending", DESCENDING].contains(&self.order.as_str()) {

@@ -335,7 +335,7 @@ fn is_of_person(row: &FeedbackRow) -> bool {
         && row.retraction.is_none()
 }
 
-/// Checks that what people are asked about are gaits of the study.
+/// Checks that comparisons are about gaits of the study.
 fn of_gaits<const N: usize>(trials: &HashMap<TrialId, &Trial>, asked: [TrialId; N]) -> Result<(), String> {
     match asked.iter().find(|id| trials.get(*id).is_none_or(|trial| trial.state != TrialState::Converged)) {
         Some(id) => Err(format!("trial {id} is not a gait of this study")),
@@ -405,7 +405,7 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
     Ok(())
 }
 
-/// Checks what was walked and measured in the lab.
+/// Checks lab sessions and their measurement files.
 async fn lab(
     db: &mut Connection,
     pool: &Pool,

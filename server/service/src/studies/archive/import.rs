@@ -126,7 +126,7 @@ async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer, 
                 row.set("forked_from", forked_from.clone().map_or(Cell::Null, Cell::Text));
             }
             if table == "imports" && !trusted {
-                // Nobody vouches for what the archive says of earlier signatures.
+                // No signature vouches for the earlier signatures that the archive lists.
                 row.set("signed_by", Cell::Null);
                 row.set("trusted", Cell::Integer(0));
             }
@@ -168,7 +168,7 @@ async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unp
             Err(does_not_fit(format!("{what} {id} exists here with different content ({})", differing.join(", "))))
         }
         Known::NameTaken(name) => Err(does_not_fit(format!(
-            "another {what} here has the name {name:?}. Rename one of them where it was made"
+            "another {what} here has the name {name:?}. Rename one of them on the system where it was created"
         ))),
     }
 }

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 #[schema(as = Proportion)]
 pub struct Share {
-    /// Number of trials of the proportion.
+    /// Number of cases.
     pub of: u32,
     /// Number of successes.
     pub count: u32,

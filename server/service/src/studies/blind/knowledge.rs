@@ -13,7 +13,7 @@ fn sees_gaits(caller: &Caller) -> bool {
 /// Whether a caller is not blind in any study: besides who sees gaits, a user whose former role allowed it.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn sees_or_saw_gaits(db: &mut Connection, caller: &Caller) -> Result<bool, Error> {
     if sees_gaits(caller) {
         return Ok(true);
@@ -26,7 +26,7 @@ pub async fn sees_or_saw_gaits(db: &mut Connection, caller: &Caller) -> Result<b
 /// rater may have been unblinded, and a controller file of a lab walk shows a gait.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn could_have_known(db: &mut Connection, caller: &Caller, study: StudyId) -> Result<bool, Error> {
     Ok(sees_or_saw_gaits(db, caller).await?
         || presentations::is_unblinded(db, study, &caller.name).await?

@@ -69,8 +69,7 @@ async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, 
 
 /// The presentation for a rater: the open one, or a new one. `None` if no comparison is pending.
 ///
-/// # Errors
-/// [`Error::NotFound`], or what the database and the learner report.
+/// # Errors [`Error::NotFound`], or errors of the database and the learner.
 pub async fn next<'a>(
     store: &'a mut Store,
     caller: &Caller,
@@ -378,8 +377,8 @@ pub async fn unblind(
     pairs.retain(|sided| sided.presentation.rater == rater);
     if pairs.is_empty() {
         return Err(Error::conflict(
-            "The archive of this study did not include the sides of this rater's pairs. Unblind the rater where the study \
-             was made.",
+            "The archive of this study did not include the sides of this rater's pairs. Unblind the rater on the \
+             system where the study was created.",
         ));
     }
     let detail = json!({ "rater": rater, "reason": reason });

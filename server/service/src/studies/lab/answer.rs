@@ -1,7 +1,7 @@
 //! The subject's answer in a lab session: which walk was better.
 //!
-//! It becomes a preference, or an assessment, at unblinding: what the learner hears is shown to everybody who may
-//! read, and whoever was in the lab would know the order from it.
+//! It becomes a preference, or an assessment, at unblinding: preferences are visible to every reader, and a person who
+//! was in the lab could infer the allocation from them.
 
 use super::question::{can_be_retracted, next_number, next_walk};
 use super::session::{InTheLab, in_the_lab, still_open};
@@ -41,9 +41,8 @@ pub struct NewAnswer {
 
 /// Records the answer of the subject.
 ///
-/// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if there is another answer, or before all walks are recorded:
-/// a safety report is taken from the first walk with the device on.
+/// # Errors [`Error::Invalid`] naming the field, [`Error::Conflict`] if there is another answer, or before all walks
+/// are recorded: a safety report is accepted once walk 1 is recorded.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
     if new.answer == Judgement::Withdrawn {
         return Err(Error::invalid(

@@ -1,9 +1,9 @@
 //! Lab sessions: a subject walks without the device and with two gaits, blinded, as in the experiment of the paper.
 //!
-//! Walk 1 is without the device. The order of the two gaits is an allocation (`store::allocations`), drawn by a biased
-//! coin and concealed until an administrator unblinds the session. Before that, only the device gets the controller
-//! files; if a person fetches one, the record says so. Measurements and the subject's answer refer to walk numbers, and
-//! the answer reaches the learner at unblinding.
+//! Walk 1 is without the device. The order of the two gaits is an allocation (`store::allocations`), drawn with a
+//! biased coin and concealed until an administrator unblinds the session. Before that, only the device gets the
+//! controller files; if a person fetches one, the record says so. Measurements and the subject's answer refer to walk
+//! numbers, and the answer reaches the learner at unblinding.
 
 mod answer;
 mod measured;

@@ -1,4 +1,5 @@
-//! What a lab session asks next: the walk, or the answer of the subject; and the answers so far, as the lab sees them.
+//! The next step of a lab session, which is a walk or the answer of the subject, and the answers so far, as the lab
+//! sees them.
 
 use gaitwright_store::Instant;
 use gaitwright_store::audit::Actor;
@@ -55,7 +56,8 @@ pub(super) fn asks(session: &LabSession) -> Option<u32> {
     open.then(|| next_number(session))
 }
 
-/// The number of an answer that reports an unsafe walk now, if one is taken: from the first walk with the device on.
+/// The number of an answer that reports an unsafe walk, if one is accepted: once walk 1, the one without the device,
+/// is recorded.
 pub(super) fn takes_report(session: &LabSession) -> Option<u32> {
     let open = session.done(Act::Closed).is_none() && session.answer().is_none();
     (open && next_walk(session) != Some(1)).then(|| next_number(session))

@@ -224,8 +224,8 @@ fn checked_device_walk(walk: u8) -> Result<u8, Error> {
 
 pub(super) fn not_included() -> Error {
     Error::conflict(
-        "The archive of this session did not include the allocation, because the session was blinded. Unblind it where it was \
-         planned.",
+        "The archive of this session did not include the allocation, because the session was blinded. Unblind it on the \
+         system where it was planned.",
     )
 }
 

@@ -193,7 +193,7 @@ async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) ->
     let delivered = message.info().map_or(1, |info| info.delivered);
     let (message, acker) = message.split();
     if delivered > MOST_DELIVERIES {
-        tracing::error!(subject = %message.subject, "a result could not be recorded {MOST_DELIVERIES} times; it is left out");
+        tracing::error!(subject = %message.subject, "recording a result failed {MOST_DELIVERIES} times; discarding it");
         return acker.ack_with(AckKind::Term).await.map_err(unreachable);
     }
     let read = pool.run(move |_| unpack::<Brought>(&message.payload)).await.map_err(unreachable)?;
