@@ -177,6 +177,8 @@ struct AnswerRow {
     note: String,
     /// Why it no longer counts.
     undone: Option<String>,
+    /// `saved` of the comparison page that can retract it.
+    saved: Option<String>,
     at: Instant,
 }
 
@@ -517,6 +519,7 @@ fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRo
             by: format!("{}, {}", format::source(row), row.author),
             note: row.note.clone(),
             undone: why(&row.retraction),
+            saved: (row.retraction.is_none() && !row.by_rater).then(|| row.id.to_string()),
             at: row.created_at,
         })
     };
@@ -526,6 +529,8 @@ fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRo
             by: format!("{}, {}", format::source_name(assessment.source), assessment.author),
             note: assessment.note.clone(),
             undone: why(&assessment.retraction).or_else(|| lifted(assessment.id)),
+            saved: (assessment.retraction.is_none() && !assessment.answer.is_about_safety())
+                .then(|| format!("assessment-{}", assessment.id)),
             at: assessment.created_at,
         })
     };
