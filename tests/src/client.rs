@@ -30,7 +30,8 @@ impl Reply {
 
 /// Sends a request with a JSON body (empty for none).
 ///
-/// # Errors When the server is not reachable or closes the connection.
+/// # Errors
+/// When the server is not reachable or closes the connection.
 pub fn send(address: &str, method: &str, path: &str, body: &str) -> std::io::Result<Reply> {
     let mut stream = TcpStream::connect(address)?;
     stream.set_read_timeout(Some(Duration::from_secs(10)))?;
@@ -55,14 +56,16 @@ pub fn send(address: &str, method: &str, path: &str, body: &str) -> std::io::Res
 
 /// `GET`.
 ///
-/// # Errors When the server is not reachable or closes the connection.
+/// # Errors
+/// When the server is not reachable or closes the connection.
 pub fn get(address: &str, path: &str) -> std::io::Result<Reply> {
     send(address, "GET", path, "")
 }
 
 /// `POST`.
 ///
-/// # Errors When the server is not reachable or closes the connection.
+/// # Errors
+/// When the server is not reachable or closes the connection.
 pub fn post(address: &str, path: &str, body: &Value) -> std::io::Result<Reply> {
     send(address, "POST", path, &body.to_string())
 }

@@ -69,7 +69,8 @@ async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, 
 
 /// The presentation for a rater: the open one, or a new one. `None` if no comparison is pending.
 ///
-/// # Errors [`Error::NotFound`], or errors of the database and the learner.
+/// # Errors
+/// [`Error::NotFound`], or errors of the database and the learner.
 pub async fn next<'a>(
     store: &'a mut Store,
     caller: &Caller,

@@ -41,7 +41,8 @@ pub struct NewAnswer {
 
 /// Records the answer of the subject.
 ///
-/// # Errors [`Error::Invalid`] naming the field, [`Error::Conflict`] if there is another answer, or before all walks
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if there is another answer, or before all walks
 /// are recorded: a safety report is accepted once walk 1 is recorded.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
     if new.answer == Judgement::Withdrawn {
