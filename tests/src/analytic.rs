@@ -2,6 +2,7 @@
 //!
 //! It is for tests of the service only; its figures do not describe walking.
 
+use gait_learner::{Dimension, SearchSpace};
 use gait_optimizer::body::{Axis, FootPoint, Side};
 use gait_optimizer::gait::{ContactRowName, MuscleTrajectory};
 use gait_optimizer::solve::{SolvePhase, StartedFrom};
@@ -40,6 +41,12 @@ impl Analytic {
     pub fn slow(pause: Duration) -> Self {
         Self { pause, ..Self::default() }
     }
+}
+
+/// Values of a bound that is never active here: two trials that start from the same gait find the same one.
+pub fn inactive_bound() -> SearchSpace {
+    let acceleration = Dimension { name: "a2".to_owned(), values: vec![70.0, 80.0, 90.0], lengthscale: 10.0 };
+    SearchSpace::new(vec![acceleration]).unwrap()
 }
 
 impl Evaluate for Analytic {

@@ -170,7 +170,7 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
 }
 
 #[tokio::test]
-async fn an_answer_is_taken_back_in_its_own_study_only() {
+async fn an_answer_is_retracted_from_its_link_and_in_its_own_study_only() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let (other, _, _) = finished(&service).await;
@@ -183,13 +183,17 @@ async fn an_answer_is_taken_back_in_its_own_study_only() {
         is_page(&answer, StatusCode::NOT_FOUND, "There is no ");
     }
     let read = service.fetch(&format!("/api/v1/preferences/{id}")).await.json();
-    assert_eq!(read["retraction"], json!(null), "nothing was taken back");
+    assert_eq!(read["retraction"], json!(null), "nothing was retracted");
+    let link = format!("/studies/{study}/compare?saved={id}");
+    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains(&link));
+    assert!(service.fetch(&link).await.text.contains(&format!("action=\"/studies/{study}/retract\"")));
     let answer = service.post_text(&format!("/studies/{study}/retract"), FORM, &form).await;
     assert_eq!(answer.status, StatusCode::SEE_OTHER);
     // A retracted answer is struck through; the reason for the retraction is not.
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     let struck = page.split("class=\"retracted\">").nth(1).unwrap().split("</span>").next().unwrap();
     assert!(struck.contains("trial") && !struck.contains("typo") && page.contains("retracted: typo"));
+    assert!(!page.contains(&link), "a retracted answer cannot be changed");
     service.stop().await;
 }
 

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_learner::{Dimension, SearchSpace};
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::studies::lab;
 use gaitwright_service::studies::motion::is_same_gait;
@@ -12,7 +11,7 @@ use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{LabSessionId, Store, StudyId, audit, lab_sessions};
-use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::consistent::Consistent;
 use gaitwright_tests::measured::{electromyogram, motion};
@@ -348,9 +347,7 @@ async fn the_form_of_a_session_offers_each_motion_once_and_no_gait_reported_as_u
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service
         .study(|new| {
-            // The bound changes nothing, so the second and the third trial, which start from the first, find one gait.
-            let acceleration = Dimension { name: "a2".to_owned(), values: vec![70.0, 80.0, 90.0], lengthscale: 10.0 };
-            new.search_space = Some(SearchSpace::new(vec![acceleration]).unwrap().into());
+            new.search_space = Some(inactive_bound().into());
             new.trial_budget = 3;
         })
         .await;

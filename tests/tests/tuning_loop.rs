@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_learner::{Dimension, LearnerSettings, Partner, SearchSpace};
+use gait_learner::{LearnerSettings, Partner};
 use gaitwright_service::studies::comparison::open_question;
 use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -12,7 +12,7 @@ use gaitwright_store::feedback::{FeedbackContent, Source};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, trials};
-use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::away::Away;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -295,9 +295,7 @@ async fn equal_gaits_are_never_offered_for_comparison() {
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service
         .study(|new| {
-            // A bound that changes nothing: every trial that starts from the first gait gives one and the same gait.
-            let acceleration = Dimension { name: "a2".to_owned(), values: vec![70.0, 80.0, 90.0], lengthscale: 10.0 };
-            new.search_space = Some(SearchSpace::new(vec![acceleration]).unwrap().into());
+            new.search_space = Some(inactive_bound().into());
             new.learner = LearnerSettings { partner: Partner::Previous, buffer: 1, ..LearnerSettings::default() };
             (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human);
         })

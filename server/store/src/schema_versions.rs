@@ -17,7 +17,7 @@ const FILES: &[(i64, &str, &str)] = &[
     (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
     (8, "role changes", include_str!("../../../migrations/0008_role_changes.sql")),
     (9, "safety reports", include_str!("../../../migrations/0009_safety_reports.sql")),
-    (10, "search by action", include_str!("../../../migrations/0010_search_by_action.sql")),
+    (10, "suggestions by action", include_str!("../../../migrations/0010_suggestions_by_action.sql")),
 ];
 
 /// Newest schema version.
