@@ -42,14 +42,16 @@ pub async fn insert(db: &mut Connection, trial: TrialId, attribution: Attributio
     Ok(id)
 }
 
+// A cross join keeps this order: there are few reports, and a study may have ten thousand trials.
+const OF_STUDY: &str =
+    "select r.* from safety_reports r cross join trials t on t.id = r.trial_id where t.study_id = ? order by r.rowid";
+
 /// The reports of a study, in the order of recording.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<SafetyReport>> {
-    let sql =
-        "select r.* from safety_reports r join trials t on t.id = r.trial_id where t.study_id = ? order by r.rowid";
-    let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
+    let rows = sqlx::query(OF_STUDY).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
@@ -62,4 +64,22 @@ fn from_row(row: &SqliteRow) -> StoreResult<SafetyReport> {
         note: row.try_get("note")?,
         created_at: row.try_get("created_at")?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schema_versions;
+    use sqlx::{AssertSqlSafe, Connection as _, SqliteConnection};
+
+    /// A preference asks this while it holds the only writer.
+    #[tokio::test]
+    async fn reports_of_a_study_are_found_without_reading_its_trials() {
+        let mut db = SqliteConnection::connect(":memory:").await.unwrap();
+        schema_versions::fresh(&mut db).await.unwrap();
+        let plan = AssertSqlSafe(format!("explain query plan {OF_STUDY}"));
+        let steps = sqlx::query(plan).bind("s").fetch_all(&mut db).await.unwrap();
+        let steps: Vec<String> = steps.iter().map(|step| step.get("detail")).collect();
+        assert!(steps[0] == "SCAN r" && steps[1].starts_with("SEARCH t") && steps[1].contains("(id=?)"), "{steps:?}");
+    }
 }
