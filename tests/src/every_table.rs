@@ -72,6 +72,7 @@ pub async fn fill(database: &Path) {
          select 'I', id, '', 'unsafe', 'K', 'r', '' from trials limit 1",
         "insert into safety_reports (id, trial_id, source, author, created_at) \
          select 'S', id, 'clinician', 'K', '' from trials limit 1",
+        "insert into safety_review_reports (review_id, report_id) values ('I', 'S')",
         "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
          values ('R', 'L', 1, 'motion', '{}', x'00', '', 'K', '')",
         "insert into emg_results (id, session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",

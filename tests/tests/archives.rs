@@ -8,7 +8,7 @@ use gait_optimizer::Mesh;
 use gaitwright_service::studies::archive::{self, SigningKey};
 use gaitwright_store::row::Row;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
-use gaitwright_store::{Store, StudyId};
+use gaitwright_store::{Store, StudyId, now};
 use gaitwright_tests::archives::{exported, import, import_trusting};
 use gaitwright_tests::cli;
 use gaitwright_tests::consistent::Consistent;
@@ -390,43 +390,92 @@ const FORGERIES: [Forgery; 57] = [
 ];
 
 /// Forgeries that only checks of the whole file can detect.
-const MORE: [Forgery; 8] =
-    [
-        ("an audit row", |r| r.0.push(("audit".to_owned(), json!({"seq": 1}))), "which is not part of an archive"),
-        (
-            "a certificate",
-            |r| r.0.push(("certificates".to_owned(), json!({"passed": 1}))),
-            "which is not part of an archive",
-        ),
-        ("an unknown column", |r| r.first("trials")["certified"] = 1.into(), "unknown column"),
-        (
-            "a time to come",
-            |r| r.first("trials")["created_at"] = "2999-01-01T00:00:00.000Z".into(),
-            "which is in the future",
-        ),
-        ("no time at all", |r| r.first("feedback")["created_at"] = "soon".into(), "not a time"),
-        (
-            "trials before their study",
-            |r| {
-                let place = r.0.iter().position(|(table, _)| table == "studies").unwrap();
-                let study = r.0.remove(place);
-                r.0.push(study);
-            },
-            "FOREIGN KEY",
-        ),
-        ("no study", |r| r.0.clear(), "0 studies"),
-        (
-            "a safety review of nothing",
-            |r| {
-                r.0.push(("safety_reviews".to_owned(), json!({
-        "id": "01900000-0000-7000-8000-000000000001", "trial_id": "01900000-0000-7000-8000-000000000002",
-        "said_until": "2026-01-01T00:00:00.000Z", "verdict": "walkable", "author": "K", "reason": "r",
-        "created_at": "2026-01-01T00:00:00.000Z"
-    })));
-            },
-            "FOREIGN KEY",
-        ),
-    ];
+const MORE: [Forgery; 9] = [
+    ("an audit row", |r| r.0.push(("audit".to_owned(), json!({"seq": 1}))), "which is not part of an archive"),
+    (
+        "a certificate",
+        |r| r.0.push(("certificates".to_owned(), json!({"passed": 1}))),
+        "which is not part of an archive",
+    ),
+    (
+        "a review of a report that nobody made yet",
+        |r| {
+            let session = "01900000-0000-7000-8000-000000000003";
+            let (review, trial) = ("01900000-0000-7000-8000-000000000004", r.first("remarks")["first"].clone());
+            r.0.push((
+                "safety_reviews".to_owned(),
+                json!({
+                    "id": review, "trial_id": trial, "said_until": "2026-01-01T00:00:00.000Z", "verdict": "walkable",
+                    "author": "K", "reason": "r", "created_at": "2026-01-01T00:00:00.000Z"
+                }),
+            ));
+            let reviewed = json!({"review_id": review, "report_id": session});
+            r.0.push(("safety_review_reports".to_owned(), reviewed));
+        },
+        "the archive has no safety report",
+    ),
+    ("an unknown column", |r| r.first("trials")["certified"] = 1.into(), "unknown column"),
+    (
+        "a time to come",
+        |r| r.first("trials")["created_at"] = "2999-01-01T00:00:00.000Z".into(),
+        "which is in the future",
+    ),
+    ("no time at all", |r| r.first("feedback")["created_at"] = "soon".into(), "not a time"),
+    (
+        "trials before their study",
+        |r| {
+            let place = r.0.iter().position(|(table, _)| table == "studies").unwrap();
+            let study = r.0.remove(place);
+            r.0.push(study);
+        },
+        "FOREIGN KEY",
+    ),
+    ("no study", |r| r.0.clear(), "0 studies"),
+    (
+        "a safety review of nothing",
+        |r| {
+            r.0.push((
+                "safety_reviews".to_owned(),
+                json!({
+                    "id": "01900000-0000-7000-8000-000000000001", "trial_id": "01900000-0000-7000-8000-000000000002",
+                    "said_until": "2026-01-01T00:00:00.000Z", "verdict": "walkable", "author": "K", "reason": "r",
+                    "created_at": "2026-01-01T00:00:00.000Z"
+                }),
+            ));
+        },
+        "FOREIGN KEY",
+    ),
+];
+
+#[tokio::test]
+async fn a_review_from_a_clock_that_was_ahead_does_not_cover_later_reports() {
+    let (folder, service, study, _) = study().await;
+    let listed = format!("/api/v1/studies/{study}/safety-reports");
+    let gait = service.fetch(&listed).await.items()[0]["trial_id"].as_str().unwrap().to_owned();
+    let review = json!({"verdict": "walkable", "reason": "seen again"});
+    assert_eq!(service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status, StatusCode::OK);
+    let mut rows = Rows::of(&exported(&service.store, study).await);
+    service.stop().await;
+    let ahead = now().plus_seconds(500).to_string();
+    for table in ["remarks", "safety_reviews"] {
+        for row in rows.table(table) {
+            row["created_at"] = json!(ahead);
+        }
+    }
+    rows.first("safety_reviews")["said_until"] = json!(ahead);
+    let database = folder.path().join("b.db");
+    let store = Store::open(&database).await.unwrap();
+    import(&store, &rows.packed()).await.unwrap();
+    store.close().await;
+    let other = Service::start(&database, Consistent::default(), 1).await;
+    assert_eq!(other.fetch(&listed).await.items()[0]["stands"], json!(false));
+    let report = other.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "fell"})).await;
+    assert_eq!((report.status, &report.json()["stands"]), (StatusCode::CREATED, &json!(true)), "{}", report.text);
+    assert!(report.json()["at"].as_str().unwrap() > ahead.as_str(), "times have the order of recording");
+    let file = other.fetch(&format!("/api/v1/trials/{gait}/controller.json")).await;
+    assert!(file.status == StatusCode::CONFLICT && file.text.contains("reported as unsafe"), "{}", file.text);
+    other.stop().await;
+}
 
 #[tokio::test]
 async fn forged_archives_are_refused_by_name_and_change_nothing() {

@@ -107,17 +107,16 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
     assert!(for_the_device.text.contains("It must not be walked until"), "{}", for_the_device.text);
-    let seen = safety_reports(&service, study).await[0]["at"].clone();
-    tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+    let seen = safety_reports(&service, study).await[0]["id"].clone();
     service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
-    let late = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r", "said_until": seen})).await;
+    let late = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r", "reports": [seen]})).await;
     assert_eq!(late.status, StatusCode::CONFLICT);
     assert!(late.text.contains("reported as unsafe again, by K3"), "{}", late.text);
 
-    // By the form, which sends the time of the newest report on its page.
+    // By the form, which sends the reports on its page.
     let page = service.fetch(&format!("/trials/{best_id}")).await.text;
-    let seen = page.split("name=\"said_until\" value=\"").nth(1).unwrap().split('"').next().unwrap();
-    let form = format!("verdict=walkable&author=K2&reason=tried+slowly&said_until={}", seen.replace(':', "%3A"));
+    let seen = page.split("name=\"reports\" value=\"").nth(1).unwrap().split('"').next().unwrap();
+    let form = format!("verdict=walkable&author=K2&reason=tried+slowly&reports={}", seen.replace(',', "%2C"));
     let sent = service.post_text(&format!("/trials/{best_id}/safety-review"), FORM, &form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
     assert_eq!(recommended().await["trial_id"], best);

@@ -51,11 +51,7 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
     ("Invitation", "name", "The name of a rater, or one that is not taken."),
     ("Unblind", "rater", "A rater who was shown a pair of this study."),
-    (
-        "SafetyReviewToMake",
-        "said_until",
-        "Not before the newest safety report that the decision is about, and not after now.",
-    ),
+    ("SafetyReviewToMake", "reports", "Includes every open safety report about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
     ("NewEmg", "reading", "An OpenSim file has no `rate_hz`. Heel strikes are two or more times, or a column instead."),
     ("NewMotion", "recording", MOTION_FILE),

@@ -1,12 +1,25 @@
 //! Checks of the text that people type: names, notes and reasons.
 
 use crate::error::Error;
+use unicode_normalization::UnicodeNormalization;
 
 /// Characters that change the direction of text, so that one name can look like another.
 const TURNING: [char; 12] = [
     '\u{061c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
     '\u{2067}', '\u{2068}', '\u{2069}',
 ];
+
+/// Whether a character leaves no mark of its own, so that names that differ in it look alike: the default ignorable code
+/// points of Unicode (DerivedCoreProperties.txt).
+fn is_invisible(c: char) -> bool {
+    matches!(
+        c,
+        '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}'..='\u{1160}' | '\u{17b4}'..='\u{17b5}' | '\u{180b}'..='\u{180f}'
+            | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}'
+            | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{ffa0}' | '\u{fff0}'..='\u{fff8}' | '\u{1bca0}'..='\u{1bca3}'
+            | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}'
+    )
+}
 
 /// The name, trimmed.
 ///
@@ -15,7 +28,7 @@ const TURNING: [char; 12] = [
 pub fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a str, Error> {
     let trimmed = text.trim();
     let prints = |c: char| !c.is_control() && !TURNING.contains(&c);
-    if trimmed.is_empty() || trimmed.chars().count() > longest || !trimmed.chars().all(prints) {
+    if person(trimmed).is_empty() || trimmed.chars().count() > longest || !trimmed.chars().all(prints) {
         return Err(Error::invalid(field, text, &format!("1 to {longest} printable characters")));
     }
     Ok(trimmed)
@@ -57,9 +70,11 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
     Ok(text)
 }
 
-/// The form of a name that identifies a person: upper and lower case and spaces make no difference.
+/// The form of a name that identifies a person: upper and lower case, spaces, invisible characters and the way in which
+/// accents are encoded make no difference.
 pub(crate) fn person(name: &str) -> String {
-    name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
+    let visible: String = name.nfkc().filter(|c| !is_invisible(*c)).collect();
+    visible.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
 }
 
 /// Whether two names are of one person.
@@ -69,7 +84,7 @@ pub(crate) fn is_same_name(one: &str, other: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{name, note, reason};
+    use super::{is_same_name, name, note, reason};
 
     #[test]
     fn notes_have_lines_but_no_other_control_characters() {
@@ -88,9 +103,18 @@ mod tests {
     #[test]
     fn names_are_trimmed_and_printable() {
         assert_eq!(name("name", " Dr. Ünal-Řehoř ", 80).unwrap(), "Dr. Ünal-Řehoř");
-        for bad in ["", "  ", "a\0b", "a\nb", "a\u{202e}b", &"x".repeat(81)] {
+        for bad in ["", "  ", "a\0b", "a\nb", "a\u{202e}b", "\u{200b}\u{ad}", &"x".repeat(81)] {
             let refusal = name("name", bad, 80).unwrap_err().to_string();
             assert!(refusal.contains("1 to 80 printable characters"), "{refusal}");
         }
+    }
+
+    #[test]
+    fn names_that_look_alike_are_of_one_person() {
+        for other in ["dr.  ünal", "Dr. U\u{308}nal", "Dr. Ün\u{ad}al", "D\u{200d}r. Ünal", "Dr.\u{a0}Ünal\u{feff}"]
+        {
+            assert!(is_same_name("Dr. Ünal", other), "{other:?}");
+        }
+        assert!(!is_same_name("Dr. Ünal", "Dr. Unal"));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::row::{Cell, Row};
 use super::seals;
-use super::{Connection, StoreError, StoreResult, StudyId, archived_allocations, consents, studies};
+use super::{Connection, StoreError, StoreResult, StudyId, archived_allocations, consents, studies, time};
 use futures_util::TryStreamExt;
 use sqlx::{AssertSqlSafe, Row as _};
 use std::collections::HashMap;
@@ -10,7 +10,7 @@ use tokio::sync::mpsc::Sender;
 
 /// Tables in the order in which their rows can be written, with the condition for rows of a study. Certificates and
 /// explanations are not included: the importing service computes them again.
-const TABLES: [(&str, &str); 30] = [
+const TABLES: [(&str, &str); 31] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -32,6 +32,10 @@ const TABLES: [(&str, &str); 30] = [
     ("remark_retractions", "remark_id in (select id from remarks where study_id = ?)"),
     ("safety_reports", "trial_id in (select id from trials where study_id = ?) order by rowid"),
     ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by id"),
+    (
+        "safety_review_reports",
+        "review_id in (select r.id from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ?)",
+    ),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_allocations", archived_allocations::LAB),
     ("lab_device_files", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
@@ -157,12 +161,19 @@ impl Unpacking {
     }
 
     /// Writes a row with the necessary changes: a running study is paused, running solves are queued, and rows get
-    /// sequence numbers of this record.
+    /// sequence numbers of this record. Whatever is recorded afterwards has later times than the row.
     ///
     /// # Errors
     /// A violated constraint or trigger; errors of the database.
     pub async fn adapt_and_write(&mut self, db: &mut Connection, table: &'static str, mut row: Row) -> StoreResult<()> {
         let text = |value: &str| Cell::Text(value.to_owned());
+        for (column, cell) in row.cells() {
+            if let (true, Cell::Text(at)) = (column.ends_with("_at"), cell)
+                && let Ok(at) = at.parse()
+            {
+                time::never_before(at);
+            }
+        }
         let mut before = None;
         match table {
             "studies" => {

@@ -86,3 +86,15 @@ identifier!(LabSessionId, "lab session");
 identifier!(MeasurementFileId, "measurement file of a lab session");
 identifier!(LabDeviceFileId, "controller file of a lab session");
 identifier!(EmgResultId, "result of EMG processing");
+
+macro_rules! holds_safety_reports {
+    ($($name:ident),*) => {
+        $(impl From<$name> for SafetyReportId {
+            /// The safety report that this object holds has the same identifier.
+            fn from(holder: $name) -> Self {
+                Self(holder.0)
+            }
+        })*
+    };
+}
+holds_safety_reports!(PresentationId, AssessmentId, LabSessionId);

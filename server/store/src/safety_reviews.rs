@@ -1,6 +1,6 @@
 //! Stored safety reviews: decisions of staff about safety reports.
 
-use super::{Connection, Instant, SafetyReviewId, StoreError, StoreResult, StudyId, TrialId, now};
+use super::{Connection, Instant, SafetyReportId, SafetyReviewId, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -44,8 +44,8 @@ pub struct SafetyReview {
     pub id: SafetyReviewId,
     /// Trial of the reviewed gait.
     pub trial_id: TrialId,
-    /// The review covers reports up to this time.
-    pub said_until: Instant,
+    /// The reports that the review decides about. Another report about the same gait needs another review.
+    pub reports: Vec<SafetyReportId>,
     /// Decision.
     pub verdict: SafetyVerdict,
     /// Reviewer.
@@ -61,8 +61,8 @@ pub struct SafetyReview {
 pub struct NewSafetyReview<'a> {
     /// Trial of the reviewed gait.
     pub trial: TrialId,
-    /// The review covers reports up to this time.
-    pub said_until: Instant,
+    /// The reports that the review decides about.
+    pub reports: &'a [SafetyReportId],
     /// Decision.
     pub verdict: SafetyVerdict,
     /// Reviewer.
@@ -71,25 +71,37 @@ pub struct NewSafetyReview<'a> {
     pub reason: &'a str,
 }
 
+const SELECT: &str = "select r.*, (select group_concat(report_id) from safety_review_reports where review_id = r.id) as reports \
+                      from safety_reviews r";
+
 /// Adds a review.
 ///
 /// # Errors
 /// A violated constraint or trigger; errors of the database.
 pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResult<SafetyReviewId> {
     let id = SafetyReviewId::fresh();
+    let at = now();
+    // The column said_until is from before the reports were listed, and decides nothing.
     sqlx::query(
         "insert into safety_reviews (id, trial_id, said_until, verdict, author, reason, created_at) \
          values (?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(new.trial)
-    .bind(new.said_until)
+    .bind(at)
     .bind(new.verdict.as_str())
     .bind(new.author)
     .bind(new.reason)
-    .bind(now())
-    .execute(db)
+    .bind(at)
+    .execute(&mut *db)
     .await?;
+    for report in new.reports {
+        sqlx::query("insert into safety_review_reports (review_id, report_id) values (?, ?)")
+            .bind(id)
+            .bind(report)
+            .execute(&mut *db)
+            .await?;
+    }
     Ok(id)
 }
 
@@ -98,27 +110,31 @@ pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResul
 /// # Errors
 /// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: SafetyReviewId) -> StoreResult<SafetyReview> {
-    let row = sqlx::query("select * from safety_reviews where id = ?").bind(id).fetch_optional(db).await?;
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where r.id = ?"));
+    let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
     let missing = || StoreError::Missing { what: "safety review", id: id.to_string() };
     row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
 }
 
-/// Every review of a study, by time.
+/// Every review of a study, in the order of recording.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<SafetyReview>> {
-    let sql =
-        "select r.* from safety_reviews r cross join trials t on t.id = r.trial_id where t.study_id = ? order by r.id";
+    let of_study = "cross join trials t on t.id = r.trial_id where t.study_id = ? order by r.rowid";
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} {of_study}"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<SafetyReview> {
+    let reports = row.try_get::<Option<&str>, _>("reports")?.unwrap_or_default();
+    let reports = reports.split_terminator(',').map(str::parse).collect::<Result<_, _>>();
+    let damaged = |e: uuid::Error| StoreError::Damaged { what: "report of a safety review", reason: e.to_string() };
     Ok(SafetyReview {
         id: row.try_get("id")?,
         trial_id: row.try_get("trial_id")?,
-        said_until: row.try_get("said_until")?,
+        reports: reports.map_err(damaged)?,
         verdict: row.try_get::<&str, _>("verdict")?.parse()?,
         author: row.try_get("author")?,
         reason: row.try_get("reason")?,

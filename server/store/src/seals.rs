@@ -60,6 +60,7 @@ pub const TABLES: &[Sealed] = &[
     sealed("remark_retractions", &["remark_id"]),
     sealed("safety_reports", &["id"]),
     sealed("safety_reviews", &["id"]),
+    sealed("safety_review_reports", &["review_id", "report_id"]),
     sealed("lab_sessions", &["id"]),
     sealed("lab_allocations", &["session_id"]),
     sealed("lab_device_files", &["id"]),

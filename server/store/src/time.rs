@@ -25,32 +25,50 @@ struct Course {
     latest: i64,
 }
 
+impl Course {
+    /// Starts at the machine's clock.
+    fn start(machine: i64) -> Self {
+        Self { anchor: (machine, Steady::now()), latest: machine.saturating_sub(1) }
+    }
+
+    /// The instant of the anchor plus the time that has passed since.
+    fn passed(&self) -> i64 {
+        let (start, since) = self.anchor;
+        start.saturating_add(i64::try_from(since.elapsed().as_millis()).unwrap_or(i64::MAX))
+    }
+}
+
 static COURSE: Mutex<Option<Course>> = Mutex::new(None);
 /// What [`set_machine_clock`] adds to the clock of the machine, in milliseconds.
 static SET_BY_MS: AtomicI64 = AtomicI64::new(0);
 
+fn machine_ms() -> i64 {
+    jiff::Timestamp::now().as_millisecond().saturating_add(SET_BY_MS.load(Ordering::Relaxed))
+}
+
 /// The current time of the server, for all rows. Later than every earlier instant of this process, and than those in
-/// the record that it opened, so that the order of times is the order of recording even if the machine's clock is set
-/// back. Time passes all the same.
+/// the record that it opened and in the archives that it imported, so that the order of times is the order of recording
+/// even if the machine's clock is set back or that of another machine was ahead. Time passes all the same.
 pub fn now() -> Instant {
-    let machine = jiff::Timestamp::now().as_millisecond().saturating_add(SET_BY_MS.load(Ordering::Relaxed));
+    let machine = machine_ms();
     let mut course = COURSE.lock().unwrap_or_else(PoisonError::into_inner);
-    let Course { anchor: (start, since), latest } =
-        course.get_or_insert_with(|| Course { anchor: (machine, Steady::now()), latest: machine.saturating_sub(1) });
-    let passed = start.saturating_add(i64::try_from(since.elapsed().as_millis()).unwrap_or(i64::MAX));
+    let course = course.get_or_insert_with(|| Course::start(machine));
+    let passed = course.passed();
     if machine > passed {
-        (*start, *since) = (machine, Steady::now());
+        course.anchor = (machine, Steady::now());
     }
-    *latest = machine.max(passed).max(latest.saturating_add(1));
-    Instant(jiff::Timestamp::from_millisecond(*latest).unwrap_or(jiff::Timestamp::MAX))
+    course.latest = machine.max(passed).max(course.latest.saturating_add(1));
+    Instant(jiff::Timestamp::from_millisecond(course.latest).unwrap_or(jiff::Timestamp::MAX))
 }
 
 /// Makes every later [`now`] later than an instant.
 pub(crate) fn never_before(instant: Instant) {
-    let least = now().max(instant).0.as_millisecond();
+    let least = instant.0.as_millisecond();
     let mut course = COURSE.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(course) = course.as_mut().filter(|course| course.latest < least) {
-        (course.anchor, course.latest) = ((least, Steady::now()), least);
+    let course = course.get_or_insert_with(|| Course::start(machine_ms()));
+    if course.latest < least {
+        course.anchor = (course.passed().max(least), Steady::now());
+        course.latest = least;
     }
 }
 

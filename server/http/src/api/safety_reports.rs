@@ -16,13 +16,16 @@ use gaitwright_service::studies::safety_report::{self, Report};
 use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
 use gaitwright_service::studies::safety_review::{self, Decision};
 use gaitwright_store::safety_reviews::{SafetyReview, SafetyVerdict};
-use gaitwright_store::{Instant, StudyId, TrialId, studies, trials};
+use gaitwright_store::{Instant, SafetyReportId, StudyId, TrialId, studies, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
 
 /// Safety report about a gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct SafetyReport {
+    /// Identifier of the report. If it was given in a blinded pair, an assessment or a lab session, the identifier of that
+    /// one, so that reports about both of its gaits have the same.
+    id: SafetyReportId,
     /// Trial of the gait.
     trial_id: TrialId,
     /// Who reported it.
@@ -37,9 +40,10 @@ pub(super) struct SafetyReport {
 
 impl From<Closed> for SafetyReport {
     fn from(closed: Closed) -> Self {
+        let id = closed.id();
         let Closed { trial, by, at, review, .. } = closed;
         let stands = review.as_ref().is_none_or(|review| review.verdict == SafetyVerdict::Unsafe);
-        Self { trial_id: trial, by, at, stands, review }
+        Self { id, trial_id: trial, by, at, stands, review }
     }
 }
 
@@ -94,13 +98,13 @@ pub(super) async fn report(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    safety_report::give(&mut writer, &request.caller, id, &report).await?;
+    let made = safety_report::give(&mut writer, &request.caller, id, &report).await?;
     let study = trials::get(&mut writer, id).await?.study_id;
-    let reports = SafetyReports::read(&mut writer, study).await?.closing(id);
-    let newest = reports.into_iter().max_by_key(|report| report.at);
-    let newest = newest.ok_or_else(|| Error::Internal("a safety report did not take effect".to_owned()))?;
+    let made =
+        SafetyReports::read(&mut writer, study).await?.closing(id).into_iter().find(|report| report.id() == made);
+    let made = made.ok_or_else(|| Error::Internal("a safety report did not take effect".to_owned()))?;
     let location = format!("/api/v1/studies/{study}/safety-reports");
-    request.created(&app, writer, location, &SafetyReport::from(newest)).await
+    request.created(&app, writer, location, &SafetyReport::from(made)).await
 }
 
 /// Review the safety reports of a gait

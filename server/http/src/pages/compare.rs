@@ -405,8 +405,9 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     let (said, key) = form.read()?;
     let mut writer = app.write().await?;
     // The key of the form makes a repeated form (double click, reload, two tabs) count once.
-    let key = format!("form {key}");
     let request = form.fingerprint(id);
+    // A safety report has a key of its own, because it is recorded even if the form was sent before with another answer.
+    let key = if said.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
     if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
         let same = before.request == request;
         let recorded = Recorded::try_from(before.body)?;

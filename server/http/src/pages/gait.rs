@@ -22,7 +22,7 @@ use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Instant, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
+use gaitwright_store::{TrialId, certificates, events, gaits, reference_gaits, studies, trials};
 
 #[derive(Template)]
 #[template(path = "gait.html")]
@@ -61,9 +61,10 @@ struct GaitPage {
 }
 
 impl GaitPage {
-    /// When the newest of the safety reports was made.
-    fn said_until(&self) -> Option<Instant> {
-        self.unsafe_by.iter().map(|closed| closed.at).max()
+    /// The open safety reports of the page, for a review; `None` without one.
+    fn reports(&self) -> Option<String> {
+        let shown: Vec<String> = self.unsafe_by.iter().map(|closed| closed.id().to_string()).collect();
+        (!shown.is_empty()).then(|| shown.join(","))
     }
 }
 

@@ -39,6 +39,13 @@ struct WalkPage {
     typed: String,
 }
 
+impl WalkPage {
+    /// Whether the second walk with the device may have begun.
+    fn second_may_have_begun(&self) -> bool {
+        self.seen.walk.is_none_or(|walk| walk == 3)
+    }
+}
+
 /// `GET /lab`.
 pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppState>) -> Page {
     let mut reader = app.read().await?;

@@ -33,6 +33,8 @@ struct RatePage {
     /// Whether the caller can see any study.
     assigned: bool,
     nothing: bool,
+    /// Whether a safety report about an answered pair was just given.
+    reported: bool,
     /// The answer just given, or else the newest one that can be retracted.
     saved: Option<Saved>,
     /// Whether the caller may read the study, and so could know which gait is which.
@@ -105,6 +107,8 @@ pub(super) struct Before {
     nothing: bool,
     /// The pair that was just answered.
     saved: Option<String>,
+    #[serde(default)]
+    reported: bool,
 }
 
 /// `GET /rate`: the studies that may ask for a comparison.
@@ -131,7 +135,15 @@ pub(super) async fn list(
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
     let assigned = members::reaches_any(&mut reader, reach).await?;
     let not_blind = blind::sees_or_saw_gaits(&mut reader, &authorized.caller).await?;
-    page(&RatePage { studies, assigned, nothing: before.nothing, saved, not_blind, no_password })
+    page(&RatePage {
+        studies,
+        assigned,
+        nothing: before.nothing,
+        reported: before.reported,
+        saved,
+        not_blind,
+        no_password,
+    })
 }
 
 /// A rater's newest answer, if it can be retracted.
@@ -242,12 +254,12 @@ pub(super) async fn answer(
         let mut writer = app.write().await?;
         // A form that is sent twice (double click, lost response) counts as one answer.
         let before = blind::own(&mut writer, &authorized.caller, &token).await?.answer();
-        if before != Some(given.answer) {
+        if before != Some(given.answer) || given.answer.is_about_safety() {
             blind::answer(&mut writer, &authorized.caller, &token, &given).await?;
             commit(writer).await?;
             app.scheduler.changed();
         }
-        Ok(())
+        Ok(before.is_some() && given.answer.is_about_safety())
     };
     let answered = answered.await;
     told(&mut app, &authorized.caller, &token, answered).await
@@ -264,21 +276,25 @@ pub(super) async fn retract(
         blind::retract(&mut writer, &authorized.caller, &token).await?;
         commit(writer).await?;
         app.scheduler.changed();
-        Ok(())
+        Ok(false)
     };
     let retracted = retracted.await;
     told(&mut app, &authorized.caller, &token, retracted).await
 }
 
-/// Redirects after an action; a conflict is shown on the page of the pair.
+/// Redirects after an action, which may be a safety report about an answered pair; a conflict is shown on the page of
+/// the pair.
 async fn told(
     app: &mut AppState,
     caller: &Caller,
     token: &str,
-    done: Result<(), Error>,
+    done: Result<bool, Error>,
 ) -> Result<Response, PageError> {
     match done {
-        Ok(()) => Ok(Redirect::to(&format!("/rate?saved={token}")).into_response()),
+        Ok(reported) => {
+            let reported = if reported { "&reported=true" } else { "" };
+            Ok(Redirect::to(&format!("/rate?saved={token}{reported}")).into_response())
+        }
         Err(error @ Error::Conflict(_)) => {
             let shown = show(app, caller, token, Some(error.to_string())).await?;
             Ok((Problem::from(&error).status(), shown).into_response())

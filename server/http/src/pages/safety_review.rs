@@ -8,19 +8,45 @@ use crate::extract::Form;
 use axum::extract::State;
 use axum::response::Redirect;
 use gaitwright_service::access;
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_report::{self, Report};
 use gaitwright_service::studies::safety_review::{self, Decision};
-use gaitwright_store::{TrialId, commit};
+use gaitwright_store::safety_reviews::SafetyVerdict;
+use gaitwright_store::{SafetyReportId, TrialId, commit};
+use serde::Deserialize;
+
+/// The form for a review.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Reviewed {
+    verdict: SafetyVerdict,
+    reason: String,
+    author: String,
+    /// The reports that the page showed, separated by commas.
+    reports: String,
+}
+
+impl Reviewed {
+    fn read(self) -> Result<Decision, Error> {
+        let identifier = |text: &str| {
+            text.parse().map_err(|_| Error::invalid("reports", text, "identifiers of safety reports from this form"))
+        };
+        let reports = self.reports.split(',').map(identifier).collect::<Result<Vec<SafetyReportId>, _>>()?;
+        let Self { verdict, reason, author, .. } = self;
+        Ok(Decision { verdict, reason, author: Some(author), reports: Some(reports) })
+    }
+}
 
 /// `POST /trials/{id}/safety-review`.
 pub(super) async fn post(
     authorized: Authorized<access::Answer>,
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, access::Answer>,
-    Form(form): Form<Decision>,
+    Form(form): Form<Reviewed>,
 ) -> Result<Redirect, PageError> {
+    let decision = form.read()?;
     let mut writer = app.write().await?;
-    safety_review::give(&mut writer, &authorized.caller, id, &form).await?;
+    safety_review::give(&mut writer, &authorized.caller, id, &decision).await?;
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}")))

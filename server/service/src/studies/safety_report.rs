@@ -5,9 +5,9 @@ use super::answer::attribution;
 use super::walkable::NotWalkable;
 use crate::access::Caller;
 use crate::error::Error;
-use gaitwright_store::feedback::Source;
-use gaitwright_store::trials::TrialState;
-use gaitwright_store::{SafetyReportId, TrialId, Writer, audit, consents, events, safety_reports, trials};
+use gaitwright_store::feedback::{Attribution, Source};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{SafetyReportId, StoreResult, TrialId, Writer, audit, consents, events, safety_reports, trials};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -42,10 +42,37 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: TrialId, report: &Re
         return Err(NotWalkable::NotConverged { number: trial.number, state: trial.state.as_str() }.into());
     }
     let attribution = attribution(caller, report.source, report.author.as_deref(), &report.note)?;
-    let made = safety_reports::insert(writer, id, attribution).await?;
-    let payload = json!({ "trial_id": id, "number": trial.number });
+    Ok(write(writer, caller, &trial, attribution).await?)
+}
+
+/// Records a report that cannot be the answer to the comparison in which it was given, because there is one already. No
+/// state of a comparison refuses a safety report.
+///
+/// # Errors
+/// Errors of the database.
+pub(super) async fn after_an_answer(
+    writer: &mut Writer,
+    caller: &Caller,
+    gaits: &[TrialId],
+    attribution: Attribution<'_>,
+) -> Result<(), Error> {
+    for gait in gaits {
+        let trial = trials::get(writer, *gait).await?;
+        write(writer, caller, &trial, attribution).await?;
+    }
+    Ok(())
+}
+
+async fn write(
+    writer: &mut Writer,
+    caller: &Caller,
+    trial: &Trial,
+    attribution: Attribution<'_>,
+) -> StoreResult<SafetyReportId> {
+    let made = safety_reports::insert(writer, trial.id, attribution).await?;
+    let payload = json!({ "trial_id": trial.id, "number": trial.number });
     events::append(writer, trial.study_id, "reported_unsafe", &payload).await?;
     let detail = json!({ "study": trial.study_id, "author": attribution.author });
-    audit::append(writer, &caller.actor, "gait.report_unsafe", &format!("trial {id}"), &detail).await?;
+    audit::append(writer, &caller.actor, "gait.report_unsafe", &format!("trial {}", trial.id), &detail).await?;
     Ok(made)
 }

@@ -8,8 +8,8 @@ use gaitwright_store::safety_reviews::{self, SafetyReview, SafetyVerdict};
 use gaitwright_store::studies::{self, Study};
 use gaitwright_store::trials::{self, Trial};
 use gaitwright_store::{
-    AssessmentId, Connection, Instant, PresentationId, StoreResult, StudyId, TrialId, assessments, lab_sessions,
-    presentations,
+    AssessmentId, Connection, Instant, LabSessionId, PresentationId, SafetyReportId, StoreResult, StudyId, TrialId,
+    assessments, lab_sessions, presentations,
 };
 use std::collections::HashSet;
 
@@ -36,9 +36,22 @@ pub enum SafetyReportSource {
     /// In an assessment.
     Staff(AssessmentId),
     /// In a report about this gait alone.
-    Alone,
-    /// The subject, in a lab session that is not unblinded.
-    Subject,
+    Alone(SafetyReportId),
+    /// By the subject, in a lab session that is not unblinded.
+    Subject(LabSessionId),
+}
+
+impl Closed {
+    /// The identifier of the report, which is that of the object that holds it. The reports about both gaits of a pair
+    /// have the same one.
+    pub fn id(&self) -> SafetyReportId {
+        match self.said {
+            SafetyReportSource::Rater(id) => id.into(),
+            SafetyReportSource::Staff(id) => id.into(),
+            SafetyReportSource::Alone(id) => id,
+            SafetyReportSource::Subject(id) => id.into(),
+        }
+    }
 }
 
 /// Accessible studies with safety reports that await review, and the number of such gaits.
@@ -154,7 +167,7 @@ impl SafetyReports {
         }
         for report in reports::of_study(db, study).await? {
             let (trial, by, at) = (report.trial_id, report.author, report.created_at);
-            found.closed.push(Closed { trial, by, at, said: SafetyReportSource::Alone, review: None });
+            found.closed.push(Closed { trial, by, at, said: SafetyReportSource::Alone(report.id), review: None });
         }
         for session in lab_sessions::of_study(db, study).await? {
             if session.done(lab_sessions::Act::Unblinded).is_some() {
@@ -165,7 +178,7 @@ impl SafetyReports {
                 // Naming one of the two gaits would reveal the allocation, so both are closed until unblinding.
                 let by =
                     format!("the subject in lab session {} (blinded, so either gait may be meant)", session.number);
-                let (at, said) = (answer.at, SafetyReportSource::Subject);
+                let (at, said) = (answer.at, SafetyReportSource::Subject(session.id));
                 let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };
                 found.closed.extend([session.gait_one, session.gait_two].map(closed));
             }
@@ -174,10 +187,11 @@ impl SafetyReports {
         Ok(found)
     }
 
-    /// Lifts the reports that are older than a review that lets the gait be walked again.
+    /// Lifts the reports about which the newest review says that the gait may be walked again.
     fn review(&mut self, reviews: &[SafetyReview]) {
         for mut closed in std::mem::take(&mut self.closed) {
-            let of_it = |review: &&SafetyReview| review.trial_id == closed.trial && closed.at <= review.said_until;
+            let id = closed.id();
+            let of_it = |review: &&SafetyReview| review.trial_id == closed.trial && review.reports.contains(&id);
             closed.review = reviews.iter().rfind(of_it).cloned();
             let lifted = closed.review.as_ref().is_some_and(|review| review.verdict == SafetyVerdict::Walkable);
             if lifted { self.lifted.push(closed) } else { self.closed.push(closed) }
@@ -194,6 +208,11 @@ impl SafetyReports {
     /// The open reports about the gait of this trial.
     pub fn closing(&self, trial: TrialId) -> Vec<Closed> {
         self.closed.iter().filter(|closed| closed.trial == trial).cloned().collect()
+    }
+
+    /// Whether a report is open.
+    pub fn is_open(&self, report: SafetyReportId) -> bool {
+        self.closed.iter().any(|closed| closed.id() == report)
     }
 
     /// An open report about the gait of this trial, which may have been given for another trial of the subject.

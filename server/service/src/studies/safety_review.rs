@@ -6,8 +6,8 @@ use crate::error::Error;
 use crate::printable;
 use gaitwright_store::safety_reviews::{self, NewSafetyReview, SafetyReview, SafetyVerdict};
 use gaitwright_store::{
-    Connection, FeedbackId, Instant, StoreResult, TrialId, Writer, assessments, audit, consents, events, feedback,
-    presentations, trials,
+    Connection, FeedbackId, SafetyReportId, StoreResult, TrialId, Writer, assessments, audit, consents, events,
+    feedback, presentations, trials,
 };
 use serde::Deserialize;
 use serde_json::json;
@@ -27,10 +27,10 @@ pub struct Decision {
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
-    /// Time of the newest safety report that the reviewer has seen. The decision is refused if a newer one exists. By
-    /// default, all reports count as seen.
+    /// The open safety reports that the reviewer has seen. The decision is refused if there is another one. By default, all
+    /// open reports count as seen.
     #[serde(default)]
-    pub said_until: Option<Instant>,
+    pub reports: Option<Vec<SafetyReportId>>,
 }
 
 /// Records a decision. If the gait may be walked again, retracts the preferences that the learner derived from the
@@ -52,8 +52,7 @@ pub async fn give(
     let reports = SafetyReports::read(writer, trial.study_id).await?;
     let closed = reports.closing(id);
     let number = trial.number;
-    let newest = closed.iter().max_by_key(|closed| closed.at);
-    let Some(newest) = newest else {
+    if closed.is_empty() {
         let elsewhere = reports.standing(&trial).and_then(|closed| closed.other_trial(&trial));
         return Err(Error::conflict(match elsewhere {
             Some(other) => {
@@ -61,16 +60,18 @@ pub async fn give(
             }
             None => format!("The gait of trial {number} has no open safety report."),
         }));
-    };
-    if decision.said_until.is_some_and(|seen| newest.at > seen) {
+    }
+    let unseen = |closed: &&Closed| decision.reports.as_ref().is_some_and(|seen| !seen.contains(&closed.id()));
+    if let Some(unseen) = closed.iter().rfind(unseen) {
         let again = format!(
             "The gait of trial {number} was reported as unsafe again, by {}. Read that report first.",
-            newest.by
+            unseen.by
         );
         return Err(Error::conflict(again));
     }
     let verdict = decision.verdict;
-    let new = NewSafetyReview { trial: id, said_until: newest.at, verdict, author, reason };
+    let decided: Vec<SafetyReportId> = closed.iter().map(Closed::id).collect();
+    let new = NewSafetyReview { trial: id, reports: &decided, verdict, author, reason };
     let made = safety_reviews::insert(writer, new).await?;
     if verdict == SafetyVerdict::Walkable {
         take_back_what_was_heard(writer, &closed, (author, reason)).await?;
@@ -105,6 +106,6 @@ async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
         // The learner receives the answer of a subject only at unblinding, and does not receive reports about one gait.
-        SafetyReportSource::Subject | SafetyReportSource::Alone => Ok(None),
+        SafetyReportSource::Subject(_) | SafetyReportSource::Alone(_) => Ok(None),
     }
 }

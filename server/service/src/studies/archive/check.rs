@@ -20,9 +20,9 @@ use gaitwright_store::row::{Cell, Row};
 use gaitwright_store::studies::{Chosen, FeedbackMode, Study, StudyPlan};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
-    Connection, FeedbackId, Instant, StoreError, StudyId, TrialId, archive, assessments, devices, feedback, gaits,
-    lab_sessions, measurement_files, now, presentations, reference_gaits, results, safety_reviews, studies, subjects,
-    trials,
+    Connection, FeedbackId, Instant, SafetyReportId, StoreError, StudyId, TrialId, archive, assessments, devices,
+    feedback, gaits, lab_sessions, measurement_files, now, presentations, reference_gaits, results, safety_reports,
+    safety_reviews, studies, subjects, trials,
 };
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -46,7 +46,7 @@ const READ_BY_NOUN: [&str; 12] = [
 /// Maximum length of any other text, characters. Longer than any note.
 const LONGEST_TEXT: usize = 20_000;
 /// Tolerance for the difference between the clocks of two machines, s.
-const CLOCKS_DIFFER_S: i64 = 86_400;
+const CLOCKS_DIFFER_S: i64 = 600;
 /// Relative tolerance between two computations of a Gait RMSE.
 const SAME_RMSE: f64 = 1e-9;
 
@@ -67,7 +67,10 @@ pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
         } else if column.ends_with("_at") || column.ends_with("_until") {
             let at: Instant = text.parse().map_err(|_| refuse(format!("{field} is {text:?}, which is not a time")))?;
             if at > now().plus_seconds(CLOCKS_DIFFER_S) && column != "lease_until" {
-                return Err(refuse(format!("{field} is {text}, which is in the future")));
+                return Err(refuse(format!(
+                    "{field} is {text}, which is in the future. Correct the clock of this machine, or import the archive after \
+                     that time"
+                )));
             }
         }
     }
@@ -319,11 +322,23 @@ async fn answers(
             return Err(refuse(format!("{what}: the preference derived from it is about other trials")));
         }
     }
+    let mut reports: HashSet<SafetyReportId> = HashSet::new();
+    reports.extend(
+        noted.iter().filter(|assessment| assessment.answer.is_about_safety()).map(|a| SafetyReportId::from(a.id)),
+    );
     for shown in at("presentations", presentations::of_study(db, id).await)? {
         at(format!("presentation {}", shown.id), of_gaits(trials, [shown.one, shown.other]))?;
+        reports.extend(shown.answer.filter(|said| said.is_about_safety()).map(|_| SafetyReportId::from(shown.id)));
     }
+    reports.extend(at("safety_reports", safety_reports::of_study(db, id).await)?.iter().map(|report| report.id));
+    let has_report = |session: &&LabSession| session.answers.iter().any(|answer| answer.said.is_about_safety());
+    reports.extend(sessions.iter().filter(has_report).map(|session| SafetyReportId::from(session.id)));
     for review in at("safety_reviews", safety_reviews::of_study(db, id).await)? {
-        at(format!("safety review {}", review.id), of_gaits(trials, [review.trial_id]))?;
+        let what = format!("safety review {}", review.id);
+        at(&what, of_gaits(trials, [review.trial_id]))?;
+        if let Some(unknown) = review.reports.iter().find(|report| !reports.contains(report)) {
+            return Err(refuse(format!("{what}: the archive has no safety report {unknown}")));
+        }
     }
     Ok(())
 }

@@ -8,6 +8,7 @@ use crate::printable;
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
 use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
 use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
@@ -161,11 +162,11 @@ async fn note(writer: &mut Writer, caller: &Caller, shown: &Presentation, action
     Ok(audit::append(writer, &caller.actor, action, &format!("presentation {}", shown.id), &detail).await?)
 }
 
-/// Records the answer of a rater.
+/// Records the answer of a rater. A pair has one answer, but a safety report is accepted at any time.
 ///
 /// # Errors
-/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] if the pair was already answered,
-/// [`Error::Invalid`] naming the field.
+/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] for an answer other than a safety report if the pair
+/// was already answered, [`Error::Invalid`] naming the field.
 pub async fn answer(
     writer: &mut Writer,
     caller: &Caller,
@@ -181,9 +182,6 @@ pub async fn answer(
             "one of the other answers, because only the service withdraws pairs",
         ));
     }
-    if shown.answer.is_some() {
-        return Err(Error::conflict(answered_already(sided.answer())));
-    }
     printable::note("note", &given.note, 2000)?;
     if given.response_ms.is_some_and(|ms| ms < 0) {
         return Err(Error::invalid("response_ms", json!(given.response_ms), "0 or more"));
@@ -192,6 +190,17 @@ pub async fn answer(
     let attribution = Attribution { source, author: &caller.name, note: &given.note };
     // From here on the answer refers to gaits, not to sides.
     let said = sided.turned(given.answer);
+    if shown.answer.is_some() {
+        if !said.is_about_safety() {
+            return Err(Error::conflict(answered_already(sided.answer())));
+        }
+        let reports = SafetyReports::read(writer, shown.study_id).await?;
+        let is_repeated = sided.answer() == Some(given.answer) && reports.is_open(shown.id.into());
+        if !is_repeated {
+            safety_report::after_an_answer(writer, caller, &said.unsafe_of(shown.pair()), attribution).await?;
+        }
+        return Ok((shown.study_id, Answered { number: shown.number }));
+    }
     // A presentation of the same gait twice, as in older records, states no preference.
     let heard = if shown.kind == Kind::Null {
         None

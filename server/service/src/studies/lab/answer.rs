@@ -4,15 +4,16 @@
 //! was in the lab could infer the allocation from them.
 
 use super::question::{can_be_retracted, next_number, next_walk};
-use super::session::{InTheLab, in_the_lab, still_open};
+use super::session::{InTheLab, in_the_lab, still_open, still_shown};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::assessment;
 use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::safety_report;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::feedback::{Attribution, Source};
-use gaitwright_store::lab_answers;
+use gaitwright_store::lab_answers::{self, LabAnswer};
 use gaitwright_store::lab_sessions::{Act, LabSession};
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::{LabSessionId, Writer, audit, events, lab_sessions, studies, subjects};
@@ -39,11 +40,11 @@ pub struct NewAnswer {
     pub note: String,
 }
 
-/// Records the answer of the subject.
+/// Records the answer of the subject. A safety report is accepted at any time, also in a closed session.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if there is another answer, or before all walks
-/// are recorded: a safety report is accepted once walk 1 is recorded.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the subject withdrew consent; for an answer other than a
+/// safety report also if there is another answer, before all walks are recorded, and in a closed session.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
     if new.answer == Judgement::Withdrawn {
         return Err(Error::invalid(
@@ -53,21 +54,23 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
         ));
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
-    let session = still_open(writer, id).await?;
+    let session = still_shown(writer, id).await?;
     let number = next_number(&session);
     if !(1..=number).contains(&new.number) {
         return Err(Error::invalid("number", new.number, &format!("1 to {number}")));
     }
-    // Nobody walks on to report that a walk was unsafe.
-    if let Some(walk) = next_walk(&session).filter(|walk| *walk == 1 || !new.answer.is_about_safety()) {
+    if new.answer.is_about_safety() {
+        return report_unsafe(writer, caller, &session, new).await;
+    }
+    let session = still_open(writer, id).await?;
+    if let Some(walk) = next_walk(&session) {
         return Err(Error::conflict(format!(
             "Walk {walk} is not recorded yet. Record all walks before you record the answer."
         )));
     }
     if let Some(stands) = session.answer() {
-        let same = (stands.number, stands.said, stands.note.as_str()) == (new.number, new.answer, new.note.as_str());
         let other = "There is already an answer. To change it, retract it first.";
-        return if same { in_the_lab(writer, id).await } else { Err(Error::conflict(other)) };
+        return if is_same(stands, new) { in_the_lab(writer, id).await } else { Err(Error::conflict(other)) };
     }
     if new.number != number {
         return Err(Error::conflict(format!(
@@ -75,6 +78,55 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
             new.number
         )));
     }
+    add(writer, caller, id, number, new).await
+}
+
+/// Whether an answer is the same form, sent twice.
+fn is_same(stands: &LabAnswer, new: &NewAnswer) -> bool {
+    (stands.number, stands.said, stands.note.as_str()) == (new.number, new.answer, new.note.as_str())
+}
+
+/// Records a safety report: as the answer of the session, in place of another answer while the session is blinded. If
+/// that cannot be, as a report of its own about the gait of the walk, or about both gaits while that is concealed.
+async fn report_unsafe(
+    writer: &mut Writer,
+    caller: &Caller,
+    session: &LabSession,
+    new: &NewAnswer,
+) -> Result<InTheLab, Error> {
+    let walked = session.walked();
+    match session.answer() {
+        None => add(writer, caller, session.id, next_number(session), new).await,
+        Some(stands) if is_same(stands, new) => in_the_lab(writer, session.id).await,
+        Some(stands) if walked.is_none() && !stands.said.is_about_safety() => {
+            take_back(writer, caller, session.id, stands.number).await?;
+            add(writer, caller, session.id, next_number(session), new).await
+        }
+        Some(_) => {
+            let (gaits, blinded) = match walked {
+                Some(pair) => (new.answer.unsafe_of(pair), ""),
+                None => (vec![session.gait_one, session.gait_two], "; blinded, so either gait may be meant"),
+            };
+            let walks = match new.answer {
+                Judgement::UnsafeFirst => "walk 2",
+                Judgement::UnsafeSecond => "walk 3",
+                _ => "walks 2 and 3",
+            };
+            let author = format!("the subject in lab session {} ({walks}{blinded})", session.number);
+            let attribution = Attribution { source: Source::Subject, author: &author, note: &new.note };
+            safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
+            in_the_lab(writer, session.id).await
+        }
+    }
+}
+
+async fn add(
+    writer: &mut Writer,
+    caller: &Caller,
+    id: LabSessionId,
+    number: u32,
+    new: &NewAnswer,
+) -> Result<InTheLab, Error> {
     if !lab_answers::insert(writer, &caller.actor, id, number, (new.answer, &new.note)).await? {
         return Err(Error::conflict("Another answer was recorded at the same time."));
     }
@@ -101,10 +153,14 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> 
                    coordinator to change it on the study page.";
         return Err(Error::conflict(why));
     }
-    lab_answers::retract(writer, &caller.actor, id, answer.number).await?;
-    let detail = json!({ "number": answer.number });
-    audit::append(writer, &caller.actor, "lab_session.retract", &format!("lab session {id}"), &detail).await?;
+    take_back(writer, caller, id, answer.number).await?;
     in_the_lab(writer, id).await
+}
+
+async fn take_back(writer: &mut Writer, caller: &Caller, id: LabSessionId, number: u32) -> Result<(), Error> {
+    lab_answers::retract(writer, &caller.actor, id, number).await?;
+    let detail = json!({ "number": number });
+    Ok(audit::append(writer, &caller.actor, "lab_session.retract", &format!("lab session {id}"), &detail).await?)
 }
 
 /// Passes the current answer, if any, to the learner with the subject as its author. If a gait has been reported as

@@ -56,11 +56,11 @@ pub(super) fn asks(session: &LabSession) -> Option<u32> {
     open.then(|| next_number(session))
 }
 
-/// The number of an answer that reports an unsafe walk, if one is accepted: once walk 1, the one without the device,
-/// is recorded.
+/// The number of an answer that reports an unsafe walk, if the subject may have walked with the device: walk 1, the one
+/// without it, is recorded, or a controller file was fetched.
 pub(super) fn takes_report(session: &LabSession) -> Option<u32> {
-    let open = session.done(Act::Closed).is_none() && session.answer().is_none();
-    (open && next_walk(session) != Some(1)).then(|| next_number(session))
+    let may_have_walked = next_walk(session) != Some(1) || !session.allocation.files.is_empty();
+    may_have_walked.then(|| next_number(session))
 }
 
 pub(super) fn next_number(session: &LabSession) -> u32 {

@@ -327,7 +327,7 @@ pub struct InTheLab {
     pub last_recorded: Option<Instant>,
     /// Number of the answer that is asked for. Absent before the last walk and after an answer.
     pub asks: Option<u32>,
-    /// Number of the answer that reports an unsafe walk. Absent before the first walk with the device and after an answer.
+    /// Number of the answer that reports an unsafe walk. Absent while nobody can have walked with the device.
     pub reports: Option<u32>,
     /// Current answer of the subject.
     pub answer: Option<AnswerView>,
