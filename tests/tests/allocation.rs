@@ -19,6 +19,7 @@ use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, 
 use gaitwright_tests::consistent::Consistent;
 use gaitwright_tests::orders::{gait_one_first, sides};
 use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::skipped::skipped;
 use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -149,6 +150,43 @@ async fn sessions_planned_walked_and_unblinded_in_turn_stay_balanced() {
     // Sessions of the same study say nothing about each other.
     let same = of_number[0].iter().zip(&of_number[1]).filter(|(a, b)| a == b).count();
     assert!(is_chance(same, 500), "{same}");
+    service.stop().await;
+}
+
+/// Minutes, so only with `GAITWRIGHT_LONG_TESTS=1`.
+#[tokio::test]
+async fn orders_of_10_000_sessions_are_balanced_whether_or_not_they_are_unblinded_in_turn() {
+    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
+        skipped("set GAITWRIGHT_LONG_TESTS=1");
+        return;
+    }
+    let (_folder, service) = one_service().await;
+    let (study, _) = finished(&service).await;
+    let mut writer = service.store.write().await.unwrap();
+    let studies = copies(&mut writer, study, 500).await;
+    let mut in_turn = Vec::new();
+    let mut concealed = Vec::new();
+    for _ in 0..20 {
+        in_turn.extend(planned_in_turn(&mut writer, &studies).await);
+    }
+    for _ in 0..20 {
+        for &of in &studies {
+            let (study, new) = session_of(of);
+            concealed.push(lab::plan(&mut writer, &Actor::program(), study, &new).await.unwrap().id);
+        }
+    }
+    let mut coins = Vec::new();
+    for id in concealed {
+        let unblinded = lab::unblind(&mut writer, &Actor::program(), id, "walked").await.unwrap();
+        coins.push(unblinded.allocation.gait_one_first.unwrap());
+    }
+    drop(writer);
+    let ones = |orders: &[bool]| orders.iter().filter(|first| **first).count();
+    let (turns, coins) = (chi_squared(ones(&in_turn), 10_000), chi_squared(ones(&coins), 10_000));
+    println!("chi-squared of 10000 sessions: unblinded in turn {turns:.3}, concealed together {coins:.2}");
+    assert!(coins < CRITICAL, "{coins}");
+    // A lead of 18 comes once in 50 million sessions.
+    assert!(turns <= chi_squared(5009, 10_000), "{turns}");
     service.stop().await;
 }
 
