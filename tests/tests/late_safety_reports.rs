@@ -37,6 +37,12 @@ fn names(trials: &[TrialId]) -> BTreeSet<String> {
     trials.iter().map(ToString::to_string).collect()
 }
 
+async fn clear(service: &Service, gait: &str) {
+    let review = json!({"verdict": "walkable", "reason": "seen again"});
+    let cleared = service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await;
+    assert_eq!(cleared.status, StatusCode::OK, "{}", cleared.text);
+}
+
 /// A study that waits for the answer to a pair, and the address of the pair.
 async fn pair(service: &Service) -> (StudyId, String) {
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
@@ -96,7 +102,13 @@ async fn a_report_that_is_repeated_counts_once_until_staff_clear_the_gait() {
     assert_eq!(service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status, StatusCode::OK);
     assert!(closed(&service, study).await.is_empty());
     assert_eq!(rate(&service, &token, "unsafe_first").await.status, StatusCode::OK);
-    assert_eq!(closed(&service, study).await, BTreeSet::from([gait]));
+    assert_eq!(closed(&service, study).await, BTreeSet::from([gait.clone()]));
+    assert_eq!(rate(&service, &token, "unsafe_both").await.status, StatusCode::OK);
+    let both = closed(&service, study).await;
+    assert_eq!(both.len(), 2);
+    clear(&service, &gait).await;
+    assert_eq!(rate(&service, &token, "unsafe_both").await.status, StatusCode::OK);
+    assert_eq!(closed(&service, study).await, both, "also if only one of two gaits was cleared");
     service.stop().await;
 }
 
@@ -120,6 +132,11 @@ async fn the_form_of_a_comparison_reports_a_gait_after_it_was_sent_with_another_
     assert_eq!(closed(&service, study).await, names(&[a]));
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
     assert_eq!(reports.as_array().unwrap().len(), 1, "the same form, sent twice, counts once: {reports}");
+    for _ in 0..2 {
+        clear(&service, &a.to_string()).await;
+        assert_eq!(send("unsafe_a").await, StatusCode::SEE_OTHER);
+        assert_eq!(closed(&service, study).await, names(&[a]), "after a review it is a new report");
+    }
     service.stop().await;
 }
 
@@ -190,13 +207,13 @@ async fn a_second_report_of_a_session_is_recorded_beside_the_first() {
     let (_folder, service) = service().await;
     let lab = Lab::walked(&service).await;
     assert_eq!(lab.answer(&service, 1, "unsafe_first").await, StatusCode::OK);
-    for gait in lab.gaits {
-        let review = json!({"verdict": "walkable", "reason": "a cable"});
-        let cleared = service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await;
-        assert_eq!(cleared.status, StatusCode::OK, "{}", cleared.text);
+    for again in ["unsafe_first", "unsafe_second"] {
+        for gait in lab.gaits {
+            clear(&service, &gait.to_string()).await;
+        }
+        assert_eq!(lab.answer(&service, 1, again).await, StatusCode::OK);
+        assert_eq!(closed(&service, lab.study).await, names(&lab.gaits), "{again}");
     }
-    assert_eq!(lab.answer(&service, 1, "unsafe_second").await, StatusCode::OK);
-    assert_eq!(closed(&service, lab.study).await, names(&lab.gaits));
     let reports = service.fetch(&format!("/api/v1/studies/{}/safety-reports", lab.study)).await.items().to_string();
     assert!(
         reports.contains("the subject in lab session 1 (walk 3; blinded, so either gait may be meant)"),

@@ -181,6 +181,8 @@ pub struct Presentation {
     pub answer: Option<Judgement>,
     /// Time of the answer.
     pub answered_at: Option<Instant>,
+    /// Free text of the answer; empty without one.
+    pub note: String,
 }
 
 impl Presentation {
@@ -308,7 +310,7 @@ pub async fn heard_of(db: &mut Connection, id: PresentationId) -> StoreResult<Op
 
 /// Selects presentations. A retracted answer reads as withdrawn.
 pub(super) const SELECT: &str = "select p.*, iif(r.presentation_id is null, a.answer, 'withdrawn') as answer, \
-                      a.created_at as answered_at, \
+                      a.created_at as answered_at, coalesce(a.note, '') as note, \
                       p.unblinded = 1 or coalesce(a.could_have_known, 0) = 1 as could_have_known from presentations p \
                       left join presentation_answers a on a.presentation_id = p.id \
                       left join presentation_retractions r on r.presentation_id = p.id ";
@@ -394,6 +396,7 @@ impl Presentation {
             created_at: row.try_get("created_at")?,
             answer: row.try_get::<Option<&str>, _>("answer")?.map(str::parse).transpose()?,
             answered_at: row.try_get("answered_at")?,
+            note: row.try_get("note")?,
         })
     }
 }

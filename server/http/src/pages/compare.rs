@@ -27,6 +27,7 @@ use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::comparison::{Question, open_question};
 use gaitwright_service::studies::preference::{self, StandingAnswer};
+use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable;
 use gaitwright_store::feedback::{FeedbackRow, Source};
@@ -306,6 +307,17 @@ impl Said {
     fn is_about_safety(&self) -> bool {
         matches!(self, Self::Assessment(assessment) if assessment.answer.is_about_safety())
     }
+
+    /// Whether every gait that this answer calls unsafe still has an open report.
+    async fn still_closes(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
+        match self {
+            Self::Assessment(given) if self.is_about_safety() => {
+                let gaits = given.answer.unsafe_of((given.first, given.second));
+                Ok(SafetyReports::read(db, study).await?.close_all(&gaits))
+            }
+            _ => Ok(true),
+        }
+    }
 }
 
 impl Submitted {
@@ -408,7 +420,10 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     let request = form.fingerprint(id);
     // A safety report has a key of its own, because it is recorded even if the form was sent before with another answer.
     let key = if said.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
-    if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
+    let before = idempotency::find(&mut writer, &caller.actor, &key).await?;
+    // A report that staff have reviewed since is a new one.
+    let is_reviewed = before.is_some() && !said.still_closes(&mut writer, id).await?;
+    if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;
         let recorded = Recorded::try_from(before.body)?;
         return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
@@ -423,8 +438,10 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
         Said::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
         Said::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };
-    let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
-    idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
+    if !is_reviewed {
+        let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
+        idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
+    }
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Given::Saved(saved))

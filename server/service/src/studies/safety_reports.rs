@@ -210,9 +210,10 @@ impl SafetyReports {
         self.closed.iter().filter(|closed| closed.trial == trial).cloned().collect()
     }
 
-    /// Whether a report is open.
-    pub fn is_open(&self, report: SafetyReportId) -> bool {
-        self.closed.iter().any(|closed| closed.id() == report)
+    /// Whether each of these gaits has an open report of its own. A report that is sent twice counts once as long as this
+    /// holds: after a review it is a new report.
+    pub fn close_all(&self, gaits: &[TrialId]) -> bool {
+        gaits.iter().all(|gait| self.closed.iter().any(|closed| closed.trial == *gait))
     }
 
     /// An open report about the gait of this trial, which may have been given for another trial of the subject.

@@ -88,6 +88,7 @@ mod tests {
             created_at: now(),
             answer: Some(Judgement::First),
             answered_at: Some(now()),
+            note: String::new(),
         }
     }
 

@@ -194,10 +194,10 @@ pub async fn answer(
         if !said.is_about_safety() {
             return Err(Error::conflict(answered_already(sided.answer())));
         }
-        let reports = SafetyReports::read(writer, shown.study_id).await?;
-        let is_repeated = sided.answer() == Some(given.answer) && reports.is_open(shown.id.into());
-        if !is_repeated {
-            safety_report::after_an_answer(writer, caller, &said.unsafe_of(shown.pair()), attribution).await?;
+        let gaits = said.unsafe_of(shown.pair());
+        let is_repeated = shown.answer == Some(said) && shown.note == given.note;
+        if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.close_all(&gaits)) {
+            safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
         return Ok((shown.study_id, Answered { number: shown.number }));
     }

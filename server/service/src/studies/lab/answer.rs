@@ -11,6 +11,7 @@ use crate::printable;
 use crate::studies::assessment;
 use crate::studies::preference::{self, Again, GivenJudgement};
 use crate::studies::safety_report;
+use crate::studies::safety_reports::SafetyReports;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::feedback::{Attribution, Source};
 use gaitwright_store::lab_answers::{self, LabAnswer};
@@ -95,18 +96,22 @@ async fn report_unsafe(
     new: &NewAnswer,
 ) -> Result<InTheLab, Error> {
     let walked = session.walked();
+    let (gaits, blinded) = match walked {
+        Some(pair) => (new.answer.unsafe_of(pair), ""),
+        None => (vec![session.gait_one, session.gait_two], "; blinded, so either gait may be meant"),
+    };
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,
-        Some(stands) if is_same(stands, new) => in_the_lab(writer, session.id).await,
+        Some(stands)
+            if is_same(stands, new) && SafetyReports::read(writer, session.study_id).await?.close_all(&gaits) =>
+        {
+            in_the_lab(writer, session.id).await
+        }
         Some(stands) if walked.is_none() && !stands.said.is_about_safety() => {
             take_back(writer, caller, session.id, stands.number).await?;
             add(writer, caller, session.id, next_number(session), new).await
         }
         Some(_) => {
-            let (gaits, blinded) = match walked {
-                Some(pair) => (new.answer.unsafe_of(pair), ""),
-                None => (vec![session.gait_one, session.gait_two], "; blinded, so either gait may be meant"),
-            };
             let walks = match new.answer {
                 Judgement::UnsafeFirst => "walk 2",
                 Judgement::UnsafeSecond => "walk 3",
