@@ -18,6 +18,7 @@ pub mod metrics;
 pub mod muscle;
 mod opensim;
 pub mod phase_portrait;
+mod quadrature;
 pub mod reference;
 pub mod settings;
 mod signal_filter;
@@ -36,9 +37,9 @@ pub use interior_point::{NlpSettings, WarmPoint};
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
-    BasinChoice, CancelToken, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, MuscleRoute, OtherBasin,
-    SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus, StartedFrom, Violation,
-    WarmStart, solve, solve_from_guesses,
+    BasinChoice, CancelToken, GaitFigures, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, MuscleRoute,
+    OtherBasin, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus,
+    StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
 };
 pub use subject::{ModelError, Subject};
 pub use tuned_bounds::TunedBounds;

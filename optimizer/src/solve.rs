@@ -6,6 +6,7 @@ use std::time::Instant;
 
 mod attempts;
 mod error;
+mod figures;
 mod multi_start;
 mod options;
 mod outcome;
@@ -17,6 +18,7 @@ mod warm_start;
 
 use attempts::{Tried, choose, enforce_between_nodes, number_basins, try_guesses, try_multi_start, try_warm};
 pub use error::SolveError;
+pub use figures::GaitFigures;
 pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use options::{BasinChoice, SolveOptions};
 use outcome::{SolveTally, other_basin, outcome};

@@ -14,4 +14,4 @@ pub use clearance::kept_clearance_m;
 pub use domain::{CYCLE, ContactRow, Domain, DomainKind};
 pub use impact::{Impact, impact, kinetic_energy};
 pub use phase::phase_gradient;
-pub use progress::{Progress, progress};
+pub use progress::{Progress, progress, progress_error_m};

@@ -7,9 +7,10 @@ use gait_optimizer::certificate::certify;
 use gait_optimizer::explanation::explain;
 use gait_optimizer::settings::Naturalness;
 use gait_optimizer::solve::StartedFrom;
+use gait_optimizer::walking::progress_error_m;
 use gait_optimizer::{
-    CancelToken, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
-    WarmStart, solve,
+    CancelToken, Gait, GaitFigures, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject,
+    TunedBounds, WarmStart, solve,
 };
 use std::io::Write;
 use std::sync::LazyLock;
@@ -49,6 +50,67 @@ fn cold_then_warm() {
     let attempts = &warm.report.attempts;
     assert_eq!(attempts[0].strategy, "warm start");
     assert!(attempts.iter().rev().map(|a| a.chosen).eq((0..attempts.len()).map(|i| i == 0)));
+}
+
+#[test]
+fn figures_of_a_gait_are_those_of_its_report_and_every_other_value_differs() {
+    let reference = problem("").reference;
+    for outcome in [&*COLD, &solved(&problem(""), None, 3)] {
+        let figures = GaitFigures::of(&outcome.gait, &reference).unwrap();
+        let stated = GaitFigures::stated_in(&outcome.report);
+        assert_eq!(figures, stated);
+        let scaled = |figure: &mut f64| *figure *= 1.0 + 1e-6;
+        let changes: [fn(&mut GaitFigures) -> &mut f64; 7] = [
+            |f| &mut f.cost_of_transport,
+            |f| &mut f.gait_rmse_rad,
+            |f| &mut f.gait_rmse_parts_rad[4],
+            |f| &mut f.speed_m_s,
+            |f| &mut f.stride_length_m,
+            |f| &mut f.durations_s[7],
+            |f| &mut f.vhip_m_s[3],
+        ];
+        for figure in changes {
+            let mut other = stated;
+            scaled(figure(&mut other));
+            let (_, changed, computed) = other.difference(&figures).unwrap();
+            assert!(changed > computed, "{other:?}");
+        }
+    }
+}
+
+/// The gait with other figures, and times that match them.
+fn with_figures(gait: &Gait, change: impl Fn(&mut Gait)) -> Gait {
+    let mut changed = gait.clone();
+    change(&mut changed);
+    let mut start = 0.0;
+    for domain in &mut changed.domains {
+        let gaps = (domain.time_s.len() - 1) as f64;
+        domain.time_s = (0..domain.q.len()).map(|k| start + domain.duration_s * k as f64 / gaps).collect();
+        start += domain.duration_s;
+    }
+    changed.stride_time_s = start;
+    changed.speed_m_s = changed.stride_length_m / start;
+    changed
+}
+
+#[test]
+fn figures_of_a_gait_that_differ_from_its_motion_are_detected() {
+    let gait = &COLD.gait;
+    let hip_is_off = progress_error_m(gait).unwrap();
+    assert!(hip_is_off < 2e-6, "{hip_is_off}");
+    for d in 0..8 {
+        let longer = with_figures(gait, |gait| gait.domains[d].duration_s += 2e-5);
+        longer.validate().unwrap();
+        let hip_is_off = progress_error_m(&longer).unwrap();
+        assert!(hip_is_off > 1e-5, "domain {d}: {hip_is_off}");
+    }
+    // The certificate compares the others with the motion at the nodes.
+    let objects = |change: fn(&mut Gait), objection: &str| {
+        let objections = certify(&with_figures(gait, change)).unwrap().objections;
+        assert!(objections.iter().any(|words| words.starts_with(objection)), "{objections:?}");
+    };
+    objects(|gait| gait.stride_length_m *= 1.0 + 1e-5, "C2 continuity of the stride");
+    objects(|gait| gait.hip_velocity_m_s[3] *= 1.0 + 1e-5, "C2 hip velocity, at nodes");
 }
 
 /// The objections of the certificate between the nodes.

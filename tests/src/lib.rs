@@ -19,6 +19,7 @@ pub mod explained;
 pub mod large;
 pub mod measured;
 pub mod orders;
+pub mod scripted;
 pub mod service;
 pub mod skipped;
 pub mod sources;

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_optimizer::Mesh;
+use gait_optimizer::{Gait, GaitFigures, Mesh};
 use gaitwright_service::studies::archive::{self, SigningKey};
 use gaitwright_store::row::Row;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
@@ -138,15 +138,53 @@ fn definition(row: &mut Value, change: impl FnOnce(&mut Value)) {
     row["name"] = document["name"].clone();
 }
 
-/// Changes a figure of the first converged trial wherever it occurs.
-fn everywhere(rows: &mut Rows, column: &str, value: f64) {
+/// Changes the report of the first converged trial wherever it occurs.
+fn in_reports(rows: &mut Rows, change: impl Fn(&mut Value)) {
     let trial = rows.table("trials").into_iter().find(|row| row["state"] == "converged").unwrap();
-    trial[column] = value.into();
-    within(trial, "report", |report| report[column] = value.into());
+    within(trial, "report", &change);
     let id = trial["id"].clone();
     for result in rows.table("results").into_iter().filter(|row| row["trial_id"] == id) {
-        within(result, "report", |report| report[column] = value.into());
+        within(result, "report", &change);
     }
+}
+
+/// Changes a figure of the first converged trial wherever it occurs.
+fn everywhere(rows: &mut Rows, column: &str, value: f64) {
+    rows.table("trials").into_iter().find(|row| row["state"] == "converged").unwrap()[column] = value.into();
+    in_reports(rows, |report| report[column] = value.into());
+}
+
+/// Scales a figure by a factor that makes another motion of it.
+fn scale(figure: &mut Value) {
+    *figure = (1.0002 * figure.as_f64().unwrap()).into();
+}
+
+/// Lengthens the last domain of a gait, with the times that follow from it.
+fn lengthen(gait: &mut Value) {
+    let domain = &mut gait["domains"][7];
+    let before = domain["duration_s"].as_f64().unwrap();
+    domain["duration_s"] = (before + 1e-3).into();
+    let (start, after) = (domain["time_s"][0].as_f64().unwrap(), domain["duration_s"].as_f64().unwrap());
+    for time in domain["time_s"].as_array_mut().unwrap() {
+        *time = (start + (time.as_f64().unwrap() - start) * after / before).into();
+    }
+    let stride = gait["stride_time_s"].as_f64().unwrap() + after - before;
+    gait["stride_time_s"] = stride.into();
+    gait["speed_m_s"] = (gait["stride_length_m"].as_f64().unwrap() / stride).into();
+}
+
+/// Writes the figures of a gait into the reports of the first converged trial.
+fn state_figures_of(rows: &mut Rows, gait: &Value) {
+    let gait: Gait = serde_json::from_value(gait.clone()).unwrap();
+    let reference = serde_json::from_str(rows.first("reference_gaits")["definition"].as_str().unwrap()).unwrap();
+    let figures = GaitFigures::of(&gait, &reference).unwrap();
+    everywhere(rows, "gait_rmse_rad", figures.gait_rmse_rad);
+    everywhere(rows, "cost_of_transport", figures.cost_of_transport);
+    in_reports(rows, |report| {
+        report["gait_rmse_parts_rad"] = json!(figures.gait_rmse_parts_rad);
+        report["speed_m_s"] = json!(figures.speed_m_s);
+        report["durations_s"] = json!(figures.durations_s);
+    });
 }
 
 fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
@@ -156,9 +194,9 @@ fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
-const FORGERIES: [Forgery; 57] = [
+const FORGERIES: [Forgery; 64] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its figures differ from its solve report"),
-    ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated Gait RMSE is 0.01 rad"),
+    ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated gait_rmse_rad is 0.01"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
     (
         "a better cost",
@@ -173,13 +211,37 @@ const FORGERIES: [Forgery; 57] = [
     (
         "parts of an RMSE",
         |r| {
-            let parts = json!([0.0, 0.0, 0.0, 0.0, 0.0]);
-            within(r.first("trials"), "report", |report| report["gait_rmse_parts_rad"] = parts.clone());
-            let id = r.first("trials")["id"].clone();
-            let result = r.table("results").into_iter().find(|row| row["trial_id"] == id).unwrap();
-            within(result, "report", |report| report["gait_rmse_parts_rad"] = parts.clone());
+            in_reports(r, |report| report["gait_rmse_parts_rad"] = json!([0.0, 0.0, 0.0, 0.0, 0.0]));
         },
-        "its stated Gait RMSE is",
+        "its stated gait_rmse_parts_rad is",
+    ),
+    ("a better cost everywhere", |r| everywhere(r, "cost_of_transport", 0.01), "its stated cost_of_transport is 0.01"),
+    (
+        "a longer stride",
+        |r| in_reports(r, |report| scale(&mut report["stride_length_m"])),
+        "its stated stride_length_m is",
+    ),
+    ("a faster gait", |r| in_reports(r, |report| scale(&mut report["speed_m_s"])), "its stated speed_m_s is"),
+    ("a longer domain", |r| in_reports(r, |report| scale(&mut report["durations_s"][7])), "its stated durations_s is"),
+    ("a faster hip", |r| in_reports(r, |report| scale(&mut report["vhip_m_s"][3])), "its stated vhip_m_s is"),
+    (
+        "a longer domain of the gait, too",
+        |r| {
+            let id = r.table("trials").into_iter().find(|row| row["state"] == "converged").unwrap()["id"].clone();
+            let row = r.table("gaits").into_iter().find(|row| row["trial_id"] == id).unwrap();
+            gait(row, lengthen);
+            let document: Value = serde_json::from_str(&text_of(&row["gait"])).unwrap();
+            for column in ["speed_m_s", "stride_time_s"] {
+                row[column] = document[column].clone();
+            }
+            state_figures_of(r, &document);
+        },
+        "the durations of its gait differ from its motion",
+    ),
+    (
+        "a gait of another subject",
+        |r| gait(r.first("gaits"), |g| scale(&mut g["subject"]["body_mass_kg"])),
+        "another height or body mass",
     ),
     (
         "a gait that is not its hash",
@@ -207,7 +269,7 @@ const FORGERIES: [Forgery; 57] = [
     (
         "a changed angle",
         |r| gait(r.first("gaits"), |g| g["domains"][0]["q"][1][5] = 1.0.into()),
-        "its stated Gait RMSE is",
+        "its stated gait_rmse_rad is",
     ),
     ("a gait without domains", |r| gait(r.first("gaits"), |g| g["domains"] = json!([])), "number of domains"),
     ("a gait of missing points", |r| gait(r.first("gaits"), |g| g["domains"][0]["qd"] = json!([])), "has 0 entries"),
@@ -239,7 +301,7 @@ const FORGERIES: [Forgery; 57] = [
     (
         "a nearer reference",
         |r| definition(r.first("reference_gaits"), |d| d["angles_rad"][7][1] = 0.9.into()),
-        "its stated Gait RMSE",
+        "its stated gait_rmse_rad is",
     ),
     (
         "a reference of few rows",

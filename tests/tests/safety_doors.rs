@@ -4,12 +4,16 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_optimizer::Device;
 use gaitwright_service::access::{Caller, Right};
 use gaitwright_service::studies::lab;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_service::studies::plan::NewStudy;
+use gaitwright_service::studies::walkable::{self, NotWalkable};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{StudyId, TokenId};
+use gaitwright_store::{DeviceId, StudyId, TokenId};
 use gaitwright_tests::callers::FORM;
+use gaitwright_tests::scripted;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
 use serde_json::{Value, json};
@@ -79,6 +83,78 @@ async fn a_report_closes_every_trial_of_the_subject_with_the_same_motion() {
     assert_eq!(clear(&service, &twin).await, StatusCode::OK);
     assert_eq!(controller(&service, best).await, StatusCode::OK);
     service.stop().await;
+}
+
+/// Trials of one action: evaluated by a lab script in two studies, by the service in a third one, and by a lab script
+/// with another device.
+#[tokio::test]
+async fn a_report_closes_every_trial_with_equal_bounds_if_a_lab_script_evaluated_one_of_them() {
+    let (_folder, service) = service().await;
+    let device = another_device(&service).await;
+    let by_script = |new: &mut NewStudy| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3);
+    let (first, second) = (service.study(by_script).await, service.study(by_script).await);
+    let on_another = service
+        .study(|new| {
+            by_script(new);
+            new.device_id = Some(device);
+        })
+        .await;
+    let computed = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(computed, &[StudyState::Finished]).await;
+    let reported = scripted::trial(&service, first).await;
+    let mut others = vec![scripted::trial(&service, second).await, scripted::trial(&service, on_another).await];
+    others.extend(converged(&service, computed).await.into_iter().filter(|trial| trial.number == 1));
+    assert!(others.len() == 3 && others.iter().all(|trial| trial.action == reported.action));
+    let different = scripted::trial(&service, second).await;
+    assert_ne!(different.action, reported.action);
+
+    let is_closed = async |trial: &Trial| {
+        let found = walkable::admit(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
+        matches!(found, Err(NotWalkable::ReportedUnsafe { .. } | NotWalkable::SameGaitReportedUnsafe { .. }))
+    };
+    assert!(!is_closed(&reported).await && !is_closed(&others[0]).await);
+    report(&service, &reported).await;
+    assert!(is_closed(&reported).await && is_closed(&others[0]).await);
+    assert!(!is_closed(&others[1]).await, "equal bounds give another gait with another device");
+    assert!(is_closed(&others[2]).await, "the gait of the lab may be this one");
+    assert!(!is_closed(&different).await);
+    assert_eq!(clear(&service, &reported).await, StatusCode::OK);
+    assert!(!is_closed(&others[0]).await && !is_closed(&others[2]).await);
+
+    report(&service, &others[2]).await;
+    assert!(is_closed(&reported).await && !is_closed(&others[1]).await);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_lab_script_is_not_given_bounds_that_were_reported_as_unsafe() {
+    let (_folder, service) = service().await;
+    let by_script = |new: &mut NewStudy| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3);
+    let (first, second, third) =
+        (service.study(by_script).await, service.study(by_script).await, service.study(by_script).await);
+    let ask = async |study: StudyId| service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await;
+    let open = ask(second).await.json();
+    let reported = scripted::trial(&service, first).await;
+    assert_eq!(open["action"], json!(reported.action));
+    report(&service, &reported).await;
+
+    let again = ask(second).await;
+    assert!(again.status == StatusCode::CONFLICT && again.text.contains("Cancel the trial"), "{}", again.text);
+    service.post(&format!("/api/v1/trials/{}/cancel", open["id"].as_str().unwrap()), &json!({})).await;
+    for study in [first, second, third] {
+        let given = ask(study).await;
+        assert_eq!(given.status, StatusCode::OK, "{}", given.text);
+        assert_ne!(given.json()["action"], json!(reported.action));
+    }
+    service.stop().await;
+}
+
+/// A device that differs from the built-in one in its name.
+async fn another_device(service: &Service) -> DeviceId {
+    let definition = Device { name: "AMPRO3, second unit".to_owned(), ..Device::ampro3().unwrap() };
+    let made = service.post("/api/v1/devices", &json!(definition)).await;
+    assert_eq!(made.status, StatusCode::CREATED, "{}", made.text);
+    made.json()["id"].as_str().unwrap().parse().unwrap()
 }
 
 #[tokio::test]

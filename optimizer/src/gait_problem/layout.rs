@@ -6,6 +6,7 @@
 
 use crate::body::{COORDINATES, JOINTS};
 use crate::muscle::MUSCLE_COUNT;
+use crate::quadrature::simpson;
 use crate::settings::Mesh;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, Domain, DomainKind};
 
@@ -98,14 +99,7 @@ impl DomainLayout {
     /// Composite Simpson weight of node k; the weights of a domain sum to 1.
     #[inline]
     pub fn simpson(&self, k: usize) -> f64 {
-        let weight = if k % 2 == 1 {
-            4.0
-        } else if k == 0 || k == self.points - 1 {
-            1.0
-        } else {
-            2.0
-        };
-        weight / (6.0 * self.intervals as f64)
+        simpson(k, self.points)
     }
     /// Index of the last node.
     #[inline]

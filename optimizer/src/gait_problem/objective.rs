@@ -12,6 +12,7 @@ use super::layout::{FORCE, Q, QD, QDD, U};
 use super::programme::GaitProgramme;
 use crate::body::{COORDINATES, GRAVITY, JOINTS};
 use crate::muscle::MUSCLE_COUNT;
+use crate::settings::Regularisation;
 
 /// The parts of the objective before weighting.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -73,20 +74,40 @@ fn smooth_power(power: f64, smoothing: f64) -> [f64; 3] {
     [root - smoothing, power / root, smoothing * smoothing / (root * root * root)]
 }
 
+/// Mean mechanical power of a domain, W, from the Simpson weight, torques and joint velocities of each node.
+pub(crate) fn mean_power(
+    nodes: impl Iterator<Item = (f64, [f64; JOINTS], [f64; JOINTS])>,
+    regularisation: &Regularisation,
+) -> f64 {
+    let mut sum = 0.0;
+    for (weight, torques, velocities) in nodes {
+        for (torque, velocity) in torques.into_iter().zip(velocities) {
+            sum += weight * smooth_power(torque * velocity, regularisation.power_smoothing_w)[0];
+        }
+    }
+    sum
+}
+
+/// Mechanical cost of transport of the effort of a stride, dimensionless.
+pub(crate) fn cost_of_transport(energy_j: f64, total_mass_kg: f64, stride_length_m: f64) -> f64 {
+    energy_j / (total_mass_kg * GRAVITY * stride_length_m)
+}
+
 /// The parts.
 pub(super) fn parts(programme: &GaitProgramme, x: &[f64]) -> ObjectiveParts {
     let layout = &programme.layout;
     let mut result = ObjectiveParts::default();
     for (d, domain) in layout.domains.iter().enumerate() {
         let duration = layout.value(x, domain.duration);
-        let (mut energy, mut regularisation, mut tracking) = (0.0, 0.0, 0.0);
+        let (mut regularisation, mut tracking) = (0.0, 0.0);
+        let nodes = (0..domain.points).map(|k| {
+            let joints = |first: usize| std::array::from_fn(|i| layout.value(x, domain.point(k) + first + i));
+            (domain.simpson(k), joints(U), joints(QD + 3))
+        });
+        let energy = mean_power(nodes, &programme.regularisation);
         for k in 0..domain.points {
             let p = domain.point(k);
             let weight = domain.simpson(k);
-            for i in 0..JOINTS {
-                let power = layout.value(x, p + U + i) * layout.value(x, p + QD + 3 + i);
-                energy += weight * smooth_power(power, programme.regularisation.power_smoothing_w)[0];
-            }
             for (offset, c) in squares(programme, d) {
                 let value = layout.value(x, p + offset);
                 regularisation += weight * c * value * value;
@@ -104,7 +125,7 @@ pub(super) fn parts(programme: &GaitProgramme, x: &[f64]) -> ObjectiveParts {
         result.tracking += tracking / domain.points as f64;
     }
     let stride = layout.value(x, layout.stride_length);
-    result.cost_of_transport = result.energy_j / (programme.model.total_mass * GRAVITY * stride);
+    result.cost_of_transport = cost_of_transport(result.energy_j, programme.model.total_mass, stride);
     result
 }
 

@@ -1,6 +1,7 @@
 //! The outcome of a solve from its attempts.
 
 use super::attempts::Candidate;
+use super::figures::GaitFigures;
 use super::phases::SolveContext;
 use super::report::{
     LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
@@ -8,7 +9,6 @@ use super::report::{
 use super::warm_start::WarmStart;
 use crate::gait_problem::margins::Margins;
 use crate::gait_problem::{GaitProgramme, RowViolation};
-use crate::metrics::gait_rmse;
 use interior_point::{NlpResult, NonlinearProgram};
 
 /// Total cost of the attempts of a solve.
@@ -34,19 +34,18 @@ pub(super) fn outcome(
     let (problem, programme) = (context.problem, context.programme);
     let Candidate { result, gait, status, .. } = candidate;
     let x = &result.x;
-    let rmse = gait_rmse(&gait, &problem.reference);
+    let figures = GaitFigures::of_well_formed(&gait, &programme.model, &problem.reference);
     let margins = margins.bearing_on(programme, x);
     let violations = programme.violations(x);
-    let parts = programme.objective_parts(x);
     let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
     let report = SolveReport {
         status,
         started_from,
         iterations: tally.iterations,
         objective: programme.objective(x),
-        cost_of_transport: parts.cost_of_transport,
-        gait_rmse_rad: rmse.total,
-        gait_rmse_parts_rad: rmse.parts,
+        cost_of_transport: figures.cost_of_transport,
+        gait_rmse_rad: figures.gait_rmse_rad,
+        gait_rmse_parts_rad: figures.gait_rmse_parts_rad,
         max_violation: violations.first().map_or(0.0, |v| v.amount),
         optimality: Some(Optimality {
             dual_infeasibility: result.scaled_residuals.dual_infeasibility,
@@ -62,10 +61,10 @@ pub(super) fn outcome(
         variables: programme.variables(),
         equalities,
         inequalities: programme.rows() - equalities,
-        speed_m_s: gait.speed_m_s,
-        stride_length_m: gait.stride_length_m,
-        durations_s: std::array::from_fn(|d| gait.domains[d].duration_s),
-        vhip_m_s: gait.hip_velocity_m_s,
+        speed_m_s: figures.speed_m_s,
+        stride_length_m: figures.stride_length_m,
+        durations_s: figures.durations_s,
+        vhip_m_s: figures.vhip_m_s,
         attempts: tally.attempts,
     };
     let violations = if status == SolveStatus::Converged {

@@ -3,6 +3,7 @@
 use super::{CYCLE, phase_gradient};
 use crate::body::WalkerModel;
 use crate::gait::Gait;
+use crate::quadrature::simpson;
 use crate::subject::ModelError;
 
 /// Phase and hip velocity at a node.
@@ -32,4 +33,25 @@ pub fn progress(gait: &Gait) -> Result<Vec<Progress>, ModelError> {
         trajectory.q.iter().zip(&trajectory.qd).map(point).collect::<Vec<_>>()
     };
     Ok(CYCLE.iter().map(|domain| domain.stance).zip(&gait.domains).flat_map(of_domain).collect())
+}
+
+/// How far the hip position at the end of a domain is from the integral of its velocity over the stated duration, m, in
+/// the worst domain of a well-formed gait. It is within the tolerance of the constraints for a converged gait: the hip
+/// velocity is constant, or, in SS1, integrated by the same Simpson rule.
+///
+/// # Errors
+/// [`ModelError`] if subject or device of the gait is invalid.
+pub fn progress_error_m(gait: &Gait) -> Result<f64, ModelError> {
+    let all = progress(gait)?;
+    let mut later = &all[..];
+    let mut worst = 0.0_f64;
+    for domain in &gait.domains {
+        let (nodes, rest) = later.split_at(domain.q.len());
+        later = rest;
+        let [first, .., last] = nodes else { continue };
+        let travelled = (last.phase - first.phase) * (domain.phase_end_m - domain.phase_start_m);
+        let velocities = nodes.iter().enumerate().map(|(k, node)| simpson(k, nodes.len()) * node.hip_velocity_m_s);
+        worst = worst.max((travelled - domain.duration_s * velocities.sum::<f64>()).abs());
+    }
+    Ok(worst)
 }

@@ -67,6 +67,15 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Im
     rows.iter().map(from_row).collect()
 }
 
+/// Whether a study came here, or on its way, in an archive without a trusted signature.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn is_untrusted(db: &mut Connection, study: StudyId) -> StoreResult<bool> {
+    let sql = "select exists(select 1 from imports where study_id = ? and not trusted)";
+    Ok(sqlx::query_scalar(sql).bind(study).fetch_one(db).await?)
+}
+
 fn from_row(row: &SqliteRow) -> StoreResult<Import> {
     Ok(Import {
         file_sha256: row.try_get("file_sha256")?,

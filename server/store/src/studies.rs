@@ -400,18 +400,18 @@ pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) 
     rows.iter().map(from_row).collect()
 }
 
-/// The other studies of a study's subject that have a safety report.
+/// The other studies of a study's subject that have a safety report, each with whether it has the same device.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn others_with_safety_reports(db: &mut Connection, study: StudyId) -> StoreResult<Vec<StudyId>> {
+pub async fn others_with_safety_reports(db: &mut Connection, study: StudyId) -> StoreResult<Vec<(StudyId, bool)>> {
     let sql = concat!(
-        "select s.id from studies s where s.subject_id = (select subject_id from studies where id = ?1) and s.id <> ?1 \
-         and s.id in (",
+        "select s.id, s.device_id = own.device_id from studies own join studies s on s.subject_id = own.subject_id \
+         where own.id = ?1 and s.id <> ?1 and s.id in (",
         reported!(),
         ") order by s.id"
     );
-    Ok(sqlx::query_scalar(sql).bind(study).fetch_all(db).await?)
+    Ok(sqlx::query_as(sql).bind(study).fetch_all(db).await?)
 }
 
 /// The newest accessible studies of a subject.

@@ -38,7 +38,7 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> R
     let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);
     let log = snapshot.log();
     let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
-    let proposal = propose(&plan.search_space, &log, &snapshot.taken_without_result(), &plan.learner, seed)?;
+    let proposal = propose(&plan.search_space, &log, &snapshot.barred_without_result(), &plan.learner, seed)?;
     Ok(NewTrial {
         number,
         action_index: proposal.action,

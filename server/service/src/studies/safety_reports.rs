@@ -2,6 +2,7 @@
 
 use super::motion::Motion;
 use crate::access::Reach;
+use gait_optimizer::TunedBounds;
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::safety_reports as reports;
 use gaitwright_store::safety_reviews::{self, SafetyReview, SafetyVerdict};
@@ -79,13 +80,17 @@ pub struct ClosedMotion {
     study: StudyId,
     /// Number of the trial of the report.
     number: u32,
+    /// Whether its study has the device of the study for which the reports were read.
+    same_device: bool,
     motion: Option<Motion>,
 }
 
 impl ClosedMotion {
-    /// Whether the report is about this motion.
+    /// Whether the report is about this motion of a trial of the study for which the reports were read.
     fn has(&self, motion: &Motion) -> bool {
-        self.motion.as_ref().is_some_and(|own| own.is_same(motion))
+        self.motion.as_ref().is_some_and(|own| {
+            if self.same_device { own.is_same(motion) } else { own.is_same_with_another_device(motion) }
+        })
     }
 
     /// The trial of the report, as shown to people, if it is not the given one.
@@ -121,18 +126,24 @@ impl SafetyReports {
     /// Errors of the database.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::given_in(db, study).await?;
-        found.add_motions(db, study, found.closed.clone()).await?;
-        for other in studies::others_with_safety_reports(db, study).await? {
+        found.add_motions(db, (study, true), found.closed.clone()).await?;
+        for (other, same_device) in studies::others_with_safety_reports(db, study).await? {
             let elsewhere = Self::given_in(db, other).await?.closed;
-            found.add_motions(db, other, elsewhere).await?;
+            found.add_motions(db, (other, same_device), elsewhere).await?;
         }
         Ok(found)
     }
 
-    async fn add_motions(&mut self, db: &mut Connection, study: StudyId, closed: Vec<Closed>) -> StoreResult<()> {
+    async fn add_motions(
+        &mut self,
+        db: &mut Connection,
+        (study, same_device): (StudyId, bool),
+        closed: Vec<Closed>,
+    ) -> StoreResult<()> {
         for report in closed {
             let trial = trials::get(db, report.trial).await?;
-            self.motions.push(ClosedMotion { report, study, number: trial.number, motion: Motion::of(&trial) });
+            let (number, motion) = (trial.number, Motion::of(&trial));
+            self.motions.push(ClosedMotion { report, study, number, same_device, motion });
         }
         Ok(())
     }
@@ -223,6 +234,13 @@ impl SafetyReports {
         }
         let own = self.motions.iter().find(|closed| closed.report.trial == trial.id);
         own.or_else(|| Motion::of(trial).and_then(|motion| self.motions.iter().find(|closed| closed.has(&motion))))
+    }
+
+    /// The bounds of gaits with an open report and with the device of this study. A lab script must not evaluate them
+    /// again, because the subject may walk in its evaluation.
+    pub fn closed_bounds(&self) -> impl Iterator<Item = TunedBounds> {
+        let on_device = self.motions.iter().filter(|closed| closed.same_device);
+        on_device.filter_map(|closed| closed.motion.as_ref()).map(Motion::bounds)
     }
 
     /// Whether the gait of this trial has an open report.

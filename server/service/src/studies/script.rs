@@ -7,6 +7,7 @@ use super::belief::Beliefs;
 use super::choice::{self, ChoiceError};
 use super::comparison::{by_gait_rmse, partners};
 use super::preference;
+use super::safety_reports::SafetyReports;
 use super::snapshot::StudySnapshot;
 use crate::access::Caller;
 use crate::error::Error;
@@ -93,6 +94,18 @@ pub async fn suggest(
     }
 }
 
+/// Refuses an open trial whose bounds were reported as unsafe since it was handed out.
+async fn not_reported(writer: &mut Writer, trial: &Trial) -> Result<(), Error> {
+    let reports = SafetyReports::read(writer, trial.study_id).await?;
+    if reports.closed_bounds().any(|bounds| bounds == trial.action) {
+        let number = trial.number;
+        return Err(Error::conflict(format!(
+            "A gait with the bounds of trial {number} was reported as unsafe. Cancel the trial, then ask again."
+        )));
+    }
+    Ok(())
+}
+
 /// Writes the chosen trial. Returns `None` if the study has changed, and the caller must choose again.
 ///
 /// # Errors
@@ -105,9 +118,11 @@ pub async fn give_out(
 ) -> Result<Option<Trial>, Error> {
     let (snapshot, new) = match suggestion {
         Suggestion::Same(id) => {
+            let open = trials::get(writer, *id).await?;
+            not_reported(writer, &open).await?;
             audit::append(writer, &caller.actor, "trial.ask", &format!("trial {id}"), &json!({ "again": true }))
                 .await?;
-            return Ok(Some(trials::get(writer, *id).await?));
+            return Ok(Some(open));
         }
         Suggestion::New(snapshot, new) => (snapshot, new),
     };

@@ -89,6 +89,15 @@ pub fn bounds_of(space: &SearchSpace, base: TunedBounds, action: ActionIndex) ->
     Ok(bounds)
 }
 
+/// The action with these bounds, if the search space has it.
+pub fn action_of(space: &SearchSpace, base: TunedBounds, bounds: TunedBounds) -> Option<ActionIndex> {
+    let all = bounds.to_array();
+    let value = |dimension: &Dimension| Some(all[TunedBounds::NAMES.iter().position(|name| *name == dimension.name)?]);
+    let values: Option<Vec<f64>> = space.dimensions().iter().map(value).collect();
+    let action = space.index_of_values(&values?).ok()?;
+    bounds_of(space, base, action).is_ok_and(|found| found == bounds).then_some(action)
+}
+
 /// Checks that every dimension is a bound and that every combination of values makes valid bounds.
 ///
 /// # Errors
@@ -137,6 +146,9 @@ mod tests {
         let base = TunedBounds { a1: 17.0, ..TunedBounds::default() };
         let bounds = bounds_of(&space, base, ActionIndex(1)).unwrap();
         assert_eq!(bounds, TunedBounds { a5: 0.02, ..base });
+        assert_eq!(action_of(&space, base, bounds), Some(ActionIndex(1)));
+        assert_eq!(action_of(&space, TunedBounds::default(), bounds), None);
+        assert_eq!(action_of(&space, base, TunedBounds { a5: 0.01, ..base }), None);
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! A consistent snapshot of a study: its trials, its feedback log and its walkable gaits.
 
+use super::search;
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
-use gaitwright_store::studies::{FeedbackMode, Study};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, Study};
 use gaitwright_store::trials::{NewTrial, Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, trials};
 use std::collections::{HashMap, HashSet};
@@ -159,9 +160,14 @@ impl StudySnapshot {
         log
     }
 
-    /// Actions without a result that must not be proposed again: being solved, or failed.
-    pub fn taken_without_result(&self) -> Vec<ActionIndex> {
-        self.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index).collect()
+    /// Actions that must not be proposed although the study has no result of them: being solved, failed, or, in a study
+    /// of a lab script, with bounds of a gait that was reported as unsafe.
+    pub fn barred_without_result(&self) -> Vec<ActionIndex> {
+        let plan = &self.study.plan;
+        let open = self.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index);
+        let closed = self.grounds.safety_reports.closed_bounds().filter(|_| plan.evaluation == Evaluation::Script);
+        let closed = closed.filter_map(|bounds| search::action_of(&plan.search_space, plan.base_bounds, bounds));
+        open.chain(closed).collect()
     }
 }
 

@@ -10,7 +10,9 @@ use gait_optimizer::Gait;
 use gait_optimizer::export::ControllerFile;
 use gaitwright_store::certificates::{self, CertificateOnRecord};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, Packed, StoreError, StoreResult, StudyId, TrialId, consents, gaits, trials};
+use gaitwright_store::{
+    Connection, Packed, StoreError, StoreResult, StudyId, TrialId, consents, gaits, imports, trials,
+};
 use std::collections::HashMap;
 use thiserror::Error as ThisError;
 
@@ -128,6 +130,15 @@ pub enum NotWalkable {
         /// Its number.
         number: u32,
     },
+    /// The study came from an archive without a trusted signature, and no certificate passed here.
+    #[error(
+        "Trial {number} belongs to a study from an archive without a trusted signature. Such a gait must not be walked \
+         or compared unless a certificate made here has passed."
+    )]
+    Unconfirmed {
+        /// Number of the trial.
+        number: u32,
+    },
     /// The trajectory was pruned before it was certified.
     #[error("The gait of trial {number} was pruned before it was certified.")]
     Pruned {
@@ -149,7 +160,7 @@ impl From<NotWalkable> for Error {
     }
 }
 
-/// The facts that decide which gaits of a study are walkable: safety reports, certificates and consent.
+/// The facts that decide which gaits of a study are walkable: safety reports, certificates, consent and origin.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Grounds {
     /// Safety reports and their reviews.
@@ -158,6 +169,9 @@ pub struct Grounds {
     pub certificates: HashMap<TrialId, CertificateOnRecord>,
     /// Whether the subject withdrew consent.
     pub withdrawn: bool,
+    /// Whether the study came from an archive without a trusted signature. Nobody vouches for its figures and states,
+    /// so only a certificate made here can admit one of its gaits.
+    pub untrusted: bool,
 }
 
 impl Grounds {
@@ -170,6 +184,7 @@ impl Grounds {
             safety_reports: SafetyReports::read(db, study).await?,
             certificates: certificates::of_study(db, study).await?,
             withdrawn: consents::is_withdrawn(db, study).await?,
+            untrusted: imports::is_untrusted(db, study).await?,
         })
     }
 
@@ -187,6 +202,7 @@ impl Grounds {
             safety_reports: SafetyReports::read(db, study).await?,
             certificates: found,
             withdrawn: consents::is_withdrawn(db, study).await?,
+            untrusted: imports::is_untrusted(db, study).await?,
         })
     }
 
@@ -217,6 +233,9 @@ impl Grounds {
             }
             Some(CertificateOnRecord::Pruned) | None => return Err(NotWalkable::Pruned { number }),
         };
+        if self.untrusted && certified != Certified::Passed {
+            return Err(NotWalkable::Unconfirmed { number });
+        }
         Ok(WalkableGait { trial: trial.id, number, study: trial.study_id, certified })
     }
 

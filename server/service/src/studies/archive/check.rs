@@ -7,10 +7,10 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::comparison::by_gait_rmse;
 use crate::studies::lab::EmgResult;
-use crate::studies::{device, lab, plan, reference_import, search, subject, trial_state};
-use gait_optimizer::metrics::gait_rmse;
+use crate::studies::{device, lab, plan, reference_import, search, solve_input, subject, trial_state};
 use gait_optimizer::solve::CONVERGED_VIOLATION;
-use gait_optimizer::{Gait, ReferenceGait, WarmStart};
+use gait_optimizer::walking::progress_error_m;
+use gait_optimizer::{Gait, GaitFigures, ReferenceGait, WarmStart};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::archive::Definition;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
@@ -47,8 +47,9 @@ const READ_BY_NOUN: [&str; 12] = [
 const LONGEST_TEXT: usize = 20_000;
 /// Tolerance for the difference between the clocks of two machines, s.
 const CLOCKS_DIFFER_S: i64 = 600;
-/// Relative tolerance between two computations of a Gait RMSE.
-const SAME_RMSE: f64 = 1e-9;
+/// Tolerance for the hip position that follows from the durations of a converged gait, m: ten times that of a row. The
+/// certificate cannot check the duration of SS1, because the closed loop has no clock there.
+const HIP_PROGRESS_M: f64 = 1e-5;
 
 /// Checks a row by itself: text is printable, times have passed, identifiers are well-formed.
 pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
@@ -89,6 +90,7 @@ pub(super) struct Checked {
 /// The study data that trials must agree with.
 struct Context {
     study: Study,
+    body: gait_optimizer::Subject,
     device: gait_optimizer::Device,
     reference: ReferenceGait,
 }
@@ -126,7 +128,8 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     of_definition("reference_gaits", &reference.name, &written)?;
 
     let id = study.id;
-    let context = Arc::new(Context { study, device, reference });
+    let body = at("subject", solve_input::body_of(db, &study.plan).await)?;
+    let context = Arc::new(Context { study, body, device, reference });
     let trials = at("trials", trials::of_study(db, id).await)?;
     let mut unchecked_rmse = 0;
     let mut earlier = HashSet::new();
@@ -240,6 +243,9 @@ async fn gait(db: &mut Connection, pool: &Pool, trial: &Trial, context: &Arc<Con
 /// Checks the stored outcome of a solve against its trial.
 fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart) -> Result<(), String> {
     gait.validate().map_err(|e| e.to_string())?;
+    if gait.subject != context.body {
+        return Err("its gait belongs to a subject of another height or body mass".to_owned());
+    }
     let plan = &context.study.plan;
     if gait.device != context.device
         || gait.muscles != plan.muscles
@@ -251,18 +257,25 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
     if warm_start.muscles != plan.muscles || warm_start.mesh != plan.gait_settings.mesh {
         return Err("its warm start belongs to another problem".to_owned());
     }
-    same_rmse(trial, gait, &context.reference)
+    same_figures(trial, gait, &context.reference)?;
+    if trial.state == TrialState::Converged {
+        let error = progress_error_m(gait).map_err(|e| e.to_string())?;
+        let follows = error <= HIP_PROGRESS_M;
+        if !follows {
+            return Err(format!("the durations of its gait differ from its motion: the hip is off by {error:.1e} m"));
+        }
+    }
+    Ok(())
 }
 
-fn same_rmse(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
+/// Checks every stated figure that the gait determines. Safety reports recognise a motion by these figures.
+fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
     let Some(report) = &trial.report else { return Ok(()) };
-    let anew = gait_rmse(gait, reference);
-    let agree = |told: f64, anew: f64| (told - anew).abs() <= SAME_RMSE * (1.0 + anew.abs());
-    let parts = report.gait_rmse_parts_rad.iter().zip(anew.parts).all(|(told, anew)| agree(*told, anew));
-    if agree(report.gait_rmse_rad, anew.total) && parts {
-        return Ok(());
+    let anew = GaitFigures::of(gait, reference).map_err(|e| e.to_string())?;
+    match GaitFigures::stated_in(report).difference(&anew) {
+        Some((name, stated, anew)) => Err(format!("its stated {name} is {stated}, but that of its gait is {anew}")),
+        None => Ok(()),
     }
-    Err(format!("its stated Gait RMSE is {} rad, but that of its gait is {} rad", report.gait_rmse_rad, anew.total))
 }
 
 /// Checks the results that workers delivered for a trial.
