@@ -166,7 +166,7 @@ impl<'de> Visitor<'de> for CellVisitor {
     type Value = Cell;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("null, a number, a text or bytes")
+        f.write_str("null, a number, a string or bytes")
     }
 
     fn visit_unit<E>(self) -> Result<Cell, E> {
@@ -188,7 +188,7 @@ impl<'de> Visitor<'de> for CellVisitor {
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Cell, E> {
         if text.len() > LARGEST_TEXT_BYTES {
             return Err(E::custom(format!(
-                "a text has {} bytes, but at most {LARGEST_TEXT_BYTES} are allowed",
+                "a string has {} bytes, but at most {LARGEST_TEXT_BYTES} are allowed",
                 text.len()
             )));
         }

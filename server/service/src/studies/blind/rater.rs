@@ -178,7 +178,7 @@ pub async fn answer(
         return Err(Error::invalid(
             "answer",
             "withdrawn",
-            "one of the other answers, because only the service withdraws pairs",
+            "one of the other answers, because only the service withdraws answers",
         ));
     }
     if shown.answer.is_some() {
