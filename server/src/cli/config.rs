@@ -59,20 +59,20 @@ const KNOWN: &[(&str, &str, &str)] = &[
 pub(super) struct RecordFlags {
     /// TOML settings file (default: GAITWRIGHT_CONFIG, or gaitwright.toml if it exists).
     #[arg(long, value_name = "FILE")]
-    pub(super) config: Option<PathBuf>,
+    config: Option<PathBuf>,
     /// SQLite file of the record (default: gaitwright.db).
     #[arg(long, value_name = "FILE")]
-    pub(super) database: Option<String>,
+    database: Option<String>,
 }
 
 /// Flags of every command that verifies or changes a record.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct AnchoredFlags {
     #[command(flatten)]
-    pub(super) record: RecordFlags,
+    record: RecordFlags,
     /// Second anchor file for the newest hashes of the record, best on another disk. An empty name means none.
     #[arg(long, value_name = "FILE")]
-    pub(super) anchor: Option<String>,
+    anchor: Option<String>,
 }
 
 impl From<RecordFlags> for AnchoredFlags {
@@ -91,7 +91,7 @@ impl From<AnchoredFlags> for Flags {
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Flags {
     #[command(flatten)]
-    pub(super) record: AnchoredFlags,
+    record: AnchoredFlags,
     /// Address and port to listen on (default: 127.0.0.1:8080).
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<String>,
@@ -112,10 +112,10 @@ pub(super) struct Flags {
     workers: Option<usize>,
     /// NATS broker for remote workers, see `gaitwright worker` (default: solve in this process).
     #[arg(long, value_name = "URL")]
-    pub(super) nats: Option<String>,
+    nats: Option<String>,
     /// Name of this service on the broker (default: gaitwright).
     #[arg(long, value_name = "NAME")]
-    pub(super) nats_queue: Option<String>,
+    nats_queue: Option<String>,
     /// Do not require users to sign in. Only on a loopback address.
     #[arg(long)]
     no_sign_in: bool,
@@ -348,6 +348,11 @@ impl Settings {
 }
 
 impl Flags {
+    /// The flags of a worker.
+    pub(super) fn of_broker(config: Option<PathBuf>, nats: Option<String>, nats_queue: Option<String>) -> Self {
+        Self { record: RecordFlags { config, database: None }.into(), nats, nats_queue, ..Self::default() }
+    }
+
     fn get(&self, name: &str) -> Option<String> {
         match name {
             "listen" => self.listen.clone(),

@@ -1,6 +1,6 @@
 //! `gaitwright worker`: runs solves for a service on another machine.
 
-use super::config::{Flags, RecordFlags, Settings};
+use super::config::{Flags, Settings};
 use super::numbers::workers;
 use super::serve::{cores_or, interrupted};
 use clap::Args;
@@ -31,13 +31,7 @@ pub(super) struct Worker {
 
 impl Worker {
     pub(super) fn flags(&self) -> Flags {
-        let record = RecordFlags { config: self.config.clone(), database: None };
-        Flags {
-            record: record.into(),
-            nats: self.nats.clone(),
-            nats_queue: self.nats_queue.clone(),
-            ..Flags::default()
-        }
+        Flags::of_broker(self.config.clone(), self.nats.clone(), self.nats_queue.clone())
     }
 
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
