@@ -435,8 +435,8 @@ fn impossible_mean_strides_are_rejected() {
         ),
         (
             |angles| with_ankle(angles, angles[3] + std::f64::consts::FRAC_PI_2),
-            "ankle_L_rad is 92° on average over the stride; at most 30° in either direction is plausible; check that 0° is the right angle \
-             between foot and shank",
+            "ankle_L_rad is 92° on average over the stride; at most 30° in either direction is plausible; check that the angle is 0° when \
+             foot and shank are perpendicular",
         ),
         (
             |angles| with_ankle(angles, angles[3].to_radians()),

@@ -468,7 +468,7 @@ async fn signed_in_user_reports_a_gait_in_their_own_name() {
     let sent = send(&service, &clinician, &Method::POST, &format!("{trial}/safety-report"), FORM, "note=fell").await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
     let page = send(&service, &clinician, &Method::GET, &trial, FORM, "").await.text;
-    assert!(page.contains("reported as unsafe by a clinician"), "{page}");
+    assert!(page.contains("unsafe</a> by a clinician"), "{page}");
     service.stop().await;
 }
 

@@ -69,8 +69,9 @@ enum Command {
     Serve(serve::Serve),
     /// Run solves for a service on another machine, through a NATS broker.
     Worker(worker::Worker),
-    /// Run an unattended study, in which Gait RMSE answers the comparisons. Continues an unfinished study with the same
-    /// settings.
+    /// Run an unattended study, in which Gait RMSE answers the comparisons.
+    ///
+    /// Continues an unfinished study with the same settings.
     Tune(tune::Tune),
     /// Reproduce the paper's comparison of gaits with and without muscles.
     Reproduce(reproduce::Reproduce),
@@ -94,7 +95,9 @@ enum Command {
     Openapi,
     /// Back up a record, also while the service is running.
     Backup(backup::Backup),
-    /// Replace a record with a backup, while the service is stopped. The replaced record is kept next to it.
+    /// Replace a record with a backup, while the service is stopped.
+    ///
+    /// The replaced record is kept next to it.
     Restore(backup::Restore),
     /// Export a study to an archive, also while the service is running.
     Export(study::Export),
@@ -104,7 +107,9 @@ enum Command {
     SigningKey(study::NewKey),
     /// List users or create sign-in links for them, while the service is stopped.
     Users(users::Users),
-    /// Delete old trajectories, while the service is stopped. Results, answers and recommended gaits are kept.
+    /// Delete old trajectories, while the service is stopped.
+    ///
+    /// Results, answers and recommended gaits are kept.
     Prune(study::Prune),
 }
 

@@ -320,7 +320,7 @@ mod tests {
             (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "other fields besides its binary value"),
             (r#"{"a": 1, "a": 2}"#.to_owned(), "twice"),
             (r#"{"a": 18446744073709551615}"#.to_owned(), "too large"),
-            (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a text has"),
+            (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a string has"),
             (format!(r#"{{"{}": 1}}"#, "x".repeat(101)), "a name of more than"),
             ("[".repeat(100_000), "invalid type"),
         ] {
