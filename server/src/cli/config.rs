@@ -335,6 +335,16 @@ impl Settings {
         }
     }
 
+    /// Prints every setting, its value and its origin.
+    pub(super) fn show(&self) -> Result<(), Error> {
+        for &(name, _, meaning) in KNOWN {
+            let origin = self.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
+            let value = without_password(self.text(name));
+            data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;
+        }
+        Ok(())
+    }
+
     /// The log filter, and whether the log is JSON.
     pub(super) fn log(&self) -> Result<(EnvFilter, bool), Error> {
         let allowed = "targets and levels such as warn,gaitwright=info";
@@ -454,15 +464,6 @@ impl Config {
     pub(super) fn flags(&self) -> Flags {
         let ConfigCommand::Show { flags } = &self.what;
         (**flags).clone()
-    }
-
-    pub(super) fn run(self, settings: &Settings) -> Result<(), Error> {
-        for &(name, _, meaning) in KNOWN {
-            let origin = settings.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
-            let value = without_password(settings.text(name));
-            data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;
-        }
-        Ok(())
     }
 }
 

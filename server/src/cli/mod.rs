@@ -165,7 +165,7 @@ pub fn run() -> ExitCode {
         Command::Emg(emg) => emg.run().map(|()| Ended::Done),
         Command::Convert(convert) => convert.run().map(|()| Ended::Done),
         Command::Audit(audit) => runtime.block_on(audit.run(&settings)).map(|()| Ended::Done),
-        Command::Config(config) => config.run(&settings).map(|()| Ended::Done),
+        Command::Config(_) => settings.show().map(|()| Ended::Done),
         Command::Openapi => {
             let text = openapi::text().map_err(|e| Error::Internal(e.to_string()));
             text.and_then(|text| data(text.trim_end())).map(|()| Ended::Done)
