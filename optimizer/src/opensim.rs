@@ -13,7 +13,7 @@ pub enum AngleUnit {
 }
 
 impl AngleUnit {
-    fn in_words(self) -> &'static str {
+    pub(crate) fn in_words(self) -> &'static str {
         match self {
             Self::Degrees => "degrees",
             Self::Radians => "radians",

@@ -131,7 +131,7 @@ fn cycle_is_the_mean_of_complete_strides() {
     assert!((cycle.standard_deviation[50] - 0.9 / 2.0_f64.sqrt()).abs() < 1e-12);
     assert!((cycle.peak() - 1.35).abs() < 1e-12 && (cycle.average() - 0.9).abs() < 1e-12);
     let none = CycleActivity::cut(&ramp(), &[0.0, 0.2]).unwrap_err().to_string();
-    assert!(none.contains("none of the 1 strides is within the recording and lasts 0.8 to 1.6 s"), "{none}");
+    assert!(none.contains("no stride is within the recording and lasts 0.8 to 1.6 s"), "{none}");
 }
 
 fn flat(channel: &str, level: f64) -> CycleActivity {
@@ -155,11 +155,12 @@ fn emg_rmse_matches_a_value_computed_by_hand() {
     assert!((parts[0] - (51.0 / 101.0_f64).sqrt() * 0.2).abs() < 1e-12 && (parts[1] - 0.3).abs() < 1e-12);
     // More than ten times the peak of normal walking is doubtful.
     gait[0].mean[7] = 2.5;
-    assert_eq!(emg_rmse(&gait, &normal).unwrap().remarks, [""; 0]);
+    assert_eq!(emg_rmse(&gait, &normal).unwrap().warnings, [""; 0]);
     gait[0].mean[7] = 2.75;
-    let doubted =
-        ["the peak of BF is 11.0 times that of normal walking; check that both recordings have the same unit"];
-    assert_eq!(emg_rmse(&gait, &normal).unwrap().remarks, doubted);
+    let doubted = [
+        "the peak of BF is 11.0 times that of the walk without the device; check that both recordings have the same unit",
+    ];
+    assert_eq!(emg_rmse(&gait, &normal).unwrap().warnings, doubted);
     assert!(matches!(emg_rmse(&gait[..1], &normal), Err(ModelError::Unknown { value, .. }) if value == "TA"));
 
     let walked = flat("TA", 0.6).normalised_by(&normal[0]).unwrap();

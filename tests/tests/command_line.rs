@@ -271,7 +271,10 @@ fn settings_of_the_solver_are_refused_with_field_value_and_range() {
         (r#"{"tau_mni": 0.9}"#, "field tau_mni is unknown (line 1, column 10). Known fields: tolerance, "),
         (r#"{"tau_min": "high"}"#, "field tau_min is \"high\" (line 1, column 18); it must be a number"),
         (r#"{"linear_solver": "ma57"}"#, "field linear_solver is \"ma57\""),
-        (r#"{"max_iterations": 5}"#, "max_iterations is determined by the phases of a solve"),
+        (
+            r#"{"max_iterations": 5}"#,
+            "max_iterations cannot be set here, because each phase of a solve sets its own value; omit it",
+        ),
         ("[]", "The document is not an object with named fields"),
     ] {
         std::fs::write(folder.path().join("solver.json"), settings).unwrap();

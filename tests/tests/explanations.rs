@@ -96,7 +96,8 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     assert!(!page.contains("/explain\""), "there is nothing to ask for any more");
 
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    let reason = format!("Relaxing a5 (swing-foot clearance) alone gives a gait in {0} of {0} explained", trials.len());
+    let reason =
+        format!("In {0} of {0} explained trials, relaxing a5 (swing-foot clearance) alone gives a gait", trials.len());
     assert!(page.contains(&reason) && page.contains(&format!("/trials/{}#explanation", trials[0].id)), "{page}");
     service.stop().await;
 }

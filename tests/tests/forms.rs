@@ -2,11 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
+use axum::http::{Method, StatusCode};
+use gaitwright_service::access::Role;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::{self, send, signed_in};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::json;
 use std::time::Duration;
@@ -435,6 +437,68 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
         let folded = before.matches("<details").count() > before.matches("</details>").count();
         assert!(!folded || before.rsplit("<details").next().unwrap().split('>').next().unwrap().contains(" open"));
     }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn new_study_of_a_subject_preselects_the_subject() {
+    let (_folder, service) = service().await;
+    let new = json!({"pseudonym": "S07", "height_m": 1.7, "body_mass_kg": 70});
+    let subject = service.post("/api/v1/subjects", &new).await.json()["id"].as_str().unwrap().to_owned();
+    let link = format!("/studies/new?subject={subject}");
+    assert!(service.fetch(&format!("/subjects/{subject}")).await.text.contains(&link));
+    let form = service.fetch(&link).await.text;
+    assert!(form.contains(&format!("value=\"{subject}\" selected")), "{form}");
+    assert_eq!(
+        form.split("name=\"subject\"").nth(1).unwrap().split("</select>").next().unwrap().matches(" selected").count(),
+        1
+    );
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn signed_in_user_reports_a_gait_in_their_own_name() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = format!("/trials/{}", service.trials(study).await[0].id);
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let page = send(&service, &clinician, &Method::GET, &trial, FORM, "").await.text;
+    assert!(page.contains("Reported by a clinician") && !page.contains("id=\"reporter\""), "{page}");
+    let sent = send(&service, &clinician, &Method::POST, &format!("{trial}/safety-report"), FORM, "note=fell").await;
+    assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
+    let page = send(&service, &clinician, &Method::GET, &trial, FORM, "").await.text;
+    assert!(page.contains("unsafe</a> by a clinician"), "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn refused_forms_name_fields_by_their_labels() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let long = "x".repeat(2001);
+    for (path, form, expected) in [
+        (
+            "correct",
+            "height_m=17.2&body_mass_kg=70&reason=r&before=0".to_owned(),
+            "Height, m is 17.2; it must be 1.4 to 2.2.",
+        ),
+        ("correct", "height_m=1.72&body_mass_kg=70&reason=&before=0".to_owned(), "Reason must be 1 to 2000 characters"),
+        (
+            "correct",
+            format!("height_m=1.72&body_mass_kg=70&reason={long}&before=0"),
+            "Reason must be at most 2000 characters long.",
+        ),
+    ] {
+        let refused = service.post_text(&format!("/subjects/{subject}/{path}"), FORM, &form).await;
+        is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, expected);
+    }
+    let other = "pseudonym=S08&height_m=17.2&body_mass_kg=70";
+    let refused = service.post_text("/subjects", FORM, other).await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Height, m is 17.2; it must be 1.4 to 2.2.");
+    let other = "name=x&form=csv&recording=y&strikes=ends&height_m=tall";
+    let refused = service.post_text("/reference-gaits", FORM, other).await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Height, m is \u{201c}tall\u{201d}; it must be a number.");
     service.stop().await;
 }
 

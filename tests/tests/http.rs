@@ -224,11 +224,11 @@ async fn preferences_are_given_read_back_and_taken_back() {
     assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
     let mut row = given.json();
     assert_eq!(row.as_object_mut().unwrap().remove("other_answers"), Some(json!([])), "nobody else answered this");
-    assert_eq!((&row["said"]["kind"], &row["said"]["winner"]), (&json!("preference"), &json!(converged[1])));
+    assert_eq!((&row["content"]["kind"], &row["content"]["winner"]), (&json!("preference"), &json!(converged[1])));
     assert_eq!(service.fetch(given.headers["location"].to_str().unwrap()).await.json(), row);
 
     let tie = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "no_difference"});
-    assert_eq!(service.post(&path, &tie).await.json()["said"]["kind"], "tie");
+    assert_eq!(service.post(&path, &tie).await.json()["content"]["kind"], "tie");
 
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     let itself = json!({"trial_a": converged[0], "trial_b": converged[0], "answer": "a"});
@@ -295,7 +295,7 @@ async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_ef
     assert_eq!(rows.len(), 3);
     for row in rows {
         assert_eq!(
-            (&row["said"]["kind"], &row["source"], &row["author"], &row["note"]),
+            (&row["content"]["kind"], &row["source"], &row["author"], &row["note"]),
             (&json!("preference"), &json!("clinician"), &json!("K"), &json!(""))
         );
     }

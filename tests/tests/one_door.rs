@@ -570,7 +570,7 @@ async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned
     let rows = lab_sessions::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
     assert!(rows[0].answer().is_some(), "what was said stays in the record");
     let audit = scene.service.fetch("/api/v1/audit").await.text;
-    assert!(audit.contains("lab_session.answer_not_heard"), "{audit}");
+    assert!(audit.contains("lab_session.answer_not_used"), "{audit}");
     scene.service.stop().await;
 }
 

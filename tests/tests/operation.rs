@@ -301,6 +301,68 @@ async fn settings_show_where_each_value_comes_from() {
 }
 
 #[tokio::test]
+async fn every_command_takes_record_and_second_anchor_from_the_settings_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| gaitwright(folder.path(), arguments);
+    let verified = || run(&["audit", "verify"]);
+    let write = |name: &str| {
+        std::fs::write(folder.path().join(name), "database = \"a.db\"\nanchor = \"b.anchor\"\n").unwrap();
+    };
+    write("gaitwright.toml");
+    let database = folder.path().join("a.db");
+    Service::start(&database, Analytic::default(), 1).await.stop().await;
+    let store = Store::open(&database).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    gaitwright_service::access::people::way_in(&mut writer).await.unwrap();
+    commit(writer).await.unwrap();
+    store.close().await;
+    let (done, text) = verified();
+    assert!(!done && text.contains("b.anchor"), "a second anchor that is missing: {text}");
+
+    // Opens the record with the second anchor, and thereby creates it.
+    let (done, text) = run(&["users", "list"]);
+    assert!(done && text.contains("admin"), "{text}");
+    let (done, text) = verified();
+    assert!(done && text.contains("complete according to anchor b.anchor"), "{text}");
+    let (done, text) = run(&["backup", "copy.db"]);
+    assert!(done, "{text}");
+    let (done, text) = run(&["users", "link", "admin"]);
+    assert!(done && text.contains("/sign-in/"), "{text}");
+    assert!(verified().0);
+
+    // An earlier state in its place is noticed by the second anchor alone.
+    std::fs::remove_file(folder.path().join("a.db.anchor")).unwrap();
+    for ending in ["-wal", "-shm"] {
+        let _ = std::fs::remove_file(folder.path().join(format!("a.db{ending}")));
+    }
+    std::fs::copy(folder.path().join("copy.db"), &database).unwrap();
+    for arguments in [&["audit", "verify"][..], &["users", "list"], &["prune", "--older-than-days", "1"]] {
+        let (done, text) = run(arguments);
+        assert!(!done && text.contains("its anchor b.anchor"), "{arguments:?}: {text}");
+    }
+    let (done, text) = run(&["audit", "verify", "--database", "copy.db", "--anchor", ""]);
+    assert!(done, "{text}");
+    let (done, text) = run(&["restore", "copy.db"]);
+    assert!(done, "{text}");
+    assert!(verified().0);
+
+    std::fs::rename(folder.path().join("gaitwright.toml"), folder.path().join("other.toml")).unwrap();
+    let (done, text) = verified();
+    assert!(!done && text.contains("gaitwright.db"), "{text}");
+    let (done, text) = run(&["audit", "verify", "--config", "other.toml"]);
+    assert!(done && text.contains("complete according to anchor b.anchor"), "{text}");
+}
+
+#[test]
+fn anchor_in_a_folder_that_does_not_exist_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let serve = ["serve", "--no-sign-in", "--listen", "127.0.0.1:0", "--anchor", "other disk/b.anchor"];
+    let (done, text) = gaitwright(folder.path(), &serve);
+    assert!(!done && text.contains("There is no folder other disk for the anchor other disk/b.anchor."), "{text}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was created");
+}
+
+#[tokio::test]
 async fn restricted_study_is_restricted_where_it_is_imported() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;

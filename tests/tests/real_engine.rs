@@ -82,7 +82,8 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
         cli::run(BINARY, folder, &[&["solve", "--warm", "many.json", "--warm-basin", "9"][..], &COARSE].concat());
     assert_eq!(unknown.status.code(), Some(2));
     assert!(
-        String::from_utf8_lossy(&unknown.stderr).contains("many.json has no basin 9 for --warm-basin. Basins: 1, 2")
+        String::from_utf8_lossy(&unknown.stderr)
+            .contains("many.json has no local optimum (basin) with the number 9. Numbers for --warm-basin: 1, 2")
     );
 
     let [reachable, unreachable] = ["a5=0.013", "a7=5,a8=5"];

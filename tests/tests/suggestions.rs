@@ -49,7 +49,7 @@ async fn the_learner_hears_a_suggestion_until_it_is_taken_back() {
     let given = service.post(&path, &new).await;
     assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
     let given = given.json();
-    let suggested = ActionIndex(given["said"]["suggested"].as_u64().unwrap());
+    let suggested = ActionIndex(given["content"]["suggested"].as_u64().unwrap());
     let mut expected = plan.search_space.values(trial.action_index);
     expected[5] = other;
     assert_eq!(plan.search_space.values(suggested), expected);

@@ -32,12 +32,8 @@ impl CycleActivity {
             .filter(|(start, end)| *start >= envelope.start_s && *end <= envelope.end_s())
             .collect();
         if strides.is_empty() {
-            let reason = format!(
-                "none of the {} strides is within the recording and lasts {} to {} s",
-                heel_strikes_s.len().saturating_sub(1),
-                STRIDE_RANGE_S.0,
-                STRIDE_RANGE_S.1
-            );
+            let reason =
+                format!("no stride is within the recording and lasts {} to {} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
             return Err(ModelError::Malformed { what: format!("channel {}", envelope.channel), reason });
         }
         let count = strides.len() as f64;
@@ -65,7 +61,8 @@ impl CycleActivity {
     pub fn normalised_by(&self, normal_walking: &Self) -> Result<Self, ModelError> {
         let peak = normal_walking.peak();
         if peak.is_nan() || peak <= 0.0 {
-            let reason = format!("the peak of normal walking is {peak}; normalisation needs a positive peak");
+            let reason =
+                format!("the peak of the walk without the device is {peak}; normalisation needs a positive peak");
             return Err(ModelError::Malformed { what: format!("channel {}", self.channel), reason });
         }
         let divided = |values: &[f64]| values.iter().map(|value| value / peak).collect();
@@ -96,8 +93,8 @@ pub struct EmgRmse {
     /// RMS difference of each channel, in the order of normal walking.
     pub parts: Vec<f64>,
     /// Warnings about doubtful channels.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub remarks: Vec<String>,
+    #[serde(default, alias = "remarks", skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// Ratio of peaks above which a channel is doubtful.
@@ -108,7 +105,7 @@ fn doubt(activity: &CycleActivity, normal: &CycleActivity) -> Option<String> {
     let times = activity.peak() / normal.peak();
     (times > LARGEST_PEAK).then(|| {
         let name = &activity.channel;
-        format!("the peak of {name} is {times:.1} times that of normal walking; check that both recordings have the same unit")
+        format!("the peak of {name} is {times:.1} times that of the walk without the device; check that both recordings have the same unit")
     })
 }
 
@@ -118,12 +115,12 @@ fn doubt(activity: &CycleActivity, normal: &CycleActivity) -> Option<String> {
 /// # Errors
 /// [`ModelError::Unknown`] for a channel that is missing in the gait.
 pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Result<EmgRmse, ModelError> {
-    let (mut parts, mut remarks) = (Vec::new(), Vec::new());
+    let (mut parts, mut warnings) = (Vec::new(), Vec::new());
     for normal in normal_walking {
         let activity = normal.same_channel(gait)?;
         let squares: f64 = activity.mean.iter().zip(&normal.mean).map(|(a, n)| (a - n).powi(2)).sum();
         parts.push((squares / normal.mean.len() as f64).sqrt());
-        remarks.extend(doubt(activity, normal));
+        warnings.extend(doubt(activity, normal));
     }
-    Ok(EmgRmse { total: parts.iter().sum(), parts, remarks })
+    Ok(EmgRmse { total: parts.iter().sum(), parts, warnings })
 }

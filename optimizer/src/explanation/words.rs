@@ -56,7 +56,7 @@ impl BoundAtLimit {
         let domains: Vec<String> = self
             .domains
             .iter()
-            .map(|name| if name == "stride" { "the whole stride" } else { name }.to_owned())
+            .map(|name| if name == "stride" { "the stride as a whole" } else { name }.to_owned())
             .collect();
         format!("{quantity} is reached in {}.", list(&domains))
     }
@@ -298,7 +298,7 @@ mod tests {
                 "a4 (hip velocity upper bound) alone, up to its loosest value, 3 m/s, is not sufficient: no gait was found from \
                  3 starts.",
                 "a2 = 20 rad/s² (coordinate acceleration) is reached in DS2_L and SS1_L.",
-                "a4 = 0.5 m/s (hip velocity upper bound) is reached in the whole stride.",
+                "a4 = 0.5 m/s (hip velocity upper bound) is reached in the stride as a whole.",
             ]
         );
     }

@@ -79,7 +79,7 @@ impl MotionRecording {
             .collect();
         let kept = format!("{} to {} s, without a gap of {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
-            let reason = format!("none of the {} strides lasts {kept}", strikes.len() - 1);
+            let reason = format!("no stride lasts {kept}");
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let count = strides.len() as f64;
@@ -105,9 +105,9 @@ impl MotionRecording {
         };
         let mut steps = self.steps.clone();
         steps.push(format!("{} right heel strikes {found}: {} s", strikes.len(), in_words(&strikes)));
+        let averaged = if strides.len() == 1 { "1 stride".to_owned() } else { format!("{} strides", strides.len()) };
         steps.push(format!(
-            "mean of {} strides of {kept} ({} dropped), {REFERENCE_ROWS} points each, interpolated linearly",
-            strides.len(),
+            "mean of {averaged} of {kept} ({} dropped), {REFERENCE_ROWS} points each, interpolated linearly",
             strikes.len() - 1 - strides.len()
         ));
         steps.extend(unlike_builtin(&mean)?);

@@ -61,7 +61,8 @@ impl MotionRecording {
         let file = StorageFile::read(what, text)?;
         let unit = file.angle_unit(what, unit)?;
         let table = file.table;
-        let mut steps = vec![format!("{what}: OpenSim motion file, {} rows, angles in {unit:?}", table.len())];
+        let mut steps =
+            vec![format!("{what}: OpenSim motion file, {} rows, angles in {}", table.len(), unit.in_words())];
         Self::from_opensim_columns(what, &table, unit.in_radians(), force_column, &mut steps)
     }
 

@@ -39,7 +39,7 @@ fn trunk(degrees: &[f64]) -> Option<String> {
         let reason = format!(
             "is {lean:.0}° on average over the stride; at most {LARGEST_LEAN_DEG}° in either direction is plausible"
         );
-        format!("{reason}; check the sign and the upright position")
+        format!("{reason}; check the sign, and that upright is 0°")
     })
 }
 
@@ -52,7 +52,7 @@ fn knee(degrees: &[f64]) -> Option<String> {
     }
     (least > LARGEST_LEAST_FLEXION_DEG).then(|| {
         let straight = format!("its minimum must be at most {LARGEST_LEAST_FLEXION_DEG}°");
-        format!("is bent by at least {least:.0}° in the whole stride; {straight}")
+        format!("is bent by at least {least:.0}° throughout the stride; {straight}")
     })
 }
 
@@ -63,7 +63,7 @@ fn ankle(degrees: &[f64]) -> Option<String> {
         let reason = format!(
             "is {mean:.0}° on average over the stride; at most {LARGEST_ANKLE_MEAN_DEG}° in either direction is plausible"
         );
-        return Some(format!("{reason}; check that 0° is the right angle between foot and shank"));
+        return Some(format!("{reason}; check that the angle is 0° when foot and shank are perpendicular"));
     }
     (range < SMALLEST_ANKLE_RANGE_DEG).then(|| {
         format!("moves by only {range:.2}° in the stride, less than {SMALLEST_ANKLE_RANGE_DEG}°; check the unit")
@@ -81,8 +81,8 @@ pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelE
             None => Some(format!("{name} (constant)")),
         })
         .collect();
-    let remark = || format!("unlike the built-in reference: {}; check sign, side and heel strikes", unlike.join(", "));
-    Ok((!unlike.is_empty()).then(remark))
+    let warning = || format!("unlike the built-in reference: {}; check sign, side and heel strikes", unlike.join(", "));
+    Ok((!unlike.is_empty()).then(warning))
 }
 
 /// One angle over the stride, in degrees.

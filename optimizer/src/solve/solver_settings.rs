@@ -54,7 +54,7 @@ fn fields(settings: &NlpSettings) -> Result<Map<String, Value>, String> {
 }
 
 fn decided(field: &str) -> String {
-    format!("{field} is determined by the phases of a solve; omit it (other options and the initial guesses set it)")
+    format!("{field} cannot be set here, because each phase of a solve sets its own value; omit it")
 }
 
 /// Checks all ranges, and that no field is set that the phases determine.
@@ -129,9 +129,9 @@ mod tests {
             (r#"{"solver": {"bound_relaxation": 1e-3}}"#, "bound_relaxation is 0.001; it must be 0 to 0.000001"),
             (r#"{"solver": {"hessian_regularisation_min": 1}}"#, "it must be more than 0 and at most 0.0001"),
             (r#"{"solver": {"kappa_epsilon": 0}}"#, "kappa_epsilon is 0; it must be any positive number"),
-            (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial is determined by the phases of a solve"),
-            (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial is determined by the phases of a solve"),
-            (r#"{"solver": {"threads": 2}}"#, "threads is determined by the phases of a solve"),
+            (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial cannot be set here"),
+            (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial cannot be set here"),
+            (r#"{"solver": {"threads": 2}}"#, "threads cannot be set here"),
         ] {
             let error = options(text).unwrap_err();
             assert!(error.contains(expected), "{text}: {error}");

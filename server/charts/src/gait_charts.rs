@@ -143,8 +143,8 @@ fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, ModelError> {
     let phase =
         Chart::new("Phase", CYCLE, "phase variable, 0 to 1").with("phase", 0, Stroke::Solid, over(|point| point.phase));
     let charts = vec![cycle.marked(velocity), cycle.marked(phase)];
-    let hint = "The phase is the linearised hip position over the stance toe, from the planned start of a domain to its planned \
-                end; it takes the place of time. In all domains but SS1 its velocity is held constant.";
+    let hint = "The phase replaces time: it rises from 0 at the planned start of a domain to 1 at its planned end, in proportion \
+                to the linearised position of the hip over the stance toe. Its velocity is constant in all domains but SS1.";
     Ok(Group::new("phase", "Hip velocity and phase", hint, charts))
 }
 
@@ -203,7 +203,7 @@ fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
 
 fn muscles(cycle: &Cycle<'_>) -> Group {
     let mut charts = Vec::new();
-    for (what, unit) in [("Activation", "activation, 0 to 1"), ("Fibre length", "optimal fibre lengths")] {
+    for (what, unit) in [("Activation", "activation, 0 to 1"), ("Fibre length", "length / optimal length")] {
         for (part, muscles) in MUSCLE_GROUPS {
             let mut chart = Chart::new(&format!("{what}, {part}"), CYCLE, unit);
             for (place, &muscle) in muscles.iter().enumerate() {

@@ -38,7 +38,7 @@ const RULES: [(&str, &str, &str); 27] = [
         "Suggestion",
         "bounds",
         "Dimensions of the study's search space, each with one of its values. At least one value differs from that of the trial. \
-         A trial that had these bounds has a different gait, which is walkable.",
+         If a trial has these bounds, its gait is different and walkable.",
     ),
     ("NewStudy", "subject_id", EXISTS),
     ("NewStudy", "device_id", EXISTS),

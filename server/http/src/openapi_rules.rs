@@ -54,7 +54,7 @@ pub(super) fn state(document: &mut Value) {
         for component in ["SafetyReviewToMake", "Retract"] {
             add(schemas, component, "author", &json!({ "minLength": 1, "maxLength": 80, "pattern": one_line }));
         }
-        for component in ["SafetyReviewToMake", "Withdrawal", "NewCorrection", "Unblind", "Retract", "Told"] {
+        for component in ["SafetyReviewToMake", "Withdrawal", "NewCorrection", "Unblind", "Retract", "UnblindSession"] {
             add(schemas, component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
         }
         add(schemas, "NewConsent", "form", &json!({ "pattern": needed }));
@@ -170,7 +170,9 @@ fn state_bounds(schemas: &mut Map<String, Value>) {
     let mut properties = Map::new();
     for (bound, name) in TunedBounds::NAMES.iter().enumerate() {
         let side = if TunedBounds::IS_LOWER[bound] { "Minimum" } else { "Maximum" };
-        let meaning = format!("{side}: {}.", TunedBounds::MEANINGS[bound]);
+        // Two meanings name the side themselves.
+        let quantity = TunedBounds::MEANINGS[bound].replace(" lower bound", "").replace(" upper bound", "");
+        let meaning = format!("{side} {quantity}.");
         let (least, most) = TunedBounds::RANGES[bound];
         let mut schema = number(&meaning, least, most, &json!("number"));
         schema["format"] = json!("double");

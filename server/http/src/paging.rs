@@ -60,9 +60,10 @@ impl TryFrom<String> for SearchText {
 
     fn try_from(text: String) -> Result<Self, String> {
         match text.chars().count() {
-            length if length > Self::LONGEST => {
-                Err(format!("contains is {length} characters long; it must be at most {} long", Self::LONGEST))
-            }
+            length if length > Self::LONGEST => Err(format!(
+                "contains is {length} characters long; it must be at most {} characters long",
+                Self::LONGEST
+            )),
             _ => Ok(Self(text)),
         }
     }

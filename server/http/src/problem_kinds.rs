@@ -211,7 +211,7 @@ impl Kind {
                 StatusCode::SERVICE_UNAVAILABLE,
                 "The record accepts no changes",
                 "The database file or its write-ahead log was deleted, replaced or truncated, or another program wrote to it, \
-                 while the service was running. The service refuses changes, because they could be lost or rest on forged \
+                 while the service was running. The service refuses changes, because they could be lost or depend on forged \
                  rows.",
                 "Tell the administrator to stop the service, run `gaitwright audit verify`, and restore a backup if it reports \
                  damage.",

@@ -32,6 +32,13 @@ impl FieldError {
 }
 
 impl FieldError {
+    /// Refuses a value that the error describes instead of repeating it. `is` and `allowed` complete the sentences "it is
+    /// ..." and "it must be ...".
+    pub fn described(field: &str, is: &str, allowed: &str) -> Self {
+        let message = format!("{field} is {is}; it must be {allowed}.");
+        Self { field: field.to_owned(), value: None, allowed: Some(allowed.to_owned()), message }
+    }
+
     /// The refusal with the path that the field has in a request: `to` in place of the prefix `from`.
     #[must_use]
     pub fn renamed(self, from: &str, to: &str) -> Self {

@@ -1,6 +1,6 @@
 //! Checks of the text that people type: names, notes and reasons.
 
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use unicode_normalization::UnicodeNormalization;
 
 /// Characters that change the direction of text, so that one name can look like another.
@@ -41,11 +41,8 @@ pub fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a str, E
 pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error> {
     let length = text.chars().count();
     if length > longest {
-        return Err(Error::invalid(
-            field,
-            format!("{length} characters long"),
-            &format!("at most {longest} characters long"),
-        ));
+        let allowed = format!("at most {longest} characters long");
+        return Err(FieldError::described(field, &format!("{length} characters long"), &allowed).into());
     }
     let parts = |c: char| matches!(c, '\n' | '\r' | '\t');
     match text.chars().find(|&c| (c.is_control() && !parts(c)) || TURNING.contains(&c)) {

@@ -1,11 +1,11 @@
 //! `gaitwright audit`.
 
+use super::config::{AnchoredFlags, Settings};
 use super::database_file::exists;
 use super::output::data;
 use clap::{Args, Subcommand};
 use gaitwright_service::error::Error;
 use gaitwright_store::verify;
-use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct Audit {
@@ -15,23 +15,24 @@ pub(super) struct Audit {
 
 #[derive(Debug, Subcommand)]
 enum AuditCommand {
-    /// Verify a database: its file, its schema, its hash chains, the seal of every row, and its anchors. Reports rows
+    /// Verify a record: its file, its schema, its hash chains, the seal of every row, and its anchors. Reports rows
     /// that were changed, added or deleted outside the program.
     Verify {
-        /// SQLite file.
-        #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-        database: PathBuf,
-        /// Second anchor file of the service, besides the one next to the database.
-        #[arg(long, env = "GAITWRIGHT_ANCHOR", value_name = "FILE")]
-        anchor: Option<PathBuf>,
+        #[command(flatten)]
+        record: AnchoredFlags,
     },
 }
 
 impl Audit {
-    pub(super) async fn run(self) -> Result<(), Error> {
-        let AuditCommand::Verify { database, anchor } = self.what;
+    pub(super) fn record(&self) -> &AnchoredFlags {
+        let AuditCommand::Verify { record } = &self.what;
+        record
+    }
+
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        let database = settings.database();
         exists(&database)?;
-        let found = verify::file(&database, anchor.as_slice()).await?;
+        let found = verify::file(&database, settings.anchor().as_slice()).await?;
         let (rows, last) = found.audit;
         data(&format!("audit trail intact: {rows} rows, last hash {last}"))?;
         data(&match found.seals {

@@ -1,5 +1,6 @@
 //! `gaitwright backup` and `gaitwright restore`.
 
+use super::config::{AnchoredFlags, RecordFlags, Settings};
 use super::database_file::{exists, note_export};
 use super::output::{data, tell};
 use clap::Args;
@@ -11,19 +12,19 @@ use std::path::PathBuf;
 pub(super) struct Backup {
     /// New file for the backup.
     to: PathBuf,
-    /// SQLite file; the service may be running.
-    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-    database: PathBuf,
+    #[command(flatten)]
+    pub(super) record: RecordFlags,
 }
 
 impl Backup {
-    pub(super) async fn run(self) -> Result<(), Error> {
-        exists(&self.database)?;
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        let database = settings.database();
+        exists(&database)?;
         if self.to.exists() {
             return Err(Error::conflict(format!("{} already exists. Choose a new file.", self.to.display())));
         }
-        backup::of_file(&self.database, &self.to).await?;
-        note_export(&self.database, "backup", "the whole record", Vec::new());
+        backup::of_file(&database, &self.to).await?;
+        note_export(&database, "backup", "the whole record", Vec::new());
         tell("backup written and verified");
         data(&self.to.display().to_string())
     }
@@ -33,21 +34,18 @@ impl Backup {
 pub(super) struct Restore {
     /// Backup made by `gaitwright backup`.
     from: PathBuf,
-    /// SQLite file to replace; the current one is kept next to it.
-    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-    database: PathBuf,
-    /// Second anchor file of the service, which is updated to match the backup.
-    #[arg(long, env = "GAITWRIGHT_ANCHOR", value_name = "FILE")]
-    anchor: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) record: AnchoredFlags,
 }
 
 impl Restore {
-    pub(super) async fn run(self) -> Result<(), Error> {
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        let database = settings.database();
         exists(&self.from)?;
-        if let Some(kept) = restore::from_file(&self.from, &self.database, self.anchor.as_deref()).await? {
+        if let Some(kept) = restore::from_file(&self.from, &database, settings.anchor().as_deref()).await? {
             tell(&format!("the current database is kept as {}", kept.display()));
         }
-        tell(&format!("restored {}", self.database.display()));
+        tell(&format!("restored {}", database.display()));
         Ok(())
     }
 }

@@ -42,7 +42,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(
-            "  largest multiplier {:.4e} (by differences {:.4e}, to {:.0e}): {}; share of a speed change left after one stride {:.1e}, in other coordinates {:.1e}",
+            "  largest multiplier {:.4e} (finite differences: {:.4e}, resolution {:.0e}): {}; of a change in speed, {:.1e} remains after one stride and {:.1e} spreads to other coordinates",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
@@ -57,7 +57,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.free_hip_return_map {
         lines.push(format!(
-            "  zero dynamics (free hip velocity): multiplier {:.4} (by differences {:.4})",
+            "  zero dynamics (free hip velocity): multiplier {:.4} (finite differences: {:.4})",
             map.largest, map.largest_by_differences
         ));
     }

@@ -9,6 +9,7 @@ use gaitwright_http::connections::Limits;
 use gaitwright_http::{NETWORKS, Network, Proxies, ProxyHeaders};
 use gaitwright_service::access::sign_in::Limits as SessionLimits;
 use gaitwright_service::error::Error;
+use gaitwright_store::{Store, StoreResult};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,9 @@ use tracing_subscriber::EnvFilter;
 
 /// The settings file that is read by default.
 const DEFAULT_FILE: &str = "gaitwright.toml";
+
+/// The environment variable that names another settings file.
+const FILE_VARIABLE: &str = "GAITWRIGHT_CONFIG";
 
 /// Every setting: name in the file, default, meaning. Flag and environment variable derive from the name.
 const KNOWN: &[(&str, &str, &str)] = &[
@@ -50,21 +54,47 @@ const KNOWN: &[(&str, &str, &str)] = &[
     ("log_format", "text", "log format: text or json"),
 ];
 
+/// Flags of every command that reads a record.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct RecordFlags {
+    /// TOML settings file (default: GAITWRIGHT_CONFIG, or gaitwright.toml if it exists).
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// SQLite file of the record (default: gaitwright.db).
+    #[arg(long, value_name = "FILE")]
+    database: Option<String>,
+}
+
+/// Flags of every command that verifies or changes a record.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct AnchoredFlags {
+    #[command(flatten)]
+    record: RecordFlags,
+    /// Second anchor file for the newest hashes of the record, best on another disk. An empty name means none.
+    #[arg(long, value_name = "FILE")]
+    anchor: Option<String>,
+}
+
+impl From<RecordFlags> for AnchoredFlags {
+    fn from(record: RecordFlags) -> Self {
+        Self { record, anchor: None }
+    }
+}
+
+impl From<AnchoredFlags> for Flags {
+    fn from(record: AnchoredFlags) -> Self {
+        Self { record, ..Self::default() }
+    }
+}
+
 /// Flags of `serve` and `config show`.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Flags {
-    /// TOML settings file (default: gaitwright.toml, if it exists).
-    #[arg(long, env = "GAITWRIGHT_CONFIG", value_name = "FILE")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    record: AnchoredFlags,
     /// Address and port to listen on (default: 127.0.0.1:8080).
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<String>,
-    /// SQLite file, created if missing (default: gaitwright.db).
-    #[arg(long, value_name = "FILE")]
-    database: Option<String>,
-    /// Second anchor file for the newest hashes of the record, best on another disk.
-    #[arg(long, value_name = "FILE")]
-    anchor: Option<String>,
     /// Folder for scheduled backups, best on another disk (default: no backups).
     #[arg(long, value_name = "FOLDER")]
     backup_folder: Option<String>,
@@ -140,8 +170,9 @@ impl Settings {
     }
 
     fn resolve(flags: &Flags, environment: impl Fn(&str) -> Option<String>) -> Result<Self, Error> {
-        let (path, file) = match &flags.config {
-            Some(path) => (path.clone(), Some(read(path)?)),
+        let named = flags.record.record.config.clone();
+        let (path, file) = match named.or_else(|| environment(FILE_VARIABLE).map(PathBuf::from)) {
+            Some(path) => (path.clone(), Some(read(&path)?)),
             None => (
                 PathBuf::from(DEFAULT_FILE),
                 Path::new(DEFAULT_FILE).exists().then(|| read(Path::new(DEFAULT_FILE))).transpose()?,
@@ -183,6 +214,7 @@ impl Settings {
         self.parsed("listen", "an address and a port such as 127.0.0.1:8080")
     }
 
+    /// The SQLite file of the record.
     pub(super) fn database(&self) -> PathBuf {
         PathBuf::from(self.text("database"))
     }
@@ -190,6 +222,11 @@ impl Settings {
     /// The second anchor file.
     pub(super) fn anchor(&self) -> Option<PathBuf> {
         Some(self.text("anchor")).filter(|path| !path.is_empty()).map(PathBuf::from)
+    }
+
+    /// Opens the record with its anchors.
+    pub(super) async fn open_record(&self) -> StoreResult<Store> {
+        Store::open_anchored(&self.database(), self.anchor().as_deref()).await
     }
 
     /// Scheduled backups, if any.
@@ -298,6 +335,16 @@ impl Settings {
         }
     }
 
+    /// Prints every setting, its value and its origin.
+    pub(super) fn show(&self) -> Result<(), Error> {
+        for &(name, _, meaning) in KNOWN {
+            let origin = self.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
+            let value = without_password(self.text(name));
+            data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;
+        }
+        Ok(())
+    }
+
     /// The log filter, and whether the log is JSON.
     pub(super) fn log(&self) -> Result<(EnvFilter, bool), Error> {
         let allowed = "targets and levels such as warn,gaitwright=info";
@@ -311,11 +358,16 @@ impl Settings {
 }
 
 impl Flags {
+    /// The flags of a worker.
+    pub(super) fn of_broker(config: Option<PathBuf>, nats: Option<String>, nats_queue: Option<String>) -> Self {
+        Self { record: RecordFlags { config, database: None }.into(), nats, nats_queue, ..Self::default() }
+    }
+
     fn get(&self, name: &str) -> Option<String> {
         match name {
             "listen" => self.listen.clone(),
-            "database" => self.database.clone(),
-            "anchor" => self.anchor.clone(),
+            "database" => self.record.record.database.clone(),
+            "anchor" => self.record.anchor.clone(),
             "backup_folder" => self.backup_folder.clone(),
             "backup_hours" => self.backup_hours.clone(),
             "backup_keep" => self.backup_keep.clone(),
@@ -338,8 +390,8 @@ impl Flags {
 /// Names that NATS accepts for a stream and as the first part of a subject.
 const QUEUE_NAMES: &str = "1 to 60 letters, digits, - or _";
 
-/// Parses the name of a service on a broker.
-pub(super) fn queue_name(text: &str) -> Result<String, String> {
+/// Checks the name of a service on a broker.
+fn queue_name(text: &str) -> Result<String, String> {
     let known = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if (1..=60).contains(&text.len()) && text.chars().all(known) {
         Ok(text.to_owned())
@@ -409,15 +461,9 @@ enum ConfigCommand {
 }
 
 impl Config {
-    pub(super) fn run(self) -> Result<(), Error> {
-        let ConfigCommand::Show { flags } = self.what;
-        let settings = Settings::read(&flags)?;
-        for &(name, _, meaning) in KNOWN {
-            let origin = settings.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
-            let value = without_password(settings.text(name));
-            data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;
-        }
-        Ok(())
+    pub(super) fn flags(&self) -> Flags {
+        let ConfigCommand::Show { flags } = &self.what;
+        (**flags).clone()
     }
 }
 
@@ -436,7 +482,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("g.toml");
         std::fs::write(&file, "workers = 3\nidle_minutes = 15\ndatabase = \"file.db\"\n").unwrap();
-        let flags = Flags { config: Some(file.clone()), workers: Some(5), ..Flags::default() };
+        let record = RecordFlags { config: Some(file.clone()), database: None };
+        let flags = Flags { record: record.into(), workers: Some(5), ..Flags::default() };
         let found = settings(&flags, &[("GAITWRIGHT_WORKERS", "4"), ("GAITWRIGHT_DATABASE", "env.db")]).unwrap();
         assert_eq!(found.workers().unwrap(), Some(5));
         assert_eq!(found.0["workers"].1, Origin::Flag);

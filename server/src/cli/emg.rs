@@ -17,7 +17,7 @@ pub(super) struct Emg {
     /// EMG recording: CSV or OpenSim file with a column for each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R).
     #[arg(value_name = "FILE")]
     recording: PathBuf,
-    /// EMG recording of normal walking, for normalisation and EMG RMSE (default: the recording itself).
+    /// EMG recording of walking without the device, for normalisation and EMG RMSE (default: the recording itself).
     #[arg(long, value_name = "FILE")]
     normal: Option<PathBuf>,
     /// Format of both files.
@@ -39,7 +39,7 @@ pub(super) struct Emg {
     /// Times of right heel strikes in the recording, as in 0.41,1.52,2.63.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', allow_negative_numbers = true)]
     heel_strikes_s: Vec<f64>,
-    /// Times of right heel strikes in the recording of normal walking.
+    /// Times of right heel strikes in the recording without the device.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "normal", allow_negative_numbers = true)]
     normal_heel_strikes_s: Vec<f64>,
     #[command(flatten)]
@@ -48,7 +48,7 @@ pub(super) struct Emg {
     #[arg(long)]
     json: bool,
     /// Output file for the mean cycles: percent, then mean and standard deviation of each channel, relative to the peak
-    /// of normal walking.
+    /// without the device.
     #[arg(long, value_name = "FILE.csv")]
     cycles: Option<PathBuf>,
     /// Output file for the envelopes: time, then each channel in the unit of the recording.
@@ -153,17 +153,18 @@ fn for_people(found: &Found) -> String {
     let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = found.settings;
     let mut lines = vec![format!(
         "band-pass {band_low_hz} to {band_high_hz} Hz, low-pass {envelope_hz} Hz, order {order}, zero-phase; relative to the \
-        peak of normal walking"
+        peak without the device"
     )];
     let Activity { channels, averages, emg_rmse } = &found.activity;
     for (place, (channel, average)) in channels.iter().zip(averages).enumerate() {
         let part = emg_rmse.as_ref().and_then(|rmse| rmse.parts.get(place));
         let distance = part.map_or_else(String::new, |part| format!(", EMG RMSE {part:.4}"));
-        let (name, peak, strides) = (&channel.channel, channel.peak(), channel.strides);
-        lines.push(format!("{name}: average {average:.4}, peak {peak:.4}{distance} ({strides} strides)"));
+        let (name, peak) = (&channel.channel, channel.peak());
+        let strides = if channel.strides == 1 { "1 stride".to_owned() } else { format!("{} strides", channel.strides) };
+        lines.push(format!("{name}: average {average:.4}, peak {peak:.4}{distance} ({strides})"));
     }
     lines.extend(emg_rmse.as_ref().map(|rmse| format!("total EMG RMSE: {:.4}", rmse.total)));
-    lines.extend(emg_rmse.iter().flat_map(|rmse| rmse.remarks.iter().cloned()));
+    lines.extend(emg_rmse.iter().flat_map(|rmse| rmse.warnings.iter().cloned()));
     lines.join("\n")
 }
 

@@ -91,13 +91,14 @@ impl Start {
         Self { point, gait, before: Vec::new() }
     }
 
-    /// The gait of an outcome; `said` is the lineage in its file.
-    pub(super) fn answer(outcome: SolveOutcome, said: Option<Lineage>) -> Self {
+    /// The gait of an outcome; `lineage` is the one in its file.
+    pub(super) fn answer(outcome: SolveOutcome, lineage: Option<Lineage>) -> Self {
         let report = &outcome.report;
         let figures = (basin_of_answer(report), report.objective, report.gait_rmse_rad);
         let mut start = Self::cold(outcome.warm_start, figures);
         // Ignore the lineage of a different gait.
-        start.before = said.filter(|said| said.id == start.gait.id).map_or_else(Vec::new, |said| said.ancestors);
+        let own = lineage.filter(|lineage| lineage.id == start.gait.id);
+        start.before = own.map_or_else(Vec::new, |lineage| lineage.ancestors);
         start
     }
 

@@ -30,7 +30,7 @@ mod users;
 mod worker;
 
 use clap::{Parser, Subcommand};
-use config::{Flags, Settings, unknown_variables};
+use config::{AnchoredFlags, Flags, RecordFlags, Settings, unknown_variables};
 use gaitwright_http::openapi;
 use gaitwright_service::error::Error;
 use output::{data, tell};
@@ -70,8 +70,10 @@ enum Command {
     /// Run solves for a service on another machine, through a NATS broker.
     Worker(worker::Worker),
     /// Run an unattended study, in which Gait RMSE answers the comparisons.
+    ///
+    /// Continues an unfinished study with the same settings.
     Tune(tune::Tune),
-    /// Reproduce the paper's comparison of gaits with and without muscles
+    /// Reproduce the paper's comparison of gaits with and without muscles.
     Reproduce(reproduce::Reproduce),
     /// Optimise one gait.
     Solve(solve::Solve),
@@ -85,36 +87,57 @@ enum Command {
     Reference(reference::Reference),
     /// Process an EMG recording: envelopes, mean cycles, EMG RMSE, average activation.
     Emg(emg::Emg),
-    /// Verify the integrity of a database.
+    /// Verify the integrity of a record.
     Audit(audit::Audit),
     /// Show the settings of the service.
     Config(config::Config),
     /// Print the description of the REST interface (OpenAPI 3.1).
     Openapi,
-    /// Back up a database, also while the service is running.
+    /// Back up a record, also while the service is running.
     Backup(backup::Backup),
-    /// Replace a database with a backup.
+    /// Replace a record with a backup, while the service is stopped.
+    ///
+    /// The replaced record is kept next to it.
     Restore(backup::Restore),
-    /// Export a study to an archive.
+    /// Export a study to an archive, also while the service is running.
     Export(study::Export),
-    /// Import a study from an archive.
+    /// Import a study from an archive, while the service is stopped.
     Import(study::Import),
     /// Create a key for signing archives, and print its public key.
     SigningKey(study::NewKey),
-    /// List users or create sign-in links for them.
+    /// List users or create sign-in links for them, while the service is stopped.
     Users(users::Users),
-    /// Delete old trajectories. Results, answers and recommended gaits are kept.
+    /// Delete old trajectories, while the service is stopped.
+    ///
+    /// Results, answers and recommended gaits are kept.
     Prune(study::Prune),
+}
+
+impl Command {
+    /// The flags that set settings.
+    fn flags(&self) -> Flags {
+        let record: AnchoredFlags = match self {
+            Self::Serve(serve) => return serve.flags.clone(),
+            Self::Config(config) => return config.flags(),
+            Self::Worker(worker) => return worker.flags(),
+            Self::Tune(tune) => tune.record.clone(),
+            Self::Audit(audit) => audit.record().clone(),
+            Self::Users(users) => users.record().clone(),
+            Self::Restore(restore) => restore.record.clone(),
+            Self::Import(import) => import.record.clone(),
+            Self::Prune(prune) => prune.record.clone(),
+            Self::Backup(backup) => backup.record.clone().into(),
+            Self::Export(export) => export.record.clone().into(),
+            _ => RecordFlags::default().into(),
+        };
+        record.into()
+    }
 }
 
 /// Runs the program.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
-    let settings = match &cli.command {
-        Command::Serve(serve) => serve.settings(),
-        _ => Settings::read(&Flags::default()),
-    };
-    let settings = match settings {
+    let settings = match Settings::read(&cli.command.flags()) {
         Ok(settings) => settings,
         Err(error) => return report(&error),
     };
@@ -132,8 +155,8 @@ pub fn run() -> ExitCode {
     };
     let done = match cli.command {
         Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| Ended::Done),
-        Command::Worker(worker) => runtime.block_on(worker.run()).map(|()| Ended::Done),
-        Command::Tune(tune) => runtime.block_on(tune.run()),
+        Command::Worker(worker) => runtime.block_on(worker.run(&settings)).map(|()| Ended::Done),
+        Command::Tune(tune) => runtime.block_on(tune.run(&settings)),
         Command::Reproduce(reproduce) => runtime.block_on(reproduce.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
@@ -141,19 +164,19 @@ pub fn run() -> ExitCode {
         Command::Reference(reference) => reference.run().map(|()| Ended::Done),
         Command::Emg(emg) => emg.run().map(|()| Ended::Done),
         Command::Convert(convert) => convert.run().map(|()| Ended::Done),
-        Command::Audit(audit) => runtime.block_on(audit.run()).map(|()| Ended::Done),
-        Command::Config(config) => config.run().map(|()| Ended::Done),
+        Command::Audit(audit) => runtime.block_on(audit.run(&settings)).map(|()| Ended::Done),
+        Command::Config(_) => settings.show().map(|()| Ended::Done),
         Command::Openapi => {
             let text = openapi::text().map_err(|e| Error::Internal(e.to_string()));
             text.and_then(|text| data(text.trim_end())).map(|()| Ended::Done)
         }
-        Command::Backup(backup) => runtime.block_on(backup.run()).map(|()| Ended::Done),
-        Command::Restore(restore) => runtime.block_on(restore.run()).map(|()| Ended::Done),
-        Command::Export(export) => runtime.block_on(export.run()).map(|()| Ended::Done),
+        Command::Backup(backup) => runtime.block_on(backup.run(&settings)).map(|()| Ended::Done),
+        Command::Restore(restore) => runtime.block_on(restore.run(&settings)).map(|()| Ended::Done),
+        Command::Export(export) => runtime.block_on(export.run(&settings)).map(|()| Ended::Done),
         Command::SigningKey(key) => key.run().map(|()| Ended::Done),
-        Command::Import(import) => runtime.block_on(import.run()).map(|()| Ended::Done),
-        Command::Users(users) => runtime.block_on(users.run()).map(|()| Ended::Done),
-        Command::Prune(prune) => runtime.block_on(prune.run()).map(|()| Ended::Done),
+        Command::Import(import) => runtime.block_on(import.run(&settings)).map(|()| Ended::Done),
+        Command::Users(users) => runtime.block_on(users.run(&settings)).map(|()| Ended::Done),
+        Command::Prune(prune) => runtime.block_on(prune.run(&settings)).map(|()| Ended::Done),
     };
     match done {
         Ok(Ended::Done) => ExitCode::SUCCESS,

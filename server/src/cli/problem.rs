@@ -151,7 +151,10 @@ impl ProblemFlags {
         let other = outcome.other_basins.into_iter().find(|other| other.basin == basin);
         let refused = || {
             let known = known.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
-            Error::Malformed(format!("{} has no basin {basin} for --warm-basin. Basins: {known}.", path.display()))
+            Error::Malformed(format!(
+                "{} has no local optimum (basin) with the number {basin}. Numbers for --warm-basin: {known}.",
+                path.display()
+            ))
         };
         let start = |other: OtherBasin| {
             Start::cold(other.warm_start, (Some(other.basin), other.objective, other.gait_rmse_rad))

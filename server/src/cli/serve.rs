@@ -33,7 +33,7 @@ const SILENCE: Duration = Duration::from_secs(15);
 #[derive(Debug, Args)]
 pub(super) struct Serve {
     #[command(flatten)]
-    flags: Flags,
+    pub(super) flags: Flags,
     /// Print a one-time sign-in link for an administrator, even if one has a password. Adds an administrator if all are
     /// disabled.
     #[arg(long)]
@@ -41,10 +41,6 @@ pub(super) struct Serve {
 }
 
 impl Serve {
-    pub(super) fn settings(&self) -> Result<Settings, Error> {
-        Settings::read(&self.flags)
-    }
-
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let (listen, sign_in, tls) = (settings.listen()?, settings.sign_in()?, settings.tls()?);
         let proxies = settings.proxies()?;
@@ -74,7 +70,7 @@ impl Serve {
         let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
         listener.set_nonblocking(true).map_err(cannot_listen)?;
         let address = listener.local_addr().map_err(cannot_listen)?;
-        let store = Store::open_anchored(&database, settings.anchor().as_deref()).await?;
+        let store = settings.open_record().await?;
         let backups = backups.map(|plan| plan.claim(&store)).transpose()?;
         store.set_reserve(reserve);
         let mut writer = store.write().await?;

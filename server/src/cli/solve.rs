@@ -52,17 +52,19 @@ pub(super) struct Solve {
         ]
     )]
     problem: Option<PathBuf>,
-    /// Basin in the file of --warm to start from (default: that of its gait).
+    /// Start from another local optimum (basin) in the file of --warm. Basins are numbered from 1, in the order in which
+    /// the initial guesses reached them; `solve` prints the list if there are several (default: that of the gait).
     #[arg(long, value_name = "NUMBER", requires = "warm")]
     warm_basin: Option<usize>,
-    /// Number of initial guesses that a cold start always tries; --out keeps a gait of every basin that they reach.
+    /// Number of initial guesses that a cold start always tries; --out keeps a gait of every local optimum
+    /// (basin) that they reach.
     #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
     initial_guesses: Option<usize>,
-    /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest [default:
-    /// the lowest objective].
+    /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest
+    /// (default: the lowest objective).
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     nearest_within: Option<f64>,
-    /// Output file (JSON) for figures, gait, multipliers, gaits of other basins and lineage.
+    /// Output file (JSON) for figures, gait, multipliers, gaits of other local optima and lineage.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the figures as one JSON object.

@@ -1,5 +1,6 @@
 //! `gaitwright export`, `gaitwright import`, `gaitwright signing-key` and `gaitwright prune`.
 
+use super::config::{AnchoredFlags, RecordFlags, Settings};
 use super::database_file::{exists, note_export};
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -24,21 +25,21 @@ pub(super) struct Export {
     study: StudyId,
     /// New file for the archive.
     to: PathBuf,
-    /// SQLite file; the service may be running.
-    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-    database: PathBuf,
+    #[command(flatten)]
+    pub(super) record: RecordFlags,
     /// Key file for signing the archive, made by `gaitwright signing-key`.
     #[arg(long, value_name = "FILE")]
     sign: Option<PathBuf>,
 }
 
 impl Export {
-    pub(super) async fn run(self) -> Result<(), Error> {
-        exists(&self.database)?;
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        let database = settings.database();
+        exists(&database)?;
         let key = self.sign.as_deref().map(|file| SigningKey::read(&read(file)?)).transpose()?;
         let out = OutFile::open_new(&self.to)?;
-        let out = archive::export(&self.database, self.study, out, key).await?;
-        note_export(&self.database, "export", &format!("study {}", self.study), vec![self.study.to_string()]);
+        let out = archive::export(&database, self.study, out, key).await?;
+        note_export(&database, "export", &format!("study {}", self.study), vec![self.study.to_string()]);
         out.finish()?;
         data(&self.to.display().to_string())
     }
@@ -48,21 +49,20 @@ impl Export {
 pub(super) struct Import {
     /// Archive made by `gaitwright export`.
     from: PathBuf,
-    /// SQLite file; the service must not be running.
-    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-    database: PathBuf,
+    #[command(flatten)]
+    pub(super) record: AnchoredFlags,
     /// Public key that must have signed the archive, as printed by `gaitwright signing-key`; can be repeated.
     #[arg(long, value_name = "KEY")]
     trust: Vec<PublicKey>,
 }
 
 impl Import {
-    pub(super) async fn run(self) -> Result<(), Error> {
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let cannot = |e: std::io::Error| Error::Malformed(format!("Cannot read {}: {e}.", self.from.display()));
         let file = std::fs::File::open(&self.from).map_err(cannot)?;
         // Checked before a database is created.
         let archive = archive::open(file, &self.trust).await?;
-        let store = Store::open(&self.database).await?;
+        let store = settings.open_record().await?;
         let done = archive::import(&store, &Actor::terminal(), archive).await;
         store.close().await;
         data(&done?.to_string())
@@ -92,21 +92,20 @@ pub(super) struct Prune {
     /// recommended, their warm starts, and gaits of lab sessions.
     #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(u32).range(1..=36_500))]
     older_than_days: u32,
-    /// SQLite file; the service must not be running.
-    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-    database: PathBuf,
+    #[command(flatten)]
+    pub(super) record: AnchoredFlags,
 }
 
 impl Prune {
-    pub(super) async fn run(self) -> Result<(), Error> {
-        exists(&self.database)?;
-        let mut store = Store::open(&self.database).await?;
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        exists(&settings.database())?;
+        let mut store = settings.open_record().await?;
         let done = prune(&mut store, self.older_than_days).await;
         let expired = retention::drop_expired(&store).await;
         store.close().await;
         let (Dropped { answers, sessions, links }, trajectories) = (expired?, done?);
-        tell(&format!("deleted {answers} idempotency keys, {sessions} sessions and {links} sign-in links"));
-        data(&format!("{trajectories} trajectories deleted"))
+        tell(&format!("deleted: idempotency keys {answers}, sessions {sessions}, sign-in links {links}"));
+        data(&format!("trajectories deleted: {trajectories}"))
     }
 }
 

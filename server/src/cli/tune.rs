@@ -2,6 +2,7 @@
 
 use super::Ended;
 use super::body::{Body, Switch};
+use super::config::{AnchoredFlags, Settings};
 use super::numbers::{seed, trials, workers};
 use super::output::{data, tell};
 use super::problem::ProblemFiles;
@@ -16,8 +17,7 @@ use gaitwright_service::studies::recommended::CertificateState;
 use gaitwright_service::studies::summary::{self, Summary};
 use gaitwright_service::studies::{catalogue, device, reference_import};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::{Store, commit};
-use std::path::PathBuf;
+use gaitwright_store::commit;
 use std::sync::Arc;
 
 #[derive(Debug, Args)]
@@ -38,22 +38,21 @@ pub(super) struct Tune {
     /// Number of trials that run in parallel (default: number of cores). Only 1 is reproducible bit for bit.
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
-    /// SQLite file, created if missing. Continues an unfinished study with the same settings.
-    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-    database: PathBuf,
+    #[command(flatten)]
+    pub(super) record: AnchoredFlags,
     /// Print one JSON object at the end instead of a line for each trial.
     #[arg(long)]
     json: bool,
 }
 
 impl Tune {
-    pub(super) async fn run(self) -> Result<Ended, Error> {
+    pub(super) async fn run(self, settings: &Settings) -> Result<Ended, Error> {
         let subject = self.body.subject()?;
         let (device, reference, gait_settings) =
             (self.files.device()?, self.files.reference()?, self.files.settings()?);
         let solve_options = self.files.options()?;
         let workers = cores_or(self.workers);
-        let mut store = Store::open(&self.database).await?;
+        let mut store = settings.open_record().await?;
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         let subject = catalogue::subject_with(&mut writer, subject).await?;
@@ -80,6 +79,9 @@ impl Tune {
         let choose = move |pool: &OnPool| best_trial(&snapshot, &*beliefs.posterior(pool, &snapshot)?);
         let best = store.compute(choose).await?.map_err(Error::Learner)?;
         self.print(&summary::of(&ran.snapshot, best, judged))?;
+        if !self.json {
+            tell(&format!("to look at the study: gaitwright serve --database {}", settings.database().display()));
+        }
         if ran.interrupted {
             let done = ran.snapshot.trials.len() - ran.snapshot.open();
             tell(&format!(
@@ -114,7 +116,6 @@ impl Tune {
             }
             _ => data("no trial found a gait")?,
         }
-        tell(&format!("to look at the study: gaitwright serve --database {}", self.database.display()));
         Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! `gaitwright users`: lists users, and creates sign-in links for them.
 
+use super::config::{AnchoredFlags, Settings};
 use super::database_file::exists;
 use super::output::{data, tell};
 use clap::{Args, Subcommand};
@@ -7,7 +8,6 @@ use gaitwright_service::access::people;
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, StoreError, commit, users};
-use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct Users {
@@ -19,27 +19,28 @@ pub(super) struct Users {
 enum UsersCommand {
     /// List users with name, role, way to sign in, and whether they are disabled.
     List {
-        /// SQLite file; the service must not be running.
-        #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-        database: PathBuf,
+        #[command(flatten)]
+        record: AnchoredFlags,
     },
     /// Create a one-time sign-in link for a user, such as an administrator who forgot the password.
     Link {
         /// Name of the user.
         name: String,
-        /// SQLite file; the service must not be running.
-        #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-        database: PathBuf,
+        #[command(flatten)]
+        record: AnchoredFlags,
     },
 }
 
 impl Users {
-    pub(super) async fn run(self) -> Result<(), Error> {
-        let database = match &self.what {
-            UsersCommand::List { database } | UsersCommand::Link { database, .. } => database,
-        };
-        exists(database)?;
-        let store = match Store::open(database).await {
+    pub(super) fn record(&self) -> &AnchoredFlags {
+        match &self.what {
+            UsersCommand::List { record } | UsersCommand::Link { record, .. } => record,
+        }
+    }
+
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        exists(&settings.database())?;
+        let store = match settings.open_record().await {
             Err(StoreError::InUse { .. }) => {
                 let reason = "The service is using this database. Stop it first, or restart it with --sign-in-link.";
                 return Err(Error::conflict(reason));

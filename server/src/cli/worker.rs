@@ -1,22 +1,26 @@
 //! `gaitwright worker`: runs solves for a service on another machine.
 
-use super::config::queue_name;
+use super::config::{Flags, Settings};
 use super::numbers::workers;
 use super::serve::{cores_or, interrupted};
 use clap::Args;
 use gaitwright_service::error::Error;
 use gaitwright_service::workers::{GaitSolver, LEASE, nats};
+use std::path::PathBuf;
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, Args)]
 pub(super) struct Worker {
-    /// Address of the NATS broker.
-    #[arg(long, env = "GAITWRIGHT_NATS", value_name = "URL", hide_env_values = true)]
-    nats: String,
-    /// Name of the service on the broker.
-    #[arg(long, env = "GAITWRIGHT_NATS_QUEUE", default_value = "gaitwright", value_name = "NAME", value_parser = queue_name)]
-    nats_queue: String,
+    /// TOML settings file (default: GAITWRIGHT_CONFIG, or gaitwright.toml if it exists).
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Address of the NATS broker, nats://HOST:PORT.
+    #[arg(long, value_name = "URL")]
+    nats: Option<String>,
+    /// Name of the service on the broker (default: gaitwright).
+    #[arg(long, value_name = "NAME")]
+    nats_queue: Option<String>,
     /// Number of solves that run in parallel (default: number of cores).
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
@@ -26,15 +30,21 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    pub(super) async fn run(self) -> Result<(), Error> {
+    pub(super) fn flags(&self) -> Flags {
+        Flags::of_broker(self.config.clone(), self.nats.clone(), self.nats_queue.clone())
+    }
+
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        let missing = || settings.refused("nats", "the address of a NATS broker, nats://HOST:PORT");
+        let (url, queue) = settings.nats()?.ok_or_else(missing)?;
         let name = self.name.unwrap_or_else(|| format!("{} {}", host(), std::process::id()));
         if name.is_empty() || name.chars().count() > 200 {
             return Err(Error::invalid("name", name, "1 to 200 characters long"));
         }
         let size = cores_or(self.workers);
         let solver = Arc::new(GaitSolver);
-        let worker = nats::Worker::connect(&self.nats, &self.nats_queue, name, size, LEASE, solver).await?;
-        tracing::info!(workers = size, queue = self.nats_queue, "waiting for jobs");
+        let worker = nats::Worker::connect(url, queue, name, size, LEASE, solver).await?;
+        tracing::info!(workers = size, queue, "waiting for jobs");
         let stop = CancellationToken::new();
         let asked = tokio::spawn({
             let (stop, interrupted) = (stop.clone(), interrupted());

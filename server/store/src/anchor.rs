@@ -102,7 +102,7 @@ pub fn read(anchor: &Path) -> StoreResult<Option<Ends>> {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         other => other.map_err(|source| StoreError::Open { path: anchor.to_owned(), source })?,
     };
-    let reason = || format!("{} cannot be read. Remove it only if you know the cause.", anchor.display());
+    let reason = || format!("{} cannot be read; remove it only if you know the cause", anchor.display());
     let place = Place::newest(&bytes).ok_or_else(|| StoreError::Damaged { what: "anchor", reason: reason() })?;
     Ok(Some(place.ends))
 }
@@ -140,10 +140,14 @@ pub(super) fn has_seen_rows(anchor: &Path) -> StoreResult<bool> {
 /// Endings of the files of a record.
 const OWN_FILES: [&str; 7] = ["", "-wal", "-shm", ".lock", ".anchor", ".access", ".restoring"];
 
-/// Refuses a second anchor that is another file: one of the record, one of the backup that is being restored, or any
-/// file that is not an anchor.
+/// Refuses a second anchor whose folder does not exist, or that is another file: one of the record, one of the backup
+/// that is being restored, or any file that is not an anchor.
 pub(super) fn refuse_wrong(elsewhere: Option<&Path>, record: &Path, backup: Option<&Path>) -> StoreResult<()> {
     let Some(anchor) = elsewhere else { return Ok(()) };
+    let folder = folder_of(anchor);
+    if !folder.is_dir() {
+        return Err(StoreError::NoAnchorFolder { folder: folder.to_owned(), anchor: anchor.to_owned() });
+    }
     let wrong = |what| Err(StoreError::WrongAnchor { path: anchor.to_owned(), what });
     let place = resolved(anchor);
     let is_of = |file: &Path| OWN_FILES.iter().any(|ending| resolved(&beside(file, ending)) == place);

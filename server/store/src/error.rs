@@ -136,6 +136,17 @@ pub enum StoreError {
         /// Which file it is.
         what: &'static str,
     },
+    /// The folder of a second anchor does not exist.
+    #[error(
+        "There is no folder {} for the anchor {}. Create the folder, or choose another file.",
+        folder.display(), anchor.display()
+    )]
+    NoAnchorFolder {
+        /// The folder.
+        folder: PathBuf,
+        /// The path of the anchor.
+        anchor: PathBuf,
+    },
     /// A folder has the scheduled backups of another record.
     #[error(
         "The backup folder {} belongs to the record {record}; each record must have a folder of its own. If the record was \
@@ -147,7 +158,7 @@ pub enum StoreError {
         folder: PathBuf,
         /// The path of the other record.
         record: String,
-        /// The file that says so.
+        /// The file that names the other record.
         claim: PathBuf,
     },
     /// A record or a backup is damaged, so it was not copied.
@@ -189,7 +200,7 @@ pub enum StoreError {
         id: String,
     },
     /// A stored value cannot be read: the file was damaged or edited.
-    #[error("The record is damaged. {what}: {reason}.")]
+    #[error("The record is damaged ({what}): {reason}.")]
     Damaged {
         /// The damaged value.
         what: &'static str,
@@ -265,7 +276,10 @@ impl StoreError {
 
     /// Whether the caller named a file that is not a usable record.
     pub fn is_wrong_file(&self) -> bool {
-        matches!(self, Self::Open { .. } | Self::NotADatabase { .. } | Self::NewerSchema { .. })
+        matches!(
+            self,
+            Self::Open { .. } | Self::NotADatabase { .. } | Self::NewerSchema { .. } | Self::NoAnchorFolder { .. }
+        )
     }
 }
 

@@ -93,6 +93,7 @@ pub struct FeedbackRow {
     /// The study.
     pub study_id: StudyId,
     /// Content of the entry.
+    #[serde(rename = "content")]
     pub said: FeedbackContent,
     /// Source.
     pub source: Source,

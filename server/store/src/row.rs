@@ -166,7 +166,7 @@ impl<'de> Visitor<'de> for CellVisitor {
     type Value = Cell;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("null, a number, a text or bytes")
+        f.write_str("null, a number, a string or bytes")
     }
 
     fn visit_unit<E>(self) -> Result<Cell, E> {
@@ -188,7 +188,7 @@ impl<'de> Visitor<'de> for CellVisitor {
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Cell, E> {
         if text.len() > LARGEST_TEXT_BYTES {
             return Err(E::custom(format!(
-                "a text has {} bytes, but at most {LARGEST_TEXT_BYTES} are allowed",
+                "a string has {} bytes, but at most {LARGEST_TEXT_BYTES} are allowed",
                 text.len()
             )));
         }
@@ -320,7 +320,7 @@ mod tests {
             (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "other fields besides its binary value"),
             (r#"{"a": 1, "a": 2}"#.to_owned(), "twice"),
             (r#"{"a": 18446744073709551615}"#.to_owned(), "too large"),
-            (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a text has"),
+            (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a string has"),
             (format!(r#"{{"{}": 1}}"#, "x".repeat(101)), "a name of more than"),
             ("[".repeat(100_000), "invalid type"),
         ] {

@@ -373,7 +373,7 @@ pub struct CertificateCheck {
     pub unit: String,
     /// Worst value; null if it could not be determined, which counts as failed.
     pub value: Option<f64>,
-    /// Largest allowed value; null: reported without a judgement.
+    /// Largest allowed value. Null if the value is only reported.
     pub limit: Option<f64>,
     /// Domain and time of the worst value.
     pub place: String,
@@ -472,15 +472,15 @@ pub struct CycleActivity {
     pub strides: u64,
 }
 
-/// EMG RMSE of a walk and its parts, in shares of the peak of normal walking.
+/// EMG RMSE of a walk and its parts, relative to the peak of the walk without the device.
 #[derive(Debug, ToSchema)]
 pub struct EmgRmse {
     /// Sum of the parts.
     pub total: f64,
-    /// RMS difference of each channel, in the order of the channels of normal walking.
+    /// RMS difference of each channel, in the order of the channels of the walk without the device.
     pub parts: Vec<f64>,
     /// Reasons to doubt the comparison. Absent if there are none.
-    pub remarks: Option<Vec<String>>,
+    pub warnings: Option<Vec<String>>,
 }
 
 /// The activation of the muscle of a channel over the gait cycle.

@@ -29,7 +29,7 @@ pub(crate) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Re
     }
     for (b, parent) in blocks.parent.iter().enumerate() {
         if parent.is_some_and(|p| p <= b || p >= count) {
-            return fail(format!("the parent of block {b} has no larger number"));
+            return fail(format!("the parent of block {b} must have a larger number"));
         }
     }
     let of = block_of_index(blocks);

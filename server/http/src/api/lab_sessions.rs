@@ -182,10 +182,10 @@ pub(super) async fn close(
     request.done(&app, writer, &SessionView::from(&session)).await
 }
 
-/// Unblinding of a session.
+/// Session to unblind, with the reason.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Told {
+pub(super) struct UnblindSession {
     /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
     reason: String,
@@ -201,20 +201,20 @@ pub(super) struct Told {
     operation_id = "unblind_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    request_body = Told,
+    request_body = UnblindSession,
     responses((status = 200, description = "Session with the condition of each walk", body = SessionView)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Administer>,
-    IdempotentWith(request, told): IdempotentWith<Administer, Told>,
+    IdempotentWith(request, asked): IdempotentWith<Administer, UnblindSession>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let session = lab::unblind(&mut writer, &request.actor, id, &told.reason).await?;
+    let session = lab::unblind(&mut writer, &request.actor, id, &asked.reason).await?;
     request.done(&app, writer, &SessionView::from(&session)).await
 }
 

@@ -174,7 +174,7 @@ fn of_settings(error: Error) -> Error {
 
 /// Process EMG recordings
 ///
-/// Filters, cuts and normalises the newest EMG recordings. Can be repeated with other settings.
+/// Filters, segments and normalises the newest EMG recordings. Can be repeated with other settings.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/emg-results",

@@ -140,9 +140,9 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
     };
     let (snapshot, ranking) = app.compute(rank).await?;
     let ranking = ranking.map_err(Error::Learner)?;
-    let best = *ranking
-        .first()
-        .ok_or_else(|| Error::conflict("The study recommends nothing yet, because it has no gait or no preference."))?;
+    let best = *ranking.first().ok_or_else(|| {
+        Error::conflict("The study has no recommendation yet, because it has no gait or no preference.")
+    })?;
     let mut reader = app.read().await?;
     let without_certificate = recommended::judged(&mut reader, &ranking).await?.without_certificate;
     let certifying = without_certificate.is_some_and(|next| app.scheduler.certify_best_of(id, next));
@@ -154,10 +154,10 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
     });
     let Some((place, trial, gait)) = walkable else {
         let why = if certifying {
-            "The study recommends nothing yet, because its best gait is being certified. Try again later.".to_owned()
+            "The study has no recommendation yet, because its best gait is being certified. Try again later.".to_owned()
         } else {
             format!(
-                "The study recommends nothing, because its best gait has no certificate. Request one with POST /api/v1/trials/{best}/certificate."
+                "The study has no recommendation, because its best gait has no certificate. Request one with POST /api/v1/trials/{best}/certificate."
             )
         };
         return Err(Error::conflict(why).into());

@@ -213,7 +213,7 @@ pub(super) async fn correct(
     operation_id = "get_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "As in `gait_settings.muscles` of a study", body = schema::MuscleParameters)),
+    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = schema::MuscleParameters)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn muscles(
@@ -235,7 +235,7 @@ pub(super) async fn muscles(
     operation_id = "set_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    request_body(content = schema::MuscleParameters, description = "As in `gait_settings.muscles` of a study; empty: the published table"),
+    request_body(content = schema::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the published table"),
     responses((status = 200, description = "Muscle values", body = schema::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

@@ -295,7 +295,7 @@ fn maps(belief: &Belief, snapshot: &StudySnapshot, chosen: Option<(usize, usize)
 /// The text below each map.
 const MAP_NOTES: [&str; 2] = [
     "Mean ± standard deviation. The frame marks the best action.",
-    "The small print counts the trials with these two values: yes, converged; no, not converged.",
+    "The small numbers count the trials with these two values: yes, converged; no, not converged.",
 ];
 
 /// How many trials with these levels converged and how many did not.

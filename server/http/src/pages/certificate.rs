@@ -37,7 +37,7 @@ impl InWords {
             ));
             let (kept, leak) = (format::number(map.speed_kept), format::number(map.speed_leak));
             figures.push((
-                "Share of a speed change left after one stride: in speed, in other coordinates",
+                "Change in speed: share that remains after one stride, share that spreads to other coordinates",
                 format!("{kept}, {leak}"),
             ));
             let distance = format::number(map.fixed_point_distance);

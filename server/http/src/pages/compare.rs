@@ -378,7 +378,7 @@ const LABELS: [(&str, &str); 6] = [
     ("b", "Gait B"),
     ("answer", "Answer"),
     ("source", "Answer given by"),
-    ("author", "Your name or code"),
+    ("author", "Name or code of this person"),
     ("note", "Note"),
 ];
 

@@ -1,5 +1,6 @@
 //! Errors as pages.
 
+use super::refusal;
 use crate::identify::AnsweredTo;
 use crate::problem::Problem;
 use crate::problem::Refusal;
@@ -32,8 +33,12 @@ impl IntoResponse for PageError {
         if matches!(self.0, Error::NotSignedIn(_)) {
             return Redirect::to("/sign-in").into_response();
         }
+        let error = match self.0 {
+            Error::Invalid(fault) => Error::Invalid(Box::new(refusal::with_label(*fault))),
+            other => other,
+        };
         // `answers::complete` renders it with the navigation of the caller.
-        Refusal(self.0).into_response()
+        Refusal(error).into_response()
     }
 }
 

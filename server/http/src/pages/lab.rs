@@ -172,8 +172,11 @@ impl Measured {
     fn of(session: &SessionView, emg: &EmgView, charts: Vec<Drawn>) -> Self {
         let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
         let strides = |walk: &WalkActivity| {
-            let strides = walk.channels.first().map_or(0, |channel| channel.strides);
-            format!("{strides} strides ({})", lab_charts::walk_name(session, walk.walk))
+            let strides = match walk.channels.first().map_or(0, |channel| channel.strides) {
+                1 => "1 stride".to_owned(),
+                many => format!("{many} strides"),
+            };
+            format!("{strides} ({})", lab_charts::walk_name(session, walk.walk))
         };
         let counts: Vec<String> = emg.result.walks.iter().map(strides).collect();
         let walks = || emg.result.walks.iter();
@@ -208,7 +211,7 @@ impl Measured {
             compared: compared.iter().map(|(walk, _)| name(walk)).collect(),
             warnings: compared
                 .iter()
-                .flat_map(|(walk, rmse)| rmse.remarks.iter().map(|warning| format!("{}: {warning}", name(walk))))
+                .flat_map(|(walk, rmse)| rmse.warnings.iter().map(|warning| format!("{}: {warning}", name(walk))))
                 .collect(),
             walks: walks().map(name).collect(),
             rows,
@@ -357,7 +360,7 @@ pub(super) async fn answer(
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/lab-sessions/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, forms, Some(error.to_string())).await?;
+            let shown = show(app, id, caller, forms, Some(refusal::in_words(&error))).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

@@ -61,7 +61,7 @@ pub(super) fn emg(session: &SessionView, emg: &EmgView) -> Vec<Figure> {
         }
         for walk in &emg.model {
             let Some(muscle) = walk.muscles.iter().find(|muscle| muscle.channel == channel.channel) else { continue };
-            let label = format!("model's {} of {}", muscle.muscle, walk_name(session, walk.walk));
+            let label = format!("model, {}: {}", walk_name(session, walk.walk), muscle.muscle);
             let line = muscle.activation.iter().enumerate().map(|(point, value)| (point as f64, *value)).collect();
             chart = chart.with(&label, 2 + usize::from(walk.walk), Stroke::Dashed, line);
         }

@@ -2,6 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format::walks_in_words;
+use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -134,7 +135,7 @@ async fn read_back(
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/lab/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, Some(error.to_string()), typed).await?;
+            let shown = show(app, id, Some(refusal::in_words(&error)), typed).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

@@ -2,6 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format;
+use super::refusal;
 use super::users::origin;
 use crate::AppState;
 use crate::accessible::{Id, Named};
@@ -121,7 +122,7 @@ pub(super) async fn post(
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
             drop(writer);
-            let shown = Visible { refused: Some(error.to_string()), typed: asked.name, link: None };
+            let shown = Visible { refused: Some(refusal::in_words(&error)), typed: asked.name, link: None };
             Ok((Problem::from(&error).status(), show(&app, &authorized.caller, id, shown).await?).into_response())
         }
         Err(error) => Err(error.into()),

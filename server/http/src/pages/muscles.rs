@@ -2,6 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format;
+use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -87,7 +88,10 @@ fn shown(
         };
         Row { name, cells: MuscleOverride::FIELDS.iter().map(cell).collect() }
     };
-    let rows = KINDS.iter().map(row).collect();
+    let rows: Vec<Row> = KINDS.iter().map(row).collect();
+    let cell = rows.iter().flat_map(|row| &row.cells).find(|cell| cell.refused);
+    let message = refused.as_ref().zip(cell).map(|(refused, cell)| refusal::of_field(&cell.label, refused));
+    let refused = refused.map(|refused| FieldError { message: message.unwrap_or(refused.message), ..refused });
     MusclesPage { subject, columns: MuscleOverride::FIELDS, rows, scaled_to_body, may_run, refused }
 }
 

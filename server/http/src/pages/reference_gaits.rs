@@ -3,6 +3,7 @@
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::figures;
+use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -132,7 +133,7 @@ pub(super) async fn import(
         Ok(definition) => definition,
         Err(Error::Invalid(refused)) => {
             let empty = ReferenceGaitsPage::read(&mut *app.read().await?, None, true).await?;
-            let form = page(&ReferenceGaitsPage { fields, refused: Some(*refused), ..empty })?;
+            let form = page(&ReferenceGaitsPage { fields, refused: Some(refusal::with_label(*refused)), ..empty })?;
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response());
         }
         Err(other) => return Err(other.into()),

@@ -4,6 +4,35 @@ use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::TrialId;
 use serde_json::Value;
 
+/// Labels of fields, the same on every form that has no labels of its own.
+const LABELS: &[(&str, &str)] = &[
+    ("pseudonym", "Pseudonym"),
+    ("height_m", "Height, m"),
+    ("body_mass_kg", "Body mass, kg"),
+    ("notes", "Notes"),
+    ("note", "Note"),
+    ("reason", "Reason"),
+    ("author", "Your name or code"),
+    ("answer", "Answer"),
+    ("name", "Name"),
+    ("who", "User or token"),
+    ("password", "New password"),
+    ("walk", "Walk"),
+    ("recording", "File contents"),
+    ("rate_hz", "Sampling rate, Hz"),
+    ("channels", "Channel columns"),
+    ("heel_strikes_s", "Right heel strikes, s"),
+    ("heel_strike_column", "Heel strike column"),
+    ("heel_strike_threshold", "Contact threshold"),
+    ("force_column", "Column of the vertical force under the right foot"),
+    ("unit", "Angle unit of an OpenSim file"),
+    ("cutoff_hz", "Low-pass cutoff, Hz"),
+    ("band_low_hz", "Band-pass from, Hz"),
+    ("band_high_hz", "Band-pass to, Hz"),
+    ("envelope_hz", "Low-pass cutoff, Hz"),
+    ("order", "Filter order"),
+];
+
 /// A refusal under the label of its field.
 pub(super) fn of_field(label: &str, fault: &FieldError) -> String {
     let Some(allowed) = fault.allowed.as_deref() else { return fault.message.clone() };
@@ -22,13 +51,27 @@ pub(super) fn of_field(label: &str, fault: &FieldError) -> String {
     }
 }
 
-/// The sentence of an error, with the label of the refused field if the form has one.
+/// The sentence of an error, with the label of the refused field: from `labels`, or else the common one.
 pub(super) fn of_form(error: &Error, labels: &[(&str, &str)]) -> String {
     match error {
-        Error::Invalid(fault) => labels
-            .iter()
-            .find(|(field, _)| *field == fault.field)
-            .map_or_else(|| error.to_string(), |(_, label)| of_field(label, fault)),
+        Error::Invalid(fault) => labelled(fault, labels),
         _ => error.to_string(),
     }
+}
+
+/// The sentence of an error, with the common label of the refused field.
+pub(super) fn in_words(error: &Error) -> String {
+    of_form(error, &[])
+}
+
+/// The same refusal, with the common label of its field.
+pub(super) fn with_label(fault: FieldError) -> FieldError {
+    FieldError { message: labelled(&fault, &[]), ..fault }
+}
+
+fn labelled(fault: &FieldError, labels: &[(&str, &str)]) -> String {
+    // A form shows a field of a part of the request, such as `reading.rate_hz`, without the part.
+    let name = fault.field.rsplit('.').next().unwrap_or_default();
+    let found = labels.iter().chain(LABELS).find(|(field, _)| *field == name);
+    found.map_or_else(|| fault.message.clone(), |(_, label)| of_field(label, fault))
 }

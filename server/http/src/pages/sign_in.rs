@@ -2,6 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format;
+use super::refusal;
 use super::unsent::{SignInPage, Unsent, send_now};
 use crate::authorization::SignedIn;
 use crate::extract::Form;
@@ -272,7 +273,7 @@ pub(super) async fn set_password(
     let name = user.name.clone();
     let hashed = match secret::aside(move || secret::hash_password_of(&name, &form.password)).await? {
         Err(Error::Invalid(field)) => {
-            shown.refused = Some(field.message);
+            shown.refused = Some(refusal::with_label(*field).message);
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
         }
         hashed => hashed?,

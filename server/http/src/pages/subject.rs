@@ -2,6 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format::{variant, words};
+use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -141,7 +142,7 @@ pub(super) async fn add(
     };
     let status = Problem::from(&error).status();
     let refused = match error {
-        Error::Invalid(refused) => *refused,
+        Error::Invalid(refused) => refusal::with_label(*refused),
         // The only possible conflict is a pseudonym that is taken.
         other => {
             FieldError { message: other.to_string(), ..FieldError::new("pseudonym", fields.pseudonym.clone(), "") }
@@ -322,7 +323,7 @@ async fn answer(
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, Some(error.to_string())).await?;
+            let shown = show(app, id, caller, Some(refusal::in_words(&error))).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

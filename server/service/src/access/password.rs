@@ -1,6 +1,6 @@
 //! The password policy: refuses passwords that are short or easy to guess.
 
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 
 /// Minimum length, characters.
 pub const SHORTEST: usize = 10;
@@ -214,12 +214,12 @@ pub fn check(password: &str, name: &str) -> Result<(), Error> {
     let length = password.chars().count();
     if length < SHORTEST || password.len() > LONGEST_BYTES {
         let allowed = format!("at least {SHORTEST} characters and at most {LONGEST_BYTES} bytes long");
-        return Err(Error::invalid("password", format!("{length} characters long"), &allowed));
+        return Err(FieldError::described("password", &format!("{length} characters long"), &allowed).into());
     }
     if unpredictable(password, name) < LEAST_UNPREDICTABLE {
         let allowed = "hard to guess, such as three unrelated words. Your name, common words, keyboard rows, sequences such as \
                        1234 and repetitions add little";
-        return Err(Error::invalid("password", "easy to guess", allowed));
+        return Err(FieldError::described("password", "easy to guess", allowed).into());
     }
     Ok(())
 }

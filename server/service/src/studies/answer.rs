@@ -91,7 +91,7 @@ pub fn attribution<'a>(
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     // A signed-in user cannot answer as another clinician.
     if caller.user.is_some() && source == Source::Clinician && author != caller.name {
-        return Err(Error::invalid("author", author, &format!("{} (the signed-in user) or absent", caller.name)));
+        return Err(Error::invalid("author", author, &format!("{} (the signed-in user), or omitted", caller.name)));
     }
     printable::note("note", note, 2000)?;
     Ok(Attribution { source, author, note })

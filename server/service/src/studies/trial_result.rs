@@ -74,7 +74,7 @@ pub async fn ended(
         return Ok(true);
     }
     // The worker is free already, so the trial is solved again, at most twice.
-    broke(store, lease, "New answers kept arriving before the result could be compared with them.").await
+    broke(store, lease, "New answers kept arriving before the result could be recorded.").await
 }
 
 /// Records an engineering failure: the job is retried at most twice, then the trial is `failed`.

@@ -121,8 +121,8 @@ pub enum NotWalkable {
     },
     /// The gait has no certificate yet.
     #[error(
-        "The gait of trial {number} has no certificate yet. If it is not being certified, request a certificate with POST \
-         /api/v1/trials/{id}/certificate."
+        "The gait of trial {number} has no certificate yet. If it is not being certified, press Certify on its \
+         page, or send POST /api/v1/trials/{id}/certificate."
     )]
     NotCertified {
         /// The trial.

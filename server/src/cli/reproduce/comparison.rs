@@ -159,9 +159,9 @@ pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
     let throughout = verdicts.iter().filter(|v| v.throughout()).count();
     let at_the_end = verdicts.iter().filter(|v| v.last.is_some_and(|(without, with)| with < without)).count();
     let pairs = verdicts.len();
-    let paper = "The paper's statement, lower Gait RMSE with muscles throughout the tuning process,";
+    let paper = "The paper's claim, lower Gait RMSE with muscles throughout the tuning process,";
     let answer = match throughout {
-        _ if pairs == 0 => "cannot be judged: there is no pair of studies",
+        _ if pairs == 0 => "cannot be tested: there is no pair of studies",
         1 if pairs == 1 => {
             "holds in the only pair, which says little: local optima can turn it either way, so repeat with more seeds"
         }
@@ -318,7 +318,7 @@ mod tests {
         assert!(conclusion(&found[1..]).contains("holds in the only pair, which says little"));
         assert!(conclusion(&[found[1].clone(), found[1].clone()]).contains("holds in every pair (2 of 2)"));
         assert!(conclusion(&found[..1]).contains("they raise the final Gait RMSE by a median of 0.100 rad"));
-        assert!(conclusion(&[]).contains("cannot be judged"));
+        assert!(conclusion(&[]).contains("cannot be tested"));
     }
 
     #[test]

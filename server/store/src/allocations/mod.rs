@@ -141,7 +141,7 @@ pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> Sto
 }
 
 /// Draws which gait of a pair is shown first, by a fair coin. A biased one would not do: answers in the study reveal
-/// earlier allocations to readers who know what the rater said. A pair that is shown `again` after a retraction keeps its
+/// earlier allocations to readers who know the answer of the rater. A pair that is shown `again` after a retraction keeps its
 /// sides.
 ///
 /// # Errors

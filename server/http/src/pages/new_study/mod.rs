@@ -9,7 +9,7 @@ use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::extract::Form;
+use crate::extract::{Form, Params};
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
@@ -238,10 +238,18 @@ impl NewStudyPage {
     }
 }
 
+/// The subject to preselect.
+#[derive(Debug, Deserialize)]
+pub(super) struct For {
+    #[serde(default)]
+    subject: Option<SubjectId>,
+}
+
 /// `GET /studies/new`.
-pub(super) async fn get(_: Authorized<Run>, State(app): State<AppState>) -> Page {
+pub(super) async fn get(_: Authorized<Run>, State(app): State<AppState>, Params(For { subject }): Params<For>) -> Page {
     let offered = Offered::read(&mut *app.read().await?).await?;
-    let fields = Fields::default();
+    let subject = subject.map_or_else(String::new, |id| id.to_string());
+    let fields = Fields { subject, ..Fields::default() };
     let editor = SpaceEditor::typed(&fields.space)?;
     page(&NewStudyPage { offered, learners: &LEARNERS, fields, editor, refused: None })
 }

@@ -22,7 +22,7 @@ impl WithoutGait {
         if let Some(Relief { bound, trials, instance }) = &common.relief {
             let limited = format::limited(bound);
             let reason = format!(
-                "Relaxing {bound} ({limited}) alone gives a gait in {trials} of {explained} explained trials without a gait."
+                "In {trials} of {explained} explained trials, relaxing {bound} ({limited}) alone gives a gait."
             );
             return Some(Self { reason, instance: *instance });
         }

@@ -50,7 +50,7 @@ pub struct RaterFigures {
     pub first_preferred: Option<Share>,
     /// Share of repeated pairs with the same answer as before, among blind answers.
     pub repeats_agree: Share,
-    /// Number of answers "cannot tell".
+    /// Number of "cannot tell" answers.
     pub cannot_tell: u32,
     /// Number of answers that reported a gait as unsafe.
     pub unsafe_gaits: u32,

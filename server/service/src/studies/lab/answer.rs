@@ -51,7 +51,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
         return Err(Error::invalid(
             "answer",
             "withdrawn",
-            "one of the other answers, because only the service withdraws pairs",
+            "one of the other answers, because only the service withdraws answers",
         ));
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
@@ -192,7 +192,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
         Err(reason @ (Error::Invalid(_) | Error::Conflict(_))) => {
             let detail = json!({ "number": given.number, "reason": reason.to_string() });
             let object = format!("lab session {}", session.id);
-            Ok(audit::append(writer, &Actor::program(), "lab_session.answer_not_heard", &object, &detail).await?)
+            Ok(audit::append(writer, &Actor::program(), "lab_session.answer_not_used", &object, &detail).await?)
         }
         other => other,
     }

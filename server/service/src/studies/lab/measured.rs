@@ -23,7 +23,7 @@ pub struct WalkActivity {
     pub walk: u8,
     /// Measurement file that it was computed from.
     pub recording_id: MeasurementFileId,
-    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, in shares of
+    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
     /// the peak of walk 1.
     #[schema(value_type = Vec<schema::CycleActivity>)]
     pub channels: Vec<CycleActivity>,
@@ -50,7 +50,7 @@ fn newest(recordings: &[MeasurementFile], kind: MeasurementKind) -> Vec<&Measure
     (1..=super::WALKS).filter_map(of_walk).collect()
 }
 
-/// Filters, cuts and normalises the newest EMG recordings of a session.
+/// Filters, segments and normalises the newest EMG recordings of a session.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming a setting, [`Error::Conflict`] without an EMG recording of walk 1.

@@ -79,7 +79,7 @@ impl EmgReading {
                 return Err(Error::invalid(
                     "reading.rate_hz",
                     rate_hz,
-                    "absent, because an OpenSim file has its own time axis",
+                    "omitted, because an OpenSim file has its own time axis",
                 ));
             }
         };
@@ -93,7 +93,7 @@ impl EmgReading {
                 given.to_vec()
             }
             (_, given) => {
-                let allowed = "at least two times, or absent if heel_strike_column is given";
+                let allowed = "at least two times, or none if a heel strike column is given";
                 return Err(Error::invalid("reading.heel_strikes_s", json!(given), allowed));
             }
         };

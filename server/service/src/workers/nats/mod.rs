@@ -3,7 +3,7 @@
 //! The broker carries jobs and results and may be wiped at any time: SQLite stays the only truth. Jobs wait in a
 //! work-queue stream, one message for each attempt; a worker holds its message with signs of life and loses it to
 //! another one when it is silent for a third of a lease. Results wait in a second stream until the
-//! service has them in its record. Iterations are told without being kept.
+//! service has them in its record. Iterations are reported, but not kept.
 
 mod engine;
 mod message;
