@@ -165,6 +165,22 @@ async fn ten_thousand_aborted_sign_ins_with_fresh_names_do_not_erase_the_failure
 }
 
 #[tokio::test]
+async fn own_sign_in_does_not_clear_the_count_of_guesses_at_other_names() {
+    let (_folder, mut service) = service().await;
+    service.access = standing_still();
+    with_password(&service, "admin", Role::Admin, RIGHT).await;
+    with_password(&service, "Bea", Role::Rater, RIGHT).await;
+    abort_attempts(&service, "192.0.2.66", (0..1001).map(|number| format!("nobody {number}"))).await;
+    let mut statuses = Vec::new();
+    for _ in 0..6 {
+        statuses.push(sign_in_from(&service, ATTACKER, None, "admin", "guess").await.status);
+        sign_in_from(&service, ATTACKER, None, "Bea", RIGHT).await;
+    }
+    assert_eq!(statuses.last(), Some(&StatusCode::TOO_MANY_REQUESTS), "{statuses:?}");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn thirty_thousand_attempts_are_visible_with_their_number() {
     let (_folder, service) = service().await;
     let admin = signed_in(&service, Role::Admin).await;

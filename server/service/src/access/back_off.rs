@@ -93,12 +93,15 @@ impl Attempt {
         note(writer, "session.refuse", &self.name, &self.origin, self.attempts).await
     }
 
-    /// Records a correct password and clears the count.
+    /// Records a correct password and clears the count of this name. The shared count stays, or anyone with an account
+    /// could clear that of their guesses at other names.
     ///
     /// # Errors
     /// Errors of the database.
     pub async fn succeeded(self, writer: &mut Writer) -> Result<(), Error> {
-        failures::forget(writer, &self.counted_as, &self.origin.source()).await?;
+        if self.counted_as != OTHER_NAMES {
+            failures::forget(writer, &self.counted_as, &self.origin.source()).await?;
+        }
         Ok(failures::uncount(writer, &self.origin.network).await?)
     }
 }

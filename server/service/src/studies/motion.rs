@@ -4,11 +4,12 @@
 use gait_optimizer::{SolveReport, TunedBounds};
 use gaitwright_store::trials::{Trial, TrialState};
 
-/// Relative difference up to which two figures count as the same.
-const TOLERANCE: f64 = 1e-5;
+/// Relative difference up to which two figures count as the same. Solves of one gait from different starts differ by more
+/// than 1e-5.
+const TOLERANCE: f64 = 1e-4;
 /// Difference up to which two durations count as the same, s. The shortest domains last 20 ms, so a relative tolerance
 /// would be less than what the constraints leave open.
-const TOLERANCE_S: f64 = 2e-5;
+const TOLERANCE_S: f64 = 1e-4;
 
 /// What identifies the gait of a trial, in whichever study of the subject it was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +112,7 @@ mod tests {
                 scale(&mut figures, factor);
                 motion(KnownBy::Figures(figures), 16.0)
             };
-            let (near, far) = (scaled(1.0 + 5e-6), scaled(1.0 + 3e-4));
+            let (near, far) = (scaled(1.0 + 5e-5), scaled(1.0 + 3e-3));
             assert!(one.is_same(&near) && one.is_same_with_another_device(&near), "{near:?}");
             assert!(!one.is_same(&far) && !one.is_same_with_another_device(&far), "{far:?}");
         }
