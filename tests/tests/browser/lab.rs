@@ -59,7 +59,7 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     page.wait_for(".notice.good button").await;
     assert!(page.text(".notice.good").await.contains("walk 2 was better"));
     page.click(".notice.good button").await;
-    page.wait_for("input[name=number][value='2']").await;
+    page.wait_for(".verdicts input[value=no_difference]").await;
     page.run("document.querySelector('input[name=answer]').focus()").await;
     page.press("ArrowRight").await;
     page.press("ArrowRight").await;
