@@ -31,10 +31,11 @@ const TABLES: [(&str, &str); 31] = [
     ("remarks", "study_id = ? order by id"),
     ("remark_retractions", "remark_id in (select id from remarks where study_id = ?)"),
     ("safety_reports", "trial_id in (select id from trials where study_id = ?) order by rowid"),
-    ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by id"),
+    ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by rowid"),
     (
         "safety_review_reports",
-        "review_id in (select r.id from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ?)",
+        "review_id in (select r.id from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ?) \
+         order by review_id, report_id",
     ),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_allocations", archived_allocations::LAB),

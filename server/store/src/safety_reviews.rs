@@ -81,7 +81,7 @@ const SELECT: &str = "select r.*, (select group_concat(report_id) from safety_re
 pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResult<SafetyReviewId> {
     let id = SafetyReviewId::fresh();
     let at = now();
-    // The column said_until is from before the reports were listed, and decides nothing.
+    // The column said_until decides nothing: the rows of safety_review_reports do.
     sqlx::query(
         "insert into safety_reviews (id, trial_id, said_until, verdict, author, reason, created_at) \
          values (?, ?, ?, ?, ?, ?, ?)",

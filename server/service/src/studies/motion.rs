@@ -4,8 +4,8 @@
 use gait_optimizer::{SolveReport, TunedBounds};
 use gaitwright_store::trials::{Trial, TrialState};
 
-/// Relative difference up to which two figures count as the same. Solves of one gait from different starts differ by more
-/// than 1e-5.
+/// Relative difference up to which two figures count as the same. Solves that find the same gait from
+/// different starts can differ by more than 1e-5.
 const TOLERANCE: f64 = 1e-4;
 /// Difference up to which two durations count as the same, s. The shortest domains last 20 ms, so a relative tolerance
 /// would be less than what the constraints leave open.

@@ -108,7 +108,7 @@ async fn report_unsafe(
             in_the_lab(writer, session.id).await
         }
         Some(stands) if walked.is_none() && !stands.said.is_about_safety() => {
-            take_back(writer, caller, session.id, stands.number).await?;
+            retract_number(writer, caller, session.id, stands.number).await?;
             add(writer, caller, session.id, next_number(session), new).await
         }
         Some(_) => {
@@ -158,11 +158,12 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> 
                    coordinator to change it on the study page.";
         return Err(Error::conflict(why));
     }
-    take_back(writer, caller, id, answer.number).await?;
+    retract_number(writer, caller, id, answer.number).await?;
     in_the_lab(writer, id).await
 }
 
-async fn take_back(writer: &mut Writer, caller: &Caller, id: LabSessionId, number: u32) -> Result<(), Error> {
+/// Retracts the answer with this number, and records it in the audit trail.
+async fn retract_number(writer: &mut Writer, caller: &Caller, id: LabSessionId, number: u32) -> Result<(), Error> {
     lab_answers::retract(writer, &caller.actor, id, number).await?;
     let detail = json!({ "number": number });
     Ok(audit::append(writer, &caller.actor, "lab_session.retract", &format!("lab session {id}"), &detail).await?)
