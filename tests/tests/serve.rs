@@ -198,6 +198,43 @@ fn silent_connections_above_the_descriptor_limit_leave_health_answering() {
     }
 }
 
+/// Peak memory of a process, MiB.
+#[cfg(target_os = "linux")]
+fn peak_memory_mib(process: &Process) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", process.child.id())).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+    line.trim().trim_end_matches(" kB").parse::<u64>().unwrap() / 1024
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn bodies_sent_in_single_bytes_use_little_memory() {
+    const CONNECTIONS: usize = 8;
+    const BYTES: usize = 8000;
+    let folder = tempfile::tempdir().unwrap();
+    let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    assert_eq!(get(process.address(), "/health").unwrap().status, 200);
+    let before = peak_memory_mib(&process);
+    let head = "POST /sign-in HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/x-www-form-urlencoded\r\n\
+                content-length: 60000\r\n\r\n";
+    let drip = |_| {
+        let mut stream = TcpStream::connect(process.address()).unwrap();
+        stream.set_nodelay(true).unwrap();
+        std::thread::spawn(move || {
+            stream.write_all(head.as_bytes()).unwrap();
+            for _ in 0..BYTES {
+                stream.write_all(b"a").unwrap();
+                std::thread::sleep(Duration::from_micros(200));
+            }
+            stream
+        })
+    };
+    let dripping: Vec<_> = (0..CONNECTIONS).map(drip).collect();
+    let open: Vec<TcpStream> = dripping.into_iter().map(|one| one.join().unwrap()).collect();
+    let used = peak_memory_mib(&process) - before;
+    assert!(used < 16, "{used} MiB for {} bytes on {} connections", open.len() * BYTES, open.len());
+}
+
 /// Sends a byte of a header every 50 ms from an address, on one connection after another.
 #[cfg(target_os = "linux")]
 async fn drip(from: std::net::SocketAddr, to: std::net::SocketAddr) {

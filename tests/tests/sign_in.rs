@@ -84,6 +84,22 @@ fn standing_still() -> Arc<Access> {
 }
 
 #[tokio::test]
+async fn bodies_of_callers_who_are_not_signed_in_are_small() {
+    let (_folder, mut service) = service().await;
+    service.access = Arc::new(Access::by_sign_in(3600.0));
+    let token = token(&service, &[Right::Run]).await;
+    let name = |length: usize| format!("name={}&password={RIGHT}", "a".repeat(length));
+    for (length, expected) in [(60_000, StatusCode::UNAUTHORIZED), (70_000, StatusCode::PAYLOAD_TOO_LARGE)] {
+        let answer = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, &name(length)).await;
+        assert_eq!(answer.status, expected, "{length}: {}", answer.text);
+    }
+    let long = json!({"name": "a".repeat(70_000)});
+    let (refused, problem) = post(&service, &token, "/api/v1/studies", &long).await;
+    assert_eq!((refused, &problem["field"]), (StatusCode::BAD_REQUEST, &json!("subject_id")), "it was read");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn right_password_is_accepted_while_others_fail_elsewhere() {
     let (_folder, mut service) = service().await;
     service.access = standing_still();
@@ -541,9 +557,10 @@ fn event_streams_are_made_in_one_place_that_asks_who_listens() {
     let found = sources::of_server();
     let makes = |text: &str| ["Sse::new", "Body::from_stream", "StreamBody"].iter().any(|way| text.contains(way));
     let makers: Vec<&str> = found.iter().filter(|(_, text)| makes(text)).map(|(path, _)| path.as_str()).collect();
-    // An archive is a finite response.
-    let (files, makers): (Vec<&str>, Vec<&str>) = makers.iter().partition(|path| **path == "http/src/api/archive.rs");
-    assert_eq!(files.len(), 1);
+    // An archive is a finite response, and the other file changes requests.
+    let finite = ["http/src/api/archive.rs", "http/src/request_body.rs"];
+    let (files, makers): (Vec<&str>, Vec<&str>) = makers.iter().partition(|path| finite.contains(path));
+    assert_eq!(files.len(), 2);
     assert!(found.len() > 100 && makers.len() == 1 && makers[0] == "http/src/event_stream.rs", "{makers:?}");
 }
 

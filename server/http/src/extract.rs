@@ -1,6 +1,6 @@
 //! Extractors for JSON bodies, query strings and forms, whose errors are problem documents.
 
-use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
+use super::{ANONYMOUS_BODY_LIMIT_BYTES, BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::problem::Refusal;
 use axum::extract::{FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
@@ -28,7 +28,8 @@ pub(crate) fn body<T: DeserializeOwned>(method: &Method, headers: &HeaderMap, by
 pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
     if status == StatusCode::PAYLOAD_TOO_LARGE {
         Error::TooLarge(format!(
-            "The body has more than {BODY_LIMIT_BYTES} bytes ({RECORDING_LIMIT_BYTES} for uploads of measurement files)."
+            "The body is too large. The limit is {BODY_LIMIT_BYTES} bytes, {RECORDING_LIMIT_BYTES} for uploads of \
+             measurement files, and {ANONYMOUS_BODY_LIMIT_BYTES} without sign-in."
         ))
     } else if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
         Error::UnsupportedMediaType(reason.to_owned())

@@ -1,8 +1,8 @@
 //! Authentication: finds the caller of a request from its token or session cookie, before any handler.
 
-use super::AppState;
+use super::{ANONYMOUS_BODY_LIMIT_BYTES, AppState};
 use crate::problem::Refusal;
-use axum::extract::{Request, State};
+use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::Response;
@@ -35,6 +35,8 @@ pub(super) async fn identify(
     if let Some(caller) = caller(&app, &path, &headers).await? {
         answered_to = Some(AnsweredTo(caller.role));
         request.extensions_mut().insert(caller);
+    } else {
+        DefaultBodyLimit::max(ANONYMOUS_BODY_LIMIT_BYTES).apply(&mut request);
     }
     let mut answer = next.run(request).await;
     if let Some(to) = answered_to {

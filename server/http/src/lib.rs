@@ -27,6 +27,7 @@ pub mod pages;
 mod paging;
 mod problem;
 mod problem_kinds;
+mod request_body;
 mod revision;
 mod router;
 mod same_origin;
@@ -42,5 +43,7 @@ pub use state::{Access, AppState};
 
 /// Largest request body.
 const BODY_LIMIT_BYTES: usize = 1 << 20;
+/// The same for callers who are not signed in.
+const ANONYMOUS_BODY_LIMIT_BYTES: usize = 64 << 10;
 /// The same for uploads of measurement files.
 const RECORDING_LIMIT_BYTES: usize = 16 << 20;
