@@ -8,15 +8,17 @@ use gait_optimizer::Device;
 use gaitwright_service::access::{Caller, Right};
 use gaitwright_service::studies::lab;
 use gaitwright_service::studies::plan::NewStudy;
+use gaitwright_service::studies::safety_report::{self, Report};
 use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{DeviceId, StudyId, TokenId};
+use gaitwright_store::{DeviceId, StudyId, TokenId, commit};
 use gaitwright_tests::callers::FORM;
 use gaitwright_tests::scripted;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
 use serde_json::{Value, json};
+use std::time::Duration;
 use tempfile::TempDir;
 
 async fn service() -> (TempDir, Service) {
@@ -63,6 +65,8 @@ async fn a_report_closes_every_trial_of_the_subject_with_the_same_motion() {
     let best = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json()["trial_id"].clone();
     let best = trials.iter().find(|trial| json!(trial.id) == best).unwrap();
     let twin = converged(&service, fork).await.into_iter().find(|trial| trial.action == best.action).unwrap();
+    let cost = |trial: &Trial| trial.report.as_ref().unwrap().cost_of_transport;
+    assert!((cost(&twin) / cost(best) - 1.0).abs() > 1e-5, "solves of one gait differ");
     assert_eq!((controller(&service, best).await, controller(&service, &twin).await), (StatusCode::OK, StatusCode::OK));
     report(&service, &twin).await;
     let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json", best.id)).await;
@@ -223,6 +227,30 @@ async fn no_file_is_released_after_a_report_was_acknowledged_or_the_session_clos
         let mut writer = service.store.write().await.unwrap();
         let refused = lab::for_device(&mut writer, &device, id.parse().unwrap(), 2).await;
         assert!(refused.is_err(), "{ends}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_report_that_is_recorded_while_a_file_waits_for_the_access_log_stops_the_file() {
+    let (_folder, service) = service().await;
+    let (study, trials) = finished(&service).await;
+    let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
+    let of_trial = format!("/api/v1/trials/{}/controller.json", trials[0].id);
+    let of_walk = format!("/api/v1/lab-sessions/{}/controller.json?walk=2", session["id"].as_str().unwrap());
+    for path in [of_trial, of_walk] {
+        let mut writer = service.store.write().await.unwrap();
+        let report = async {
+            // Long enough for the file to be made; the response then waits for the writer.
+            tokio::time::sleep(Duration::from_secs(2)).await;
+            let report: Report = serde_json::from_value(json!({"note": "stumbled"})).unwrap();
+            safety_report::give(&mut writer, &Caller::without_sign_in(), trials[0].id, &report).await.unwrap();
+            commit(writer).await.unwrap();
+        };
+        let (refused, ()) = tokio::join!(service.fetch(&path), report);
+        assert_eq!(refused.status, StatusCode::CONFLICT, "{path}");
+        assert_eq!(clear(&service, &trials[0]).await, StatusCode::OK);
     }
     service.stop().await;
 }

@@ -13,10 +13,11 @@ use axum::middleware::Next;
 use axum::response::Response;
 use gaitwright_service::access::Caller;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::walkable;
 use gaitwright_service::supervise::Task;
 use gaitwright_store::access_log::{self, Access, Kind, Tally};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::{Store, StoreResult, access_spool, commit, now};
+use gaitwright_store::{Store, StoreResult, TrialId, access_spool, commit, now};
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -165,6 +166,23 @@ async fn append(store: &Store, rows: &[(Access, Tally)]) -> StoreResult<()> {
     commit(writer).await
 }
 
+/// The trials of a response that must not be sent after any of their gaits was reported as unsafe. An extension of the
+/// response.
+#[derive(Debug, Clone)]
+pub(crate) struct OnlyWhileWalkable(pub(crate) Vec<TrialId>);
+
+/// Writes the row of an export. The same transaction decides whether the gaits in it are still walkable, so the file of
+/// a gait is not sent after a report about it was acknowledged.
+async fn append_export(store: &Store, access: &Access, of: Option<&OnlyWhileWalkable>) -> Result<(), Error> {
+    let mut writer = store.write().await?;
+    for &trial in of.iter().flat_map(|of| &of.0) {
+        walkable::admit(&mut writer, trial).await??;
+    }
+    let at = now();
+    access_log::append(&mut writer, access, Tally { first_at: at, last_at: at, times: 1 }).await?;
+    Ok(commit(writer).await?)
+}
+
 /// Writes pending rows, as a background task of the service.
 async fn keep_writing(app: AppState) {
     let scheduler = app.scheduler.clone();
@@ -252,8 +270,7 @@ pub(super) async fn note(
     let (method, status) = (method.to_string(), answer.status().as_u16());
     let access = Access { kind, actor, address, method, route, object, status, named };
     if kind == Kind::Export {
-        let at = now();
-        append(app.store(), &[(access, Tally { first_at: at, last_at: at, times: 1 })]).await?;
+        append_export(app.store(), &access, answer.extensions().get()).await?;
     } else if app.access.log.count(access) {
         tokio::spawn(keep_writing(app.clone()));
     }

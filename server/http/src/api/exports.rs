@@ -1,6 +1,7 @@
 //! REST: downloads of a trial: problem file, OpenSim motion, controller file.
 
 use crate::AppState;
+use crate::access_log::OnlyWhileWalkable;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Params;
@@ -111,9 +112,14 @@ pub(super) async fn controller(
     let number = gait.number();
     let write = move |pool: &OnPool| gait.controller_file(&trajectory.unpack(pool)?, sampling.rate_hz);
     let text = app.compute(write).await??;
-    // A report may have been acknowledged while the file was written.
-    walkable::admit(&mut *app.read().await?, id).await??;
-    Ok(file("application/json", &format!("device-trial-{number}.json"), text))
+    Ok(device_file(&format!("device-trial-{number}.json"), text, vec![id]))
+}
+
+/// A controller file, which is sent only if every gait that it may be of is still walkable then.
+pub(super) fn device_file(name: &str, text: String, gaits: Vec<TrialId>) -> Response {
+    let mut answer = file("application/json", name, text);
+    answer.extensions_mut().insert(OnlyWhileWalkable(gaits));
+    answer
 }
 
 /// A response that a browser saves as `name`.

@@ -143,7 +143,8 @@ pub(super) async fn controller(
         GaitOfWalk::One => one,
         GaitOfWalk::Two => two,
     };
-    Ok(exports::file("application/json", &format!("controller-walk-{}.json", of.walk), text))
+    let name = format!("controller-walk-{}.json", of.walk);
+    Ok(exports::device_file(&name, text, vec![session.gait_one, session.gait_two]))
 }
 
 /// Closing of a session.
