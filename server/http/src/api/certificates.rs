@@ -15,7 +15,6 @@ use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certification;
 use gaitwright_service::studies::job::JobId;
-use gaitwright_service::studies::job_status;
 use gaitwright_store::{TrialId, certificates, schema};
 
 /// Get the certificate of a trial
@@ -49,7 +48,7 @@ pub(super) async fn get(
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
-        (status = 200, description = "Existing certificate", body = schema::Certificate),
+        (status = 200, description = "Finished job of the existing certificate", body = Job),
         (status = 202, description = "Job that makes the certificate, which takes a few seconds", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
@@ -63,13 +62,9 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    if let Some(certificate) = certification::ask(&mut writer, &request.actor, id).await? {
-        return request.done(&app, writer, &certificate).await;
-    }
-    if !app.scheduler.certify(id) {
+    let exists = certification::ask(&mut writer, &request.actor, id).await?;
+    if !exists && !app.scheduler.certify(id) {
         return Err(Error::NotReady("This service does not certify gaits.".to_owned()).into());
     }
-    let id = JobId::Certificate(id);
-    let job = Job::from(job_status::find(&mut writer, app.runners(), id).await?);
-    request.accepted(&app, writer, Job::address(id), &job).await
+    Job::respond(&request, &app, writer, JobId::Certificate(id)).await
 }

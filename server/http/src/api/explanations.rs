@@ -16,7 +16,6 @@ use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::job::JobId;
-use gaitwright_service::studies::job_status;
 use gaitwright_store::explanations::Explained;
 use gaitwright_store::{Instant, TrialId, schema, trials};
 use serde::Serialize;
@@ -117,7 +116,7 @@ pub(super) async fn get(
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
-        (status = 200, description = "Existing explanation", body = TrialExplanation),
+        (status = 200, description = "Finished job of the existing explanation", body = Job),
         (status = 202, description = "Job that makes the explanation, which takes a few minutes and has lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
@@ -131,12 +130,8 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let asked = explanation::ask(&mut writer, &request.actor, id, app.scheduler.explaining(id)).await?;
-    if let Some(made) = asked {
-        return request.done(&app, writer, &TrialExplanation::new(id, made)).await;
+    if !explanation::ask(&mut writer, &request.actor, id, app.scheduler.explaining(id)).await? {
+        app.scheduler.explain_again(id);
     }
-    app.scheduler.explain_again(id);
-    let id = JobId::Explanation(id);
-    let job = Job::from(job_status::find(&mut writer, app.runners(), id).await?);
-    request.accepted(&app, writer, Job::address(id), &job).await
+    Job::respond(&request, &app, writer, JobId::Explanation(id)).await
 }

@@ -9,11 +9,11 @@ use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gaitwright_service::access::{Read, Run};
+use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::studies::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
 use gaitwright_store::jobs::{self, OpenSolve};
-use gaitwright_store::{StudyId, TrialId};
+use gaitwright_store::{LentWriter, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
@@ -58,6 +58,20 @@ impl Job {
     /// The address of a job.
     pub(super) fn address(id: JobId) -> String {
         format!("/api/v1/jobs/{id}")
+    }
+
+    /// The response to a request for a result: 202, or 200 if the result exists already.
+    pub(super) async fn respond<P: Permission>(
+        request: &Idempotent<P>,
+        app: &AppState,
+        mut writer: LentWriter<'_>,
+        id: JobId,
+    ) -> Result<Response, Refusal> {
+        let job = Self::from(job_status::find(&mut writer, app.runners(), id).await?);
+        match job.state {
+            JobState::Done => request.done(app, writer, &job).await,
+            _ => request.accepted(app, writer, Self::address(id), &job).await,
+        }
     }
 }
 

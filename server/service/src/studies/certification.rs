@@ -43,16 +43,16 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
     Ok(Certification::Ahead(gaits::get(reader, trial).await?))
 }
 
-/// Requests the certificate of a trial's gait. Returns `None` if it does not exist yet.
+/// Requests the certificate of a trial's gait. Returns whether it exists already.
 ///
 /// # Errors
 /// As [`begin`].
-pub async fn ask(writer: &mut Writer, actor: &Actor, trial: TrialId) -> Result<Option<Certificate>, Error> {
+pub async fn ask(writer: &mut Writer, actor: &Actor, trial: TrialId) -> Result<bool, Error> {
     match begin(writer, trial).await? {
-        Certification::Made(certificate) => Ok(Some(*certificate)),
+        Certification::Made(_) => Ok(true),
         Certification::Ahead(_) => {
             audit::append(writer, actor, certificates::REQUESTED, &format!("trial {trial}"), &json!({})).await?;
-            Ok(None)
+            Ok(false)
         }
     }
 }

@@ -70,23 +70,23 @@ pub async fn state(db: &mut Connection, trial: &Trial, effort: Effort) -> Result
     }
 }
 
-/// Requests the explanation of a trial. Returns `None` while it is being computed.
+/// Requests the explanation of a trial. Returns whether it exists already.
 ///
 /// # Errors
 /// [`Error::Conflict`] if the trial cannot be explained or the subject withdrew consent, [`Error::NotFound`], errors of
 /// the database.
-pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: Effort) -> Result<Option<Explained>, Error> {
+pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: Effort) -> Result<bool, Error> {
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     match state(writer, &trial, effort).await? {
-        ExplanationState::Made(made) => Ok(Some(*made)),
-        ExplanationState::BeingMade => Ok(None),
+        ExplanationState::Made(_) => Ok(true),
+        ExplanationState::BeingMade => Ok(false),
         ExplanationState::Refused(reason) => Err(refusal(&trial, &reason)),
         ExplanationState::Waiting | ExplanationState::NotAsked => {
             explainable(writer, &trial).await?;
             explanations::request(writer, id, actor).await?;
             audit::append(writer, actor, "trial.ask_explanation", &format!("trial {id}"), &json!({})).await?;
-            Ok(None)
+            Ok(false)
         }
     }
 }
