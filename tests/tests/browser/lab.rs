@@ -110,6 +110,38 @@ async fn browser_in_the_lab_keeps_the_note_over_a_reload_and_while_the_service_i
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn browser_in_the_lab_reports_an_unsafe_walk_during_the_walks_and_after_the_answer() {
+    let Some(browser) = Chromium::launch().await else { return };
+    for walks in [1, 3] {
+        let site = Site::start(Analytic::default()).await;
+        let (study, session) = planned(&site).await;
+        for walk in 1..=walks {
+            site.service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": walk})).await;
+        }
+        let page = browser.open(&site.at(&format!("/lab/{session}"))).await;
+        if walks == 3 {
+            page.click("input[value=first]").await;
+            page.click("main form button").await;
+            page.wait_for(".notice.good").await;
+        }
+        page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
+        page.click("details input[value=unsafe_first]").await;
+        page.fill("#event", "stumbled at the step").await;
+        page.click("details form:has(#event) button").await;
+        page.wait_until(
+            "document.querySelector('main').innerText.includes('unsafe') && !document.querySelector('#event')",
+        )
+        .await;
+        page.is_clean(&site.origin).await;
+        let reports = site.service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
+        assert_eq!(reports.as_array().unwrap().len(), 2, "either gait may be meant: {reports}");
+        let kept = site.service.fetch(&format!("/api/v1/lab-sessions/{session}")).await.text;
+        assert!(kept.contains("stumbled at the step"), "{kept}");
+    }
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn browser_in_the_lab_answers_without_scripts_and_in_two_tabs() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
