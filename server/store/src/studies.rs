@@ -400,16 +400,19 @@ pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) 
     rows.iter().map(from_row).collect()
 }
 
-/// The other studies of a study's subject that have a safety report, each with whether it has the same device.
+/// The studies of a study's subject that have a safety report, each with whether it has the same device. The study
+/// itself comes first, and is listed also if somebody could not tell which gait of a pair is better.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn others_with_safety_reports(db: &mut Connection, study: StudyId) -> StoreResult<Vec<(StudyId, bool)>> {
+pub async fn of_subject_with_safety_reports(db: &mut Connection, study: StudyId) -> StoreResult<Vec<(StudyId, bool)>> {
     let sql = concat!(
         "select s.id, s.device_id = own.device_id from studies own join studies s on s.subject_id = own.subject_id \
-         where own.id = ?1 and s.id <> ?1 and s.id in (",
+         where own.id = ?1 and (s.id in (",
         reported!(),
-        ") order by s.id"
+        ") or s.id = ?1 and (exists (select 1 from remarks where study_id = ?1) or exists (select 1 from presentations p \
+         join presentation_answers a on a.presentation_id = p.id where p.study_id = ?1 and a.answer = 'cannot_tell'))) \
+         order by s.id <> ?1, s.id"
     );
     Ok(sqlx::query_as(sql).bind(study).fetch_all(db).await?)
 }

@@ -125,11 +125,13 @@ impl SafetyReports {
     /// # Errors
     /// Errors of the database.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
-        let mut found = Self::given_in(db, study).await?;
-        found.add_motions(db, (study, true), found.closed.clone()).await?;
-        for (other, same_device) in studies::others_with_safety_reports(db, study).await? {
-            let elsewhere = Self::given_in(db, other).await?.closed;
-            found.add_motions(db, (other, same_device), elsewhere).await?;
+        let mut found = Self::default();
+        for (of, same_device) in studies::of_subject_with_safety_reports(db, study).await? {
+            let given = Self::given_in(db, of).await?;
+            found.add_motions(db, (of, same_device), given.closed.clone()).await?;
+            if of == study {
+                found = Self { motions: found.motions, ..given };
+            }
         }
         Ok(found)
     }
