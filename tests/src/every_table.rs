@@ -65,15 +65,15 @@ pub async fn fill(database: &Path) {
         "insert into lab_acts (session_id, act, actor, created_at) values ('L', 'walk_1', 'K', '')",
         "insert into lab_answers (session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
         "insert into lab_answer_retractions (session_id, number, actor, created_at) values ('L', 1, 'K', '')",
-        "insert into remarks (id, study_id, first, second, answer, source, author, created_at) \
+        "insert into assessments (id, study_id, first, second, answer, source, author, created_at) \
          select 'M', study_id, min(id), max(id), 'cannot_tell', 'clinician', 'K', '' from trials group by study_id",
-        "insert into remark_retractions (remark_id, author, reason, created_at) values ('M', 'K', 'r', '')",
-        "insert into safety_reviews (id, trial_id, said_until, verdict, author, reason, created_at) \
+        "insert into assessment_retractions (assessment_id, author, reason, created_at) values ('M', 'K', 'r', '')",
+        "insert into safety_reviews (id, trial_id, said_until, decision, author, reason, created_at) \
          select 'I', id, '', 'unsafe', 'K', 'r', '' from trials limit 1",
         "insert into safety_reports (id, trial_id, source, author, created_at) \
          select 'S', id, 'clinician', 'K', '' from trials limit 1",
         "insert into safety_review_reports (review_id, report_id) values ('I', 'S')",
-        "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+        "insert into measurement_files (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
          values ('R', 'L', 1, 'motion', '{}', x'00', '', 'K', '')",
         "insert into emg_results (id, session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",
         "insert into subject_muscles (subject_id, definition, actor, created_at) \

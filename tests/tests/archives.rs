@@ -97,7 +97,7 @@ impl Rows {
 
 /// An archive with this content.
 fn framed(content: &str) -> Vec<u8> {
-    [b"gaitwright study 3\n", &zstd::encode_all(content.as_bytes(), 3).unwrap()[..]].concat()
+    [b"gaitwright study 4\n", &zstd::encode_all(content.as_bytes(), 3).unwrap()[..]].concat()
 }
 
 fn sha256(text: &[u8]) -> String {
@@ -463,11 +463,11 @@ const MORE: [Forgery; 9] = [
         "a review of a report that nobody made yet",
         |r| {
             let session = "01900000-0000-7000-8000-000000000003";
-            let (review, trial) = ("01900000-0000-7000-8000-000000000004", r.first("remarks")["first"].clone());
+            let (review, trial) = ("01900000-0000-7000-8000-000000000004", r.first("assessments")["first"].clone());
             r.0.push((
                 "safety_reviews".to_owned(),
                 json!({
-                    "id": review, "trial_id": trial, "said_until": "2026-01-01T00:00:00.000Z", "verdict": "walkable",
+                    "id": review, "trial_id": trial, "said_until": "2026-01-01T00:00:00.000Z", "decision": "walkable",
                     "author": "K", "reason": "r", "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));
@@ -500,7 +500,7 @@ const MORE: [Forgery; 9] = [
                 "safety_reviews".to_owned(),
                 json!({
                     "id": "01900000-0000-7000-8000-000000000001", "trial_id": "01900000-0000-7000-8000-000000000002",
-                    "said_until": "2026-01-01T00:00:00.000Z", "verdict": "walkable", "author": "K", "reason": "r",
+                    "said_until": "2026-01-01T00:00:00.000Z", "decision": "walkable", "author": "K", "reason": "r",
                     "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));
@@ -514,12 +514,12 @@ async fn a_review_from_a_clock_that_was_ahead_does_not_cover_later_reports() {
     let (folder, service, study, _) = study().await;
     let listed = format!("/api/v1/studies/{study}/safety-reports");
     let gait = service.fetch(&listed).await.items()[0]["trial_id"].as_str().unwrap().to_owned();
-    let review = json!({"verdict": "walkable", "reason": "seen again"});
+    let review = json!({"decision": "walkable", "reason": "seen again"});
     assert_eq!(service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status, StatusCode::OK);
     let mut rows = Rows::of(&exported(&service.store, study).await);
     service.stop().await;
     let ahead = now().plus_seconds(500).to_string();
-    for table in ["remarks", "safety_reviews"] {
+    for table in ["assessments", "safety_reviews"] {
         for row in rows.table(table) {
             row["created_at"] = json!(ahead);
         }
@@ -744,7 +744,7 @@ const MOST_MEMORY_BYTES: u64 = 320 << 20;
 
 /// A compressed archive of content that is made as it is compressed.
 fn streamed(write: impl FnOnce(&mut dyn Write)) -> Vec<u8> {
-    let mut encoder = zstd::Encoder::new(b"gaitwright study 3\n".to_vec(), 1).unwrap();
+    let mut encoder = zstd::Encoder::new(b"gaitwright study 4\n".to_vec(), 1).unwrap();
     write(&mut encoder);
     encoder.finish().unwrap()
 }
@@ -899,11 +899,11 @@ async fn bombs_are_refused_within_bounded_memory() {
     ];
     // Many rows, each of which is valid.
     let mut rows = whole.clone();
-    let trial = rows.first("remarks").clone();
+    let trial = rows.first("assessments").clone();
     bombs.push((
-        "forty thousand remarks, cut off",
+        "forty thousand assessments, cut off",
         streamed(|out| {
-            for (table, row) in whole.0.iter().take_while(|(table, _)| table != "remark_retractions") {
+            for (table, row) in whole.0.iter().take_while(|(table, _)| table != "assessment_retractions") {
                 let known: Row = serde_json::from_value(row.clone()).unwrap();
                 writeln!(out, "{}", json!({"table": table, "sha256": known.sha256(), "row": row})).unwrap();
             }
@@ -912,11 +912,11 @@ async fn bombs_are_refused_within_bounded_memory() {
                 row["id"] = format!("01900000-0000-7000-8000-{number:012}").into();
                 row["note"] = "n".repeat(2000).into();
                 let known: Row = serde_json::from_value(row.clone()).unwrap();
-                writeln!(out, "{}", json!({"table": "remarks", "sha256": known.sha256(), "row": row})).unwrap();
+                writeln!(out, "{}", json!({"table": "assessments", "sha256": known.sha256(), "row": row})).unwrap();
             }
         }),
     ));
-    let mut window = zstd::Encoder::new(b"gaitwright study 3\n".to_vec(), 1).unwrap();
+    let mut window = zstd::Encoder::new(b"gaitwright study 4\n".to_vec(), 1).unwrap();
     window.window_log(27).unwrap();
     repeated(&mut window, "w", 512 << 20);
     bombs.push(("a window of 128 MB", window.finish().unwrap()));

@@ -137,9 +137,9 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     scene.one(done, "post /trials/{id}/safety-reports", &report, json!({"note": "stumbled"})).await;
     let again = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_both"});
     service.post(&format!("{api}/studies/{finished}/assessments"), &again).await;
-    for (trial, verdict) in [(&trials[0], "walkable"), (&trials[1], "unsafe"), (&trials[1], "walkable")] {
+    for (trial, decision) in [(&trials[0], "walkable"), (&trials[1], "unsafe"), (&trials[1], "walkable")] {
         let review = format!("{api}/trials/{}/safety-reviews", trial.id);
-        let decision = json!({"verdict": verdict, "reason": "looked at the video"});
+        let decision = json!({"decision": decision, "reason": "looked at the video"});
         scene.one(done, "post /trials/{id}/safety-reviews", &review, decision).await;
     }
 

@@ -399,7 +399,7 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     for change in [
         "update lab_allocations set gait_one_first = 1 - gait_one_first",
         "delete from lab_acts",
-        "delete from lab_recordings",
+        "delete from measurement_files",
     ] {
         let mut writer = other.write().await.unwrap();
         let refused = sqlx::query(change).execute(&mut **writer).await.unwrap_err().to_string();

@@ -199,9 +199,15 @@ impl Scene {
     async fn rows(&self) -> BTreeMap<&'static str, i64> {
         let mut reader = self.service.store.read().await.unwrap();
         let mut counts = BTreeMap::new();
-        for table in
-            ["feedback", "remarks", "presentations", "presentation_answers", "lab_sessions", "lab_acts", "lab_answers"]
-        {
+        for table in [
+            "feedback",
+            "assessments",
+            "presentations",
+            "presentation_answers",
+            "lab_sessions",
+            "lab_acts",
+            "lab_answers",
+        ] {
             let sql = sqlx::AssertSqlSafe(format!("select count(*) from {table}"));
             counts.insert(table, sqlx::query_scalar(sql).fetch_one(&mut **reader).await.unwrap());
         }

@@ -54,15 +54,15 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
 
     // It stays unsafe: nobody needs to look again, and it can still be lifted.
     let stays =
-        decide(&service, &gait, &json!({"verdict": "unsafe", "reason": "the knee buckles", "author": "K1"})).await;
-    assert_eq!((stays.status, &stays.json()["verdict"]), (StatusCode::OK, &json!("unsafe")));
+        decide(&service, &gait, &json!({"decision": "unsafe", "reason": "the knee buckles", "author": "K1"})).await;
+    assert_eq!((stays.status, &stays.json()["decision"]), (StatusCode::OK, &json!("unsafe")));
     assert!(!waits_at_home(&service).await);
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(shown.contains("K1 reviewed the report and kept the gait unsafe: <q>the knee buckles</q>"), "{shown}");
     let heard = service.feedback(study).await;
     assert!(heard.iter().all(|row| row.retraction.is_none()));
 
-    let walkable = json!({"verdict": "walkable", "reason": "the video was cut", "author": "K2"});
+    let walkable = json!({"decision": "walkable", "reason": "the video was cut", "author": "K2"});
     assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!((&said[0]["stands"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
@@ -109,14 +109,14 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     assert!(for_the_device.text.contains("It must not be walked until"), "{}", for_the_device.text);
     let seen = safety_reports(&service, study).await[0]["id"].clone();
     service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
-    let late = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r", "reports": [seen]})).await;
+    let late = decide(&service, best_id, &json!({"decision": "walkable", "reason": "r", "reports": [seen]})).await;
     assert_eq!(late.status, StatusCode::CONFLICT);
     assert!(late.text.contains("reported as unsafe again, by K3"), "{}", late.text);
 
     // By the form, which sends the reports on its page.
     let page = service.fetch(&format!("/trials/{best_id}")).await.text;
     let seen = page.split("name=\"reports\" value=\"").nth(1).unwrap().split('"').next().unwrap();
-    let form = format!("verdict=walkable&author=K2&reason=tried+slowly&reports={}", seen.replace(',', "%2C"));
+    let form = format!("decision=walkable&author=K2&reason=tried+slowly&reports={}", seen.replace(',', "%2C"));
     let sent = service.post_text(&format!("/trials/{best_id}/safety-review"), FORM, &form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
     assert_eq!(recommended().await["trial_id"], best);
@@ -128,11 +128,11 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     );
     let study_page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(study_page.contains("cleared for walking by K2: tried slowly"), "{study_page}");
-    let twice = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r"})).await;
+    let twice = decide(&service, best_id, &json!({"decision": "walkable", "reason": "r"})).await;
     assert_eq!(twice.status, StatusCode::CONFLICT);
     for (decision, field) in [
-        (json!({"verdict": "walkable", "reason": " "}), "reason"),
-        (json!({"verdict": "walkable", "reason": "r", "author": ""}), "author"),
+        (json!({"decision": "walkable", "reason": " "}), "reason"),
+        (json!({"decision": "walkable", "reason": "r", "author": ""}), "author"),
     ] {
         let refused = decide(&service, best_id, &decision).await;
         assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!(field)));
@@ -154,7 +154,7 @@ async fn lifted_safety_report_of_a_walk_opens_anew_at_unblinding() {
     assert_eq!(safety_reports(&service, study).await.len(), 2, "which of the two would tell the order");
     for gait in &gaits[..2] {
         let lifted =
-            decide(&service, gait, &json!({"verdict": "walkable", "reason": "he stumbled over a cable"})).await;
+            decide(&service, gait, &json!({"decision": "walkable", "reason": "he stumbled over a cable"})).await;
         assert_eq!(lifted.status, StatusCode::OK, "{}", lifted.text);
     }
     let planned = service.post(&sessions, &plan).await;

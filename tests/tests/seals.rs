@@ -193,7 +193,7 @@ async fn a_changed_or_deleted_row_and_a_changed_schema_keep_the_record_from_open
     for sql in [
         "drop trigger users_no_delete",
         "drop trigger feedback_no_update",
-        "create trigger evil after insert on remarks begin delete from events; end",
+        "create trigger evil after insert on assessments begin delete from events; end",
         "create table more (x)",
         "create view v as select 1",
         "create index i on users (role)",

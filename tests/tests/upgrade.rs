@@ -21,13 +21,14 @@ const V1: &[u8] = include_bytes!("../records/v1.db.zst");
 /// Tables that sign-in alone fills, and the example does not.
 const OF_SIGN_IN: [&str; 3] = ["clock", "sign_in_failures", "sign_in_sources"];
 /// The records that are kept, by the form in which they were written.
-const RECORDS: [(i64, &[u8]); 6] = [
+const RECORDS: [(i64, &[u8]); 7] = [
     (1, V1),
     (7, include_bytes!("../records/v7.db.zst")),
     (8, include_bytes!("../records/v8.db.zst")),
     (9, include_bytes!("../records/v9.db.zst")),
     (10, include_bytes!("../records/v10.db.zst")),
     (11, include_bytes!("../records/v11.db.zst")),
+    (12, include_bytes!("../records/v12.db.zst")),
 ];
 
 fn unpacked(record: &[u8]) -> (TempDir, PathBuf) {
@@ -75,13 +76,30 @@ async fn rows(database: &Path, layout: &BTreeMap<String, Vec<String>>) -> BTreeM
     all
 }
 
+/// Tables and columns that a migration renamed.
+const RENAMED: [(&str, &str); 5] = [
+    ("remarks", "assessments"),
+    ("remark_retractions", "assessment_retractions"),
+    ("remark_id", "assessment_id"),
+    ("lab_recordings", "measurement_files"),
+    ("verdict", "decision"),
+];
+
+fn present_name(old: &str) -> String {
+    RENAMED.iter().find(|(before, _)| *before == old).map_or(old, |(_, after)| after).to_owned()
+}
+
 /// All rows of the old version exist, and the record is intact.
 async fn assert_upgraded(database: &Path, old: &Path) {
     let old_layout = layout(old).await;
-    let (before, after) = (rows(old, &old_layout).await, rows(database, &old_layout).await);
+    let present = |(table, columns): (&String, &Vec<String>)| {
+        (present_name(table), columns.iter().map(|column| present_name(column)).collect())
+    };
+    let (before, after) =
+        (rows(old, &old_layout).await, rows(database, &old_layout.iter().map(present).collect()).await);
     for (table, rows) in &before {
         assert!(!rows.is_empty() || OF_SIGN_IN.contains(&table.as_str()), "{table} has rows");
-        let missing: Vec<_> = rows.iter().filter(|row| !after[table].contains(row)).collect();
+        let missing: Vec<_> = rows.iter().filter(|row| !after[&present_name(table)].contains(row)).collect();
         // Rows that the new version adds at start, and the counters of the database.
         assert!(missing.is_empty() || table == "sqlite_sequence", "{table}: {missing:?}");
     }

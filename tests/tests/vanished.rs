@@ -86,8 +86,8 @@ const SUBJECT: &str =
 #[tokio::test]
 async fn record_that_another_program_writes_to_accepts_no_further_changes() {
     let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'admin', '')";
-    let trigger = "create trigger evil after insert on remarks begin \
-                   update remarks set note = 'x' where id = new.id; end";
+    let trigger = "create trigger evil after insert on assessments begin \
+                   update assessments set note = 'x' where id = new.id; end";
     for sql in [user, trigger, "update subjects set notes = 'forged'", "create table more (x)"] {
         let (_folder, database, service) = service().await;
         assert_eq!(add_subjects(&service, "before", 5).await, (5, 0));

@@ -28,8 +28,8 @@ const TABLES: [(&str, &str); 31] = [
     ("presentation_retractions", "presentation_id in (select id from presentations where study_id = ?)"),
     ("presentation_allocations", archived_allocations::PAIRS),
     ("unblindings", "study_id = ? order by seq"),
-    ("remarks", "study_id = ? order by id"),
-    ("remark_retractions", "remark_id in (select id from remarks where study_id = ?)"),
+    ("assessments", "study_id = ? order by id"),
+    ("assessment_retractions", "assessment_id in (select id from assessments where study_id = ?)"),
     ("safety_reports", "trial_id in (select id from trials where study_id = ?) order by rowid"),
     ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by rowid"),
     (
@@ -43,7 +43,7 @@ const TABLES: [(&str, &str); 31] = [
     ("lab_acts", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_answers", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_answer_retractions", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
-    ("lab_recordings", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("measurement_files", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
     ("emg_results", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
     ("imports", "study_id = ? order by seq"),
 ];

@@ -64,7 +64,7 @@ pub struct NewAssessment<'a> {
 pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult<AssessmentId> {
     let id = AssessmentId::fresh();
     sqlx::query(
-        "insert into remarks (id, study_id, first, second, answer, source, author, note, feedback_id, created_at) \
+        "insert into assessments (id, study_id, first, second, answer, source, author, note, feedback_id, created_at) \
          values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
@@ -88,8 +88,8 @@ pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult
 /// Errors of the database.
 pub async fn retract(db: &mut Connection, id: AssessmentId, author: &str, reason: &str) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into remark_retractions (remark_id, author, reason, created_at) values (?, ?, ?, ?) \
-         on conflict (remark_id) do nothing",
+        "insert into assessment_retractions (assessment_id, author, reason, created_at) values (?, ?, ?, ?) \
+         on conflict (assessment_id) do nothing",
     )
     .bind(id)
     .bind(author)
@@ -101,8 +101,8 @@ pub async fn retract(db: &mut Connection, id: AssessmentId, author: &str, reason
 }
 
 const SELECT: &str = "select m.*, r.author as retracted_by, r.reason as retracted_because, \
-                      r.created_at as retracted_at from remarks m \
-                      left join remark_retractions r on r.remark_id = m.id ";
+                      r.created_at as retracted_at from assessments m \
+                      left join assessment_retractions r on r.assessment_id = m.id ";
 
 /// The assessment with this identifier.
 ///

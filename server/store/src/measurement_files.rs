@@ -111,7 +111,7 @@ pub async fn insert(
         created_at: now(),
     };
     sqlx::query(
-        "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+        "insert into measurement_files (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
          values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(added.id)
@@ -129,7 +129,7 @@ pub async fn insert(
 }
 
 /// Selects files without their content.
-const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, created_at from lab_recordings";
+const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, created_at from measurement_files";
 
 /// The file with this identifier, without its content.
 ///
@@ -159,7 +159,7 @@ fn missing(id: MeasurementFileId) -> StoreError {
 /// # Errors
 /// [`StoreError::Missing`], or errors of the database.
 pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: MeasurementFileId) -> StoreResult<(T, PackedText)> {
-    let row = sqlx::query("select reading, raw, raw_sha256 from lab_recordings where id = ?")
+    let row = sqlx::query("select reading, raw, raw_sha256 from measurement_files where id = ?")
         .bind(id)
         .fetch_optional(db)
         .await?

@@ -10,14 +10,14 @@ use utoipa::ToSchema;
 /// Decision of a review.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum SafetyVerdict {
+pub enum SafetyDecision {
     /// The gait may be walked again.
     Walkable,
     /// The gait stays unsafe.
     Unsafe,
 }
 
-impl SafetyVerdict {
+impl SafetyDecision {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -27,13 +27,13 @@ impl SafetyVerdict {
     }
 }
 
-impl FromStr for SafetyVerdict {
+impl FromStr for SafetyDecision {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
         [Self::Walkable, Self::Unsafe]
             .into_iter()
-            .find(|verdict| verdict.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "verdict of a safety review", reason: text.to_owned() })
+            .find(|decision| decision.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "decision of a safety review", reason: text.to_owned() })
     }
 }
 
@@ -47,7 +47,7 @@ pub struct SafetyReview {
     /// The reports that the review decides about. Another report about the same gait needs another review.
     pub reports: Vec<SafetyReportId>,
     /// Decision.
-    pub verdict: SafetyVerdict,
+    pub decision: SafetyDecision,
     /// Reviewer.
     pub author: String,
     /// Reason.
@@ -64,7 +64,7 @@ pub struct NewSafetyReview<'a> {
     /// The reports that the review decides about.
     pub reports: &'a [SafetyReportId],
     /// Decision.
-    pub verdict: SafetyVerdict,
+    pub decision: SafetyDecision,
     /// Reviewer.
     pub author: &'a str,
     /// Reason.
@@ -83,13 +83,13 @@ pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResul
     let at = now();
     // The column said_until decides nothing: the rows of safety_review_reports do.
     sqlx::query(
-        "insert into safety_reviews (id, trial_id, said_until, verdict, author, reason, created_at) \
+        "insert into safety_reviews (id, trial_id, said_until, decision, author, reason, created_at) \
          values (?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(new.trial)
     .bind(at)
-    .bind(new.verdict.as_str())
+    .bind(new.decision.as_str())
     .bind(new.author)
     .bind(new.reason)
     .bind(at)
@@ -135,7 +135,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<SafetyReview> {
         id: row.try_get("id")?,
         trial_id: row.try_get("trial_id")?,
         reports: reports.map_err(damaged)?,
-        verdict: row.try_get::<&str, _>("verdict")?.parse()?,
+        decision: row.try_get::<&str, _>("decision")?.parse()?,
         author: row.try_get("author")?,
         reason: row.try_get("reason")?,
         created_at: row.try_get("created_at")?,
@@ -158,8 +158,8 @@ pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyV
                  where p.study_id in own),
                 (select count(*) from presentation_retractions r join presentations p on p.id = r.presentation_id
                  where p.study_id in own),
-                (select count(*) from remarks where study_id in own),
-                (select count(*) from remark_retractions r join remarks m on m.id = r.remark_id
+                (select count(*) from assessments where study_id in own),
+                (select count(*) from assessment_retractions r join assessments m on m.id = r.assessment_id
                  where m.study_id in own),
                 (select count(*) from lab_answers a join lab_sessions s on s.id = a.session_id
                  where s.study_id in own),

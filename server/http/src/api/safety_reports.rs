@@ -15,7 +15,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_report::{self, Report};
 use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
 use gaitwright_service::studies::safety_review::{self, Decision};
-use gaitwright_store::safety_reviews::{SafetyReview, SafetyVerdict};
+use gaitwright_store::safety_reviews::{SafetyDecision, SafetyReview};
 use gaitwright_store::{Instant, SafetyReportId, StudyId, TrialId, studies, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -42,7 +42,7 @@ impl From<Closed> for SafetyReport {
     fn from(closed: Closed) -> Self {
         let id = closed.id();
         let Closed { trial, by, at, review, .. } = closed;
-        let stands = review.as_ref().is_none_or(|review| review.verdict == SafetyVerdict::Unsafe);
+        let stands = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
         Self { id, trial_id: trial, by, at, stands, review }
     }
 }

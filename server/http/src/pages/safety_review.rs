@@ -11,7 +11,7 @@ use gaitwright_service::access;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_report::{self, Report};
 use gaitwright_service::studies::safety_review::{self, Decision};
-use gaitwright_store::safety_reviews::SafetyVerdict;
+use gaitwright_store::safety_reviews::SafetyDecision;
 use gaitwright_store::{SafetyReportId, TrialId, commit};
 use serde::Deserialize;
 
@@ -19,7 +19,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Reviewed {
-    verdict: SafetyVerdict,
+    decision: SafetyDecision,
     reason: String,
     author: String,
     /// The reports that the page showed, separated by commas.
@@ -32,8 +32,8 @@ impl Reviewed {
             text.parse().map_err(|_| Error::invalid("reports", text, "identifiers of safety reports from this form"))
         };
         let reports = self.reports.split(',').map(identifier).collect::<Result<Vec<SafetyReportId>, _>>()?;
-        let Self { verdict, reason, author, .. } = self;
-        Ok(Decision { verdict, reason, author: Some(author), reports: Some(reports) })
+        let Self { decision, reason, author, .. } = self;
+        Ok(Decision { decision, reason, author: Some(author), reports: Some(reports) })
     }
 }
 

@@ -5,7 +5,7 @@ use crate::access::Reach;
 use gait_optimizer::TunedBounds;
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::safety_reports as reports;
-use gaitwright_store::safety_reviews::{self, SafetyReview, SafetyVerdict};
+use gaitwright_store::safety_reviews::{self, SafetyDecision, SafetyReview};
 use gaitwright_store::studies::{self, Study};
 use gaitwright_store::trials::{self, Trial};
 use gaitwright_store::{
@@ -206,7 +206,7 @@ impl SafetyReports {
             let id = closed.id();
             let of_it = |review: &&SafetyReview| review.trial_id == closed.trial && review.reports.contains(&id);
             closed.review = reviews.iter().rfind(of_it).cloned();
-            let lifted = closed.review.as_ref().is_some_and(|review| review.verdict == SafetyVerdict::Walkable);
+            let lifted = closed.review.as_ref().is_some_and(|review| review.decision == SafetyDecision::Walkable);
             if lifted { self.lifted.push(closed) } else { self.closed.push(closed) }
         }
     }

@@ -4,7 +4,7 @@ use super::safety_reports::{Closed, SafetyReportSource, SafetyReports};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use gaitwright_store::safety_reviews::{self, NewSafetyReview, SafetyReview, SafetyVerdict};
+use gaitwright_store::safety_reviews::{self, NewSafetyReview, SafetyDecision, SafetyReview};
 use gaitwright_store::{
     Connection, FeedbackId, SafetyReportId, StoreResult, TrialId, Writer, assessments, audit, consents, events,
     feedback, presentations, trials,
@@ -19,7 +19,7 @@ use utoipa::ToSchema;
 #[schema(as = SafetyReviewToMake)]
 pub struct Decision {
     /// `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
-    pub verdict: SafetyVerdict,
+    pub decision: SafetyDecision,
     /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
     pub reason: String,
@@ -69,18 +69,18 @@ pub async fn give(
         );
         return Err(Error::conflict(again));
     }
-    let verdict = decision.verdict;
+    let taken = decision.decision;
     let decided: Vec<SafetyReportId> = closed.iter().map(Closed::id).collect();
-    let new = NewSafetyReview { trial: id, reports: &decided, verdict, author, reason };
+    let new = NewSafetyReview { trial: id, reports: &decided, decision: taken, author, reason };
     let made = safety_reviews::insert(writer, new).await?;
-    if verdict == SafetyVerdict::Walkable {
+    if taken == SafetyDecision::Walkable {
         take_back_what_was_heard(writer, &closed, (author, reason)).await?;
     }
-    let payload = json!({ "trial_id": id, "number": number, "verdict": verdict });
+    let payload = json!({ "trial_id": id, "number": number, "decision": taken });
     events::append(writer, trial.study_id, "safety_reviewed", &payload).await?;
     let said: Vec<_> = closed.iter().map(|closed| json!({ "by": closed.by, "at": closed.at })).collect();
     let detail = json!({
-        "study": trial.study_id, "verdict": verdict, "author": author, "reason": reason, "safety_reports": said,
+        "study": trial.study_id, "decision": taken, "author": author, "reason": reason, "safety_reports": said,
     });
     audit::append(writer, &caller.actor, "gait.review", &format!("trial {id}"), &detail).await?;
     Ok(safety_reviews::get(writer, made).await?)

@@ -443,7 +443,7 @@ async fn lab(
     let sessions = at("lab_sessions", lab_sessions::of_study(db, study).await)?;
     for session in &sessions {
         at(format!("lab session {}", session.id), of_gaits(trials, [session.gait_one, session.gait_two]))?;
-        for found in at("lab_recordings", measurement_files::of_session(db, session.id).await)? {
+        for found in at("measurement_files", measurement_files::of_session(db, session.id).await)? {
             at(format!("measurement file {}", found.id), lab::check_kept(db, pool, &found).await)?;
         }
         let results = measurement_files::results::<EmgResult>(db, session.id).await;
