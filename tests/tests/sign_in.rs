@@ -211,13 +211,16 @@ async fn passwords_that_are_easily_guessed_are_refused() {
     let (_, link) = user(&service, "Ada Lovelace", Role::Clinician).await;
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
     let ada = session_of(&come);
-    for weak in ["aaaaaaaaaa", "Password123!", "1234567890", "lovelace ada", "qwertyuiop"] {
+    for weak in ["aaaaaaaaaaaaaaa", "PasswordPassword1!", "123456789012345", "ada lovelace 1815", "qwertyuiopasdfgh"] {
         let body = format!("password={}", weak.replace(' ', "+"));
         let refused = send(&service, &ada, &Method::POST, "/account", FORM, &body).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{weak}");
         assert!(refused.text.contains("hard to guess"), "{}", refused.text);
     }
-    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse").await;
+    let short = send(&service, &ada, &Method::POST, "/account", FORM, "password=Winter2025!!").await;
+    assert_eq!(short.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(short.text.contains("at least 15 characters"), "{}", short.text);
+    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse+battery").await;
     assert_eq!(set.status, StatusCode::OK);
     service.stop().await;
 }
@@ -240,7 +243,7 @@ async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
     let ada_session = session_of(&come);
     assert_eq!(post(&service, &me, &disable, &json!({})).await.0, StatusCode::CONFLICT);
-    let set = send(&service, &ada_session, &Method::POST, "/account", FORM, "password=battery+staple").await;
+    let set = send(&service, &ada_session, &Method::POST, "/account", FORM, "password=battery+staple+meadow").await;
     let ada_session = session_of(&set);
     assert_eq!(post(&service, &ada_session, &disable, &json!({})).await.0, StatusCode::OK);
     assert_eq!(status(&service, &me).await, StatusCode::UNAUTHORIZED);
