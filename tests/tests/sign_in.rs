@@ -21,6 +21,7 @@ use gaitwright_tests::callers::{
 use gaitwright_tests::service::Service;
 use gaitwright_tests::sources;
 use serde_json::{Value, json};
+use std::net::Ipv6Addr;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -71,7 +72,7 @@ async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<I
     let mut writer = service.store.write().await.unwrap();
     let at = now();
     for name in names {
-        let origin = Origin { network: network.to_owned(), known: None };
+        let origin = Origin { network: network.to_owned(), site: None, known: None };
         let _ = back_off::begin(&mut writer, at, &name, origin).await.unwrap();
     }
     commit(writer).await.unwrap();
@@ -79,7 +80,10 @@ async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<I
 
 /// Sign-in with a stopped clock, so that no wait ends before the next attempt, however slow the machine is.
 fn standing_still() -> Arc<Access> {
-    let at = now();
+    standing_at(now())
+}
+
+fn standing_at(at: Instant) -> Arc<Access> {
     Arc::new(Access { clock: Clock::over(move || at), ..Access::by_sign_in(3600.0) })
 }
 
@@ -129,6 +133,55 @@ async fn known_browser_does_not_wait_for_others_in_its_network() {
         own.push(sign_in_from(&service, OWNER, Some(&browser), "Ada", "guess").await.status);
     }
     assert_eq!(own[4], StatusCode::TOO_MANY_REQUESTS, "{own:?}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn guesses_from_many_ipv6_networks_of_one_site_wait() {
+    let (_folder, mut service) = service().await;
+    service.access = standing_still();
+    with_password(&service, "Ada", Role::Clinician, RIGHT).await;
+    let mut statuses = Vec::new();
+    for subnet in 0..8 {
+        let address = Ipv6Addr::new(0x2001, 0xdb8, 1, subnet, 0, 0, 0, 1);
+        statuses.push(sign_in_from(&service, address, None, "Ada", "guess").await.status);
+    }
+    assert_eq!(statuses[..7], [StatusCode::UNAUTHORIZED; 7]);
+    assert_eq!(statuses[7], StatusCode::TOO_MANY_REQUESTS);
+    let other_site = Ipv6Addr::new(0x2001, 0xdb8, 2, 0, 0, 0, 0, 1);
+    assert_eq!(sign_in_from(&service, other_site, None, "Ada", RIGHT).await.status, StatusCode::SEE_OTHER);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn guesses_from_many_networks_wait_a_few_seconds_and_known_browsers_do_not() {
+    let (folder, mut service) = service().await;
+    let at = now().plus_seconds(3600);
+    service.access = standing_at(at);
+    with_password(&service, "Ada", Role::Clinician, RIGHT).await;
+    let browser = cookie_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await, "gaitwright_browser");
+    let mut writer = service.store.write().await.unwrap();
+    for number in 1..=60 {
+        let origin = Origin { network: format!("198.51.100.{number}"), site: None, known: None };
+        let _ = back_off::begin(&mut writer, at.plus_seconds(10 * (number - 60)), "Ada", origin).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+    service.stop().await;
+    let mut service = start_anew(&folder.path().join("a.db")).await;
+    service.access = standing_at(at);
+    let refused = sign_in_from(&service, ATTACKER, None, "Ada", "guess").await;
+    assert_eq!(refused.status, StatusCode::TOO_MANY_REQUESTS);
+    assert_eq!(refused.headers["retry-after"], "10");
+    // Other users, and browsers in which the user signed in earlier, do not wait.
+    with_password(&service, "Bob", Role::Clinician, RIGHT).await;
+    assert_eq!(sign_in_from(&service, OWNER, None, "Bob", RIGHT).await.status, StatusCode::SEE_OTHER);
+    let known = sign_in_from(&service, OWNER, Some(&browser), "Ada", RIGHT).await;
+    assert_eq!(known.status, StatusCode::SEE_OTHER);
+    // Another browser gets in as soon as the wait is over, and ends the waits.
+    assert_eq!(sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status, StatusCode::TOO_MANY_REQUESTS);
+    service.access = standing_at(at.plus_seconds(10));
+    assert_eq!(sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status, StatusCode::SEE_OTHER);
+    assert_eq!(sign_in_from(&service, ATTACKER, None, "Ada", "guess").await.status, StatusCode::UNAUTHORIZED);
     service.stop().await;
 }
 
@@ -193,7 +246,7 @@ async fn thirty_thousand_attempts_are_visible_with_their_number() {
 
     // Counts that are a day old are deleted, and their number is written to the audit trail.
     let mut writer = service.store.write().await.unwrap();
-    let origin = Origin { network: "10.0.0.9".to_owned(), known: None };
+    let origin = Origin { network: "10.0.0.9".to_owned(), site: None, known: None };
     let tomorrow = now().plus_seconds(25 * 3600);
     let _ = back_off::begin(&mut writer, tomorrow, "Ada", origin).await.unwrap();
     commit(writer).await.unwrap();

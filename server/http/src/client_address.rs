@@ -39,6 +39,13 @@ impl ClientAddress {
             }
         }
     }
+
+    /// The largest network that providers usually delegate to one customer: the /48 network of an IPv6 address.
+    pub fn site(self) -> Option<String> {
+        let IpAddr::V6(address) = self.0 else { return None };
+        let [a, b, c, ..] = address.segments();
+        Some(format!("{}/48", Ipv6Addr::new(a, b, c, 0, 0, 0, 0, 0)))
+    }
 }
 
 impl fmt::Display for ClientAddress {
@@ -124,5 +131,9 @@ mod tests {
         assert_eq!(network("2001:db8:1:2:ffff::1"), network("2001:db8:1:2:3:4:5:6"));
         assert_ne!(network("2001:db8:1:3::1"), network("2001:db8:1:2::1"));
         assert_eq!(network("::ffff:10.0.0.7"), "10.0.0.7");
+        let site = |text: &str| ClientAddress::new(text.parse().unwrap()).site();
+        assert_eq!(site("2001:db8:1:2:3:4:5:6").as_deref(), Some("2001:db8:1::/48"));
+        assert_eq!(site("2001:db8:1:ffff::"), site("2001:db8:1::1"));
+        assert_eq!([site("10.0.0.7"), site("::ffff:10.0.0.7")], [None, None]);
     }
 }
