@@ -7,6 +7,7 @@ use axum::http::request::Parts;
 use axum::http::{Extensions, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::Response;
+use gaitwright_service::error::Error;
 use std::convert::Infallible;
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -85,6 +86,11 @@ fn client_address(extensions: &Extensions) -> ClientAddress {
 /// TLS.
 pub(super) async fn note(State(app): State<AppState>, mut request: Request, next: Next) -> Result<Response, Refusal> {
     let peer = client_address(request.extensions());
+    if app.access.open && forwarded::is_forwarded(request.headers()) {
+        let reason = "A proxy forwarded this request, but the service runs without sign-in, for requests of this machine \
+                      only. Start it without --no-sign-in to use it through a proxy.";
+        return Err(Error::Forbidden(reason.to_owned()).into());
+    }
     let believed = app.proxies.believe(peer.ip(), request.headers())?;
     let secure = Secure(believed.secure.unwrap_or(app.access.secure));
     forwarded::remove(request.headers_mut());

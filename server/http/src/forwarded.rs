@@ -12,6 +12,7 @@ use std::sync::Arc;
 const FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 const PROTO: HeaderName = HeaderName::from_static("x-forwarded-proto");
 const HOST: HeaderName = HeaderName::from_static("x-forwarded-host");
+const REAL_IP: HeaderName = HeaderName::from_static("x-real-ip");
 
 /// An address, or a network in CIDR notation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,6 +141,11 @@ impl Proxies {
         }
         Ok(believed)
     }
+}
+
+/// Whether a proxy of any kind says that it forwarded the request.
+pub(super) fn is_forwarded(headers: &HeaderMap) -> bool {
+    [FOR, PROTO, HOST, REAL_IP, header::FORWARDED, header::VIA].iter().any(|name| headers.contains_key(name))
 }
 
 /// Removes the headers of proxies, so that no later code reads them.
