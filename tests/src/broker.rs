@@ -45,7 +45,8 @@ impl Broker {
         self.process = run(&self.folder, self.port);
     }
 
-    fn kill(&mut self) {
+    /// Kills the broker, until it is restarted.
+    pub fn kill(&mut self) {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
     }

@@ -14,7 +14,7 @@ use gaitwright_service::studies::membership::{self, NewMember};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::members::{Member, MemberKind};
 use gaitwright_store::{StudyId, UserId, commit};
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use tempfile::TempDir;
 
@@ -126,7 +126,7 @@ pub fn cookie_of(answer: &Answer, name: &str) -> String {
 /// Sends name and password from an address, in a browser that may have been there before.
 pub async fn sign_in_from(
     service: &Service,
-    address: [u8; 4],
+    address: impl Into<IpAddr>,
     browser: Option<&str>,
     name: &str,
     password: &str,
@@ -139,7 +139,7 @@ pub async fn sign_in_from(
     }
     let body = format!("name={}&password={}", name.replace(' ', "+"), password.replace(' ', "+"));
     let mut request = request.body(Body::from(body)).unwrap();
-    request.extensions_mut().insert(ConnectInfo(SocketAddr::from((address, 40_000))));
+    request.extensions_mut().insert(ConnectInfo(SocketAddr::new(address.into(), 40_000)));
     service.send(request).await
 }
 

@@ -246,7 +246,7 @@ async fn answer_after_the_end_of_the_sign_in_session_is_neither_stored_nor_lost(
     assert_eq!((row.author.as_str(), row.note.as_str()), ("R1", "\"steady\" & calm"));
 
     // New passwords are not kept, and entries are not sent to other sites.
-    let account = send(&service, &As::Nobody, &Method::POST, "/account", FORM, "password=correct+horse").await;
+    let account = send(&service, &As::Nobody, &Method::POST, "/account", FORM, "password=correct+horse+battery").await;
     assert!(account.status == StatusCode::UNAUTHORIZED && !account.text.contains("correct"), "{}", account.text);
     for elsewhere in ["https://example.org/", "//example.org/", "/\\example.org/"] {
         let body = format!("{credentials}&to={elsewhere}&fields=a%3Db");
@@ -291,12 +291,12 @@ async fn a_link_signs_in_once_and_a_password_after_that() {
     assert_eq!((&me["name"], &me["role"]), (&json!("Ada"), &json!("admin")));
     let short = send(&service, &ada, &Method::POST, "/account", FORM, "password=short").await;
     assert_eq!(short.status, StatusCode::UNPROCESSABLE_ENTITY);
-    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse").await;
+    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse+battery").await;
     let newer = session_of(&set);
     assert_eq!(send(&service, &ada, &Method::GET, "/api/v1/me", "", "").await.status, StatusCode::UNAUTHORIZED);
     assert_eq!(send(&service, &newer, &Method::GET, "/api/v1/me", "", "").await.status, StatusCode::OK);
 
-    let body = "name=ada&password=correct+horse";
+    let body = "name=ada&password=correct+horse+battery";
     let by_password = session_of(&send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, body).await);
     let out = send(&service, &by_password, &Method::POST, "/sign-out", FORM, "").await;
     assert!(out.headers["set-cookie"].to_str().unwrap().contains("Max-Age=0"));
@@ -305,7 +305,7 @@ async fn a_link_signs_in_once_and_a_password_after_that() {
     // No secret is in the record.
     service.store.close().await;
     let bytes = std::fs::read(service.store.path()).unwrap();
-    for secret in [link.as_str(), "correct horse"] {
+    for secret in [link.as_str(), "correct horse battery"] {
         assert!(!bytes.windows(secret.len()).any(|window| window == secret.as_bytes()), "{secret}");
     }
 }
@@ -323,20 +323,23 @@ async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
         async move { send(service, &who, &Method::POST, "/account", FORM, &body).await }
     };
     // Nothing to know yet; and then, whoever has the session alone does not take the account.
-    let first = session_of(&change(&come(&link).await, "password=correct+horse").await);
-    for body in ["password=battery+staple", "password=battery+staple&present=", "password=battery+staple&present=wrong"]
-    {
+    let first = session_of(&change(&come(&link).await, "password=correct+horse+battery").await);
+    for body in [
+        "password=battery+staple+meadow",
+        "password=battery+staple+meadow&present=",
+        "password=battery+staple+meadow&present=wrong",
+    ] {
         let refused = change(&first, body).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{body}");
         assert!(refused.text.contains("The current password is wrong"), "{}", refused.text);
     }
     let page = send(&service, &first, &Method::GET, "/account", FORM, "").await;
     assert!(page.text.contains("name=\"present\""), "{}", page.text);
-    let second = session_of(&change(&first, "password=battery+staple&present=correct+horse").await);
+    let second = session_of(&change(&first, "password=battery+staple+meadow&present=correct+horse+battery").await);
     // Guesses are delayed here as on the sign-in page.
     let mut statuses = Vec::new();
     for _ in 0..6 {
-        statuses.push(change(&second, "password=another+horse&present=guess").await.status);
+        statuses.push(change(&second, "password=another+horse+battery&present=guess").await.status);
     }
     assert_eq!(statuses.last(), Some(&StatusCode::TOO_MANY_REQUESTS), "{statuses:?}");
 
@@ -361,7 +364,7 @@ async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
 async fn wrong_passwords_wait_longer_and_longer_and_leave_their_mark() {
     let (_folder, service) = service().await;
     let (id, _) = user(&service, "Ada", Role::Clinician).await;
-    let hashed = secret::hash_password("correct horse").unwrap();
+    let hashed = secret::hash_password("correct horse battery").unwrap();
     let mut writer = service.store.write().await.unwrap();
     people::set_password(&mut writer, &Actor::program(), id, &hashed).await.unwrap();
     commit(writer).await.unwrap();
@@ -370,7 +373,7 @@ async fn wrong_passwords_wait_longer_and_longer_and_leave_their_mark() {
         let refused = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, wrong).await;
         assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
     }
-    let right = "name=Ada&password=correct+horse";
+    let right = "name=Ada&password=correct+horse+battery";
     let waits = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, right).await;
     assert_eq!(waits.status, StatusCode::TOO_MANY_REQUESTS, "even the right one");
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 100).await.unwrap();

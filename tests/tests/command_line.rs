@@ -117,6 +117,10 @@ fn a_warm_start_file_of_another_kind_is_refused() {
 fn a_service_without_sign_in_listens_to_this_machine_only() {
     refused(&["serve", "--no-sign-in", "--listen", "0.0.0.0:0"], "without sign-in");
     refused(&["serve", "--no-sign-in", "--listen", "127.0.0.1:0", "--trusted-proxy", "10.1.0.1"], "without sign-in");
+    for name in ["gait.example", "localhost.example", "10.0.0.7"] {
+        let names = format!("localhost,{name}");
+        refused(&["serve", "--no-sign-in", "--listen", "127.0.0.1:0", "--host-name", &names], "without sign-in");
+    }
     refused(&["serve", "--trusted-proxy", "proxy.example"], "addresses and networks such as 127.0.0.1");
     refused(&["serve", "--proxy-headers", "via"], "x-forwarded or forwarded");
     refused(&["serve", "--listen", "here"], "listen (flag)");

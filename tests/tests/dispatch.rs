@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use axum::http::StatusCode;
 use futures_util::future::BoxFuture;
 use gaitwright_service::workers::nats::JetStream;
 use gaitwright_service::workers::{Assignment, Dispatch, DispatchError, InProcess, News, Receipt};
@@ -16,7 +17,7 @@ use gaitwright_tests::service::Service;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::process::{Child, Command};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -254,6 +255,82 @@ async fn disturbed(mut rig: Rig, disturb: impl Fn(&mut Broker)) {
     }
     nothing_is_lost_or_doubled(&service, study).await;
     service.stop().await;
+}
+
+/// Longer than any test, so that no job is handed out again because its lease has expired.
+const LONG: Duration = Duration::from_hours(1);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn service_is_not_ready_and_keeps_its_jobs_until_the_broker_is_connected() {
+    let Some(mut broker) = Broker::start() else { return };
+    broker.kill();
+    let mut rig = Rig { broker: Some(broker), workers: Vec::new(), folder: tempfile::tempdir().unwrap() };
+    let broker = rig.broker.as_ref().unwrap();
+    let engine = JetStream::connect(&broker.url(), QUEUE, 1, LONG).await.unwrap();
+    let service = Service::start_with(&rig.database(), Arc::new(engine)).await;
+    let study = started(&service).await;
+    while service.trials(study).await.is_empty() {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    let ready = service.fetch("/ready").await;
+    assert_eq!(ready.status, StatusCode::SERVICE_UNAVAILABLE);
+    assert!(ready.text.contains("NATS broker"), "{}", ready.text);
+    rig.broker.as_mut().unwrap().restart();
+    rig.add_worker(Worker::Steady);
+    nothing_is_lost_or_doubled(&service, study).await;
+    assert_eq!(service.fetch("/ready").await.text, "ready");
+    service.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn refused_job_is_handed_out_again_before_its_lease_expires() {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = InProcess::new(1, Arc::new(Analytic::default())).with_lease(LONG);
+    let engine = Refuses { inner, refusals: AtomicU32::new(1) };
+    let service = Service::start_with(&folder.path().join("a.db"), Arc::new(engine)).await;
+    let study = started(&service).await;
+    nothing_is_lost_or_doubled(&service, study).await;
+    service.stop().await;
+}
+
+/// An engine that refuses its first jobs.
+struct Refuses {
+    inner: InProcess,
+    refusals: AtomicU32,
+}
+
+impl Dispatch for Refuses {
+    fn name(&self) -> &'static str {
+        self.inner.name()
+    }
+
+    fn size(&self) -> usize {
+        self.inner.size()
+    }
+
+    fn lease(&self) -> Duration {
+        self.inner.lease()
+    }
+
+    fn outlives_process(&self) -> bool {
+        self.inner.outlives_process()
+    }
+
+    fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>> {
+        let left = |left: u32| left.checked_sub(1);
+        if self.refusals.fetch_update(Ordering::SeqCst, Ordering::SeqCst, left).is_ok() {
+            return Box::pin(async { Err(DispatchError::Unreachable("a test refuses".to_owned())) });
+        }
+        self.inner.submit(assignment)
+    }
+
+    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        self.inner.withdraw(trial)
+    }
+
+    fn next(&self) -> BoxFuture<'_, News> {
+        self.inner.next()
+    }
 }
 
 #[derive(Debug, Clone, Copy)]

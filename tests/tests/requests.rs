@@ -315,6 +315,29 @@ async fn forwarded_headers_of_strangers_change_nothing() {
 }
 
 #[tokio::test]
+async fn service_without_sign_in_refuses_forwarded_requests() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let host = ("host", "localhost");
+    assert_eq!(service.send(from(PROXY, "GET", "/api/v1/studies", &[host])).await.status, StatusCode::OK);
+    for header in [
+        ("x-forwarded-for", "192.0.2.9"),
+        ("x-forwarded-proto", "https"),
+        ("x-forwarded-host", "gait.example"),
+        ("x-real-ip", "192.0.2.9"),
+        ("forwarded", "for=192.0.2.9"),
+        ("via", "1.1 proxy"),
+    ] {
+        for path in ["/api/v1/studies", "/"] {
+            let refused = service.send(from(PROXY, "GET", path, &[host, header])).await;
+            assert_eq!(refused.status, StatusCode::FORBIDDEN, "{header:?}");
+            assert!(refused.text.contains("without sign-in"), "{}", refused.text);
+        }
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn an_absent_body_replaces_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;

@@ -21,6 +21,7 @@ use gaitwright_tests::callers::{
 use gaitwright_tests::service::Service;
 use gaitwright_tests::sources;
 use serde_json::{Value, json};
+use std::net::Ipv6Addr;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -71,7 +72,7 @@ async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<I
     let mut writer = service.store.write().await.unwrap();
     let at = now();
     for name in names {
-        let origin = Origin { network: network.to_owned(), known: None };
+        let origin = Origin { network: network.to_owned(), site: None, known: None };
         let _ = back_off::begin(&mut writer, at, &name, origin).await.unwrap();
     }
     commit(writer).await.unwrap();
@@ -79,7 +80,10 @@ async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<I
 
 /// Sign-in with a stopped clock, so that no wait ends before the next attempt, however slow the machine is.
 fn standing_still() -> Arc<Access> {
-    let at = now();
+    standing_at(now())
+}
+
+fn standing_at(at: Instant) -> Arc<Access> {
     Arc::new(Access { clock: Clock::over(move || at), ..Access::by_sign_in(3600.0) })
 }
 
@@ -149,6 +153,55 @@ async fn known_browser_does_not_wait_for_others_in_its_network() {
 }
 
 #[tokio::test]
+async fn guesses_from_many_ipv6_networks_of_one_site_wait() {
+    let (_folder, mut service) = service().await;
+    service.access = standing_still();
+    with_password(&service, "Ada", Role::Clinician, RIGHT).await;
+    let mut statuses = Vec::new();
+    for subnet in 0..8 {
+        let address = Ipv6Addr::new(0x2001, 0xdb8, 1, subnet, 0, 0, 0, 1);
+        statuses.push(sign_in_from(&service, address, None, "Ada", "guess").await.status);
+    }
+    assert_eq!(statuses[..7], [StatusCode::UNAUTHORIZED; 7]);
+    assert_eq!(statuses[7], StatusCode::TOO_MANY_REQUESTS);
+    let other_site = Ipv6Addr::new(0x2001, 0xdb8, 2, 0, 0, 0, 0, 1);
+    assert_eq!(sign_in_from(&service, other_site, None, "Ada", RIGHT).await.status, StatusCode::SEE_OTHER);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn guesses_from_many_networks_wait_a_few_seconds_and_known_browsers_do_not() {
+    let (folder, mut service) = service().await;
+    let at = now().plus_seconds(3600);
+    service.access = standing_at(at);
+    with_password(&service, "Ada", Role::Clinician, RIGHT).await;
+    let browser = cookie_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await, "gaitwright_browser");
+    let mut writer = service.store.write().await.unwrap();
+    for number in 1..=60 {
+        let origin = Origin { network: format!("198.51.100.{number}"), site: None, known: None };
+        let _ = back_off::begin(&mut writer, at.plus_seconds(10 * (number - 60)), "Ada", origin).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+    service.stop().await;
+    let mut service = start_anew(&folder.path().join("a.db")).await;
+    service.access = standing_at(at);
+    let refused = sign_in_from(&service, ATTACKER, None, "Ada", "guess").await;
+    assert_eq!(refused.status, StatusCode::TOO_MANY_REQUESTS);
+    assert_eq!(refused.headers["retry-after"], "10");
+    // Other users, and browsers in which the user signed in earlier, do not wait.
+    with_password(&service, "Bob", Role::Clinician, RIGHT).await;
+    assert_eq!(sign_in_from(&service, OWNER, None, "Bob", RIGHT).await.status, StatusCode::SEE_OTHER);
+    let known = sign_in_from(&service, OWNER, Some(&browser), "Ada", RIGHT).await;
+    assert_eq!(known.status, StatusCode::SEE_OTHER);
+    // Another browser gets in as soon as the wait is over, and ends the waits.
+    assert_eq!(sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status, StatusCode::TOO_MANY_REQUESTS);
+    service.access = standing_at(at.plus_seconds(10));
+    assert_eq!(sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status, StatusCode::SEE_OTHER);
+    assert_eq!(sign_in_from(&service, ATTACKER, None, "Ada", "guess").await.status, StatusCode::UNAUTHORIZED);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn ten_thousand_aborted_sign_ins_with_fresh_names_do_not_erase_the_failures_of_an_account() {
     let (folder, service) = service().await;
     with_password(&service, "Ada", Role::Admin, RIGHT).await;
@@ -209,7 +262,7 @@ async fn thirty_thousand_attempts_are_visible_with_their_number() {
 
     // Counts that are a day old are deleted, and their number is written to the audit trail.
     let mut writer = service.store.write().await.unwrap();
-    let origin = Origin { network: "10.0.0.9".to_owned(), known: None };
+    let origin = Origin { network: "10.0.0.9".to_owned(), site: None, known: None };
     let tomorrow = now().plus_seconds(25 * 3600);
     let _ = back_off::begin(&mut writer, tomorrow, "Ada", origin).await.unwrap();
     commit(writer).await.unwrap();
@@ -227,13 +280,16 @@ async fn passwords_that_are_easily_guessed_are_refused() {
     let (_, link) = user(&service, "Ada Lovelace", Role::Clinician).await;
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
     let ada = session_of(&come);
-    for weak in ["aaaaaaaaaa", "Password123!", "1234567890", "lovelace ada", "qwertyuiop"] {
+    for weak in ["aaaaaaaaaaaaaaa", "PasswordPassword1!", "123456789012345", "ada lovelace 1815", "qwertyuiopasdfgh"] {
         let body = format!("password={}", weak.replace(' ', "+"));
         let refused = send(&service, &ada, &Method::POST, "/account", FORM, &body).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{weak}");
         assert!(refused.text.contains("hard to guess"), "{}", refused.text);
     }
-    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse").await;
+    let short = send(&service, &ada, &Method::POST, "/account", FORM, "password=Winter2025!!").await;
+    assert_eq!(short.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(short.text.contains("at least 15 characters"), "{}", short.text);
+    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse+battery").await;
     assert_eq!(set.status, StatusCode::OK);
     service.stop().await;
 }
@@ -256,7 +312,7 @@ async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
     let ada_session = session_of(&come);
     assert_eq!(post(&service, &me, &disable, &json!({})).await.0, StatusCode::CONFLICT);
-    let set = send(&service, &ada_session, &Method::POST, "/account", FORM, "password=battery+staple").await;
+    let set = send(&service, &ada_session, &Method::POST, "/account", FORM, "password=battery+staple+meadow").await;
     let ada_session = session_of(&set);
     assert_eq!(post(&service, &ada_session, &disable, &json!({})).await.0, StatusCode::OK);
     assert_eq!(status(&service, &me).await, StatusCode::UNAUTHORIZED);

@@ -207,6 +207,58 @@ async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() 
 }
 
 #[tokio::test]
+async fn studies_of_a_subject_who_withdrew_cannot_be_changed_except_by_removing_members() {
+    let closed = Closed::new().await;
+    let (service, admin, study) = (&closed.service, &closed.admin, closed.study);
+    let subject = service.subject().await;
+    post(service, admin, &format!("/api/v1/subjects/{subject}/withdraw"), &json!({"reason": "moved away"})).await;
+    let before = newest_act(service).await;
+    let changing = doors().into_iter().filter(|(method, ..)| *method != Method::GET);
+    let removal = ["/api/v1/study-members/{id}/remove", "/studies/{id}/members"];
+    let mut refused = 0;
+    for (method, path, start) in changing.filter(|(_, path, _)| !removal.contains(&path.as_str())) {
+        let answer = knock(service, admin, &method, &path, &closed.names[start.as_str()]).await;
+        assert_eq!(answer.status, StatusCode::CONFLICT, "{method} {path}: {}", answer.text);
+        assert!(answer.text.contains("withdrew consent"), "{method} {path}: {}", answer.text);
+        refused += 1;
+    }
+    assert!(refused > 40, "{refused}");
+    let page = format!("/studies/{study}/members");
+    for form in ["act=add&who=user+a+admin", "act=restrict", "act=open", "act=invite&name=R7"] {
+        let answer = send(service, admin, &Method::POST, &page, FORM, form).await;
+        assert_eq!(answer.status, StatusCode::CONFLICT, "{form}: {}", answer.text);
+    }
+    assert_eq!(newest_act(service).await, before, "nothing was changed");
+    // The page offers only what is possible.
+    let shown = send(service, admin, &Method::GET, &page, "", "").await.text;
+    assert!(shown.contains("value=\"remove\"") && shown.contains("withdrew consent"), "{shown}");
+    for act in ["add", "open", "restrict", "invite"] {
+        assert!(!shown.contains(&format!("value=\"{act}\"")), "{act}: {shown}");
+    }
+
+    let listed = send(service, admin, &Method::GET, &format!("/api/v1{page}"), "", "").await.items();
+    let remove = format!("/api/v1/study-members/{}/remove", listed[0]["id"].as_str().unwrap());
+    post(service, admin, &remove, &json!({})).await;
+    assert!(newest_act(service).await.ends_with("study.member_end"));
+    closed.service.stop().await;
+}
+
+#[tokio::test]
+async fn members_are_removed_on_the_page_of_a_study_whose_subject_withdrew() {
+    let closed = Closed::new().await;
+    let (service, admin, study) = (&closed.service, &closed.admin, closed.study);
+    let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
+    post(service, admin, &withdraw, &json!({"reason": "moved away"})).await;
+    let page = format!("/studies/{study}/members");
+    let form = format!("act=remove&member={}", closed.names["study-members"]);
+    let answer = send(service, admin, &Method::POST, &page, FORM, &form).await;
+    assert_eq!(answer.status, StatusCode::SEE_OTHER, "{}", answer.text);
+    let listed = send(service, admin, &Method::GET, &format!("/api/v1{page}"), "", "").await.items();
+    assert!(listed.as_array().unwrap().is_empty(), "{listed}");
+    closed.service.stop().await;
+}
+
+#[tokio::test]
 async fn lists_show_a_restricted_study_to_its_members_alone() {
     let closed = Closed::new().await;
     let service = &closed.service;

@@ -1,8 +1,11 @@
 //! CSV tables, safe for spreadsheets. No other module writes CSV.
 //!
 //! A spreadsheet treats a cell that starts with `=`, `+`, `-`, `@`, a tab or a line break as a formula. Such text gets
-//! an apostrophe in front, which spreadsheets show as text. Numbers are not changed.
+//! an apostrophe in front, which spreadsheets show as text. Spaces and invisible characters do not count as a start.
+//! Numbers are not changed.
 
+use icu_properties::CodePointSetData;
+use icu_properties::props::DefaultIgnorableCodePoint;
 use std::fmt::Write;
 
 /// Characters that start a formula, including their full-width forms.
@@ -18,7 +21,11 @@ impl Cell {
 
     /// A text cell that is not a formula.
     fn text(text: &str) -> Self {
-        let begins_formula = text.trim_start().starts_with(FORMULA) || text.starts_with(['\t', '\r', '\n']);
+        let leaves_no_mark = |c: char| {
+            c.is_whitespace() || c.is_control() || CodePointSetData::new::<DefaultIgnorableCodePoint>().contains(c)
+        };
+        let begins_formula =
+            text.trim_start_matches(leaves_no_mark).starts_with(FORMULA) || text.starts_with(['\t', '\r', '\n']);
         let safe = if begins_formula { format!("'{text}") } else { text.to_owned() };
         // Semicolons separate cells in locales with a decimal comma.
         if safe.contains([',', ';', '"', '\t', '\r', '\n']) {
@@ -118,6 +125,18 @@ mod tests {
         let expected = "name,value\n\"'=HYPERLINK(\"\"http://x\"\";\"\"y\"\")\",-1.5\n'+1+1,-1.5\n'-1,-1.5\n'@SUM(1),-1.5\n\
                         \"'\tx\",-1.5\n\"'\rx\",-1.5\n' =1,-1.5\n'\u{ff1d}1,-1.5\n\"a, \"\"b\"\"\",-3\na=b,\n";
         assert_eq!(table.into_text(), expected);
+    }
+
+    #[test]
+    fn invisible_characters_do_not_hide_a_formula() {
+        for hidden in ['\u{ad}', '\u{200b}', '\u{2060}', '\u{feff}', '\u{3164}', '\u{e0020}', '\u{a0}', '\u{7f}', '\0']
+        {
+            for start in ["=1", "+1", "-1", "@A1", "\u{ff1d}1", " =1", "\t=1"] {
+                let cell = Cell::text(&format!("{hidden}{start}"));
+                assert!(cell.0.starts_with('\'') || cell.0.starts_with("\"'"), "{hidden:?}{start:?}: {cell:?}");
+            }
+            assert_eq!(Cell::text(&format!("{hidden}a=1")).0, format!("{hidden}a=1"));
+        }
     }
 
     #[test]

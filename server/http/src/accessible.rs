@@ -5,6 +5,7 @@
 
 use super::AppState;
 use super::authorization::{Refused, permitted};
+use super::visible::visible;
 use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
 use gaitwright_service::access::{Permission, Reach};
@@ -111,7 +112,8 @@ async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OfStudy(pub(super) Option<StudyId>);
 
-/// The identifier `{id}` in the path, of an object for which the caller has the right `P`.
+/// The identifier `{id}` in the path, of an object for which the caller has the right `P`. A request that changes an
+/// object whose subject withdrew consent is refused.
 #[derive(Debug)]
 pub(crate) struct Id<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 
@@ -119,7 +121,26 @@ impl<T: Located, P: Permission> FromRequestParts<AppState> for Id<T, P> {
     type Rejection = Refused;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Refused> {
+        let found = if parts.method.is_safe() {
+            in_path::<T, P>(parts, app).await.map(|(id, _)| id)
+        } else {
+            visible::<T, P>(parts, app).await
+        };
+        found.map(|id| Self(id, PhantomData)).map_err(|error| Refused::of(parts, error))
+    }
+}
+
+/// An [`Id`] for handlers that take access away, which protects a subject who withdrew consent.
+#[derive(Debug)]
+pub(crate) struct DespiteWithdrawal<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
+
+impl<T: Located, P: Permission> FromRequestParts<AppState> for DespiteWithdrawal<T, P> {
+    type Rejection = Refused;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Refused> {
         let found = in_path::<T, P>(parts, app).await;
+        // A stored response of such a handler has no data of the subject, so it may be repeated.
+        parts.extensions.insert(OfStudy(None));
         found.map(|(id, _)| Self(id, PhantomData)).map_err(|error| Refused::of(parts, error))
     }
 }

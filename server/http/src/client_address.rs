@@ -7,6 +7,7 @@ use axum::http::request::Parts;
 use axum::http::{Extensions, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::Response;
+use gaitwright_service::error::Error;
 use std::convert::Infallible;
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -38,6 +39,13 @@ impl ClientAddress {
                 format!("{}/64", Ipv6Addr::new(a, b, c, d, 0, 0, 0, 0))
             }
         }
+    }
+
+    /// The largest network that providers usually delegate to one customer: the /48 network of an IPv6 address.
+    pub fn site(self) -> Option<String> {
+        let IpAddr::V6(address) = self.0 else { return None };
+        let [a, b, c, ..] = address.segments();
+        Some(format!("{}/48", Ipv6Addr::new(a, b, c, 0, 0, 0, 0, 0)))
     }
 }
 
@@ -78,6 +86,11 @@ fn client_address(extensions: &Extensions) -> ClientAddress {
 /// TLS.
 pub(super) async fn note(State(app): State<AppState>, mut request: Request, next: Next) -> Result<Response, Refusal> {
     let peer = client_address(request.extensions());
+    if app.access.open && forwarded::is_forwarded(request.headers()) {
+        let reason = "A proxy forwarded this request, but the service runs without sign-in, for requests of this machine \
+                      only. Start it without --no-sign-in to use it through a proxy.";
+        return Err(Error::Forbidden(reason.to_owned()).into());
+    }
     let believed = app.proxies.believe(peer.ip(), request.headers())?;
     let secure = Secure(believed.secure.unwrap_or(app.access.secure));
     forwarded::remove(request.headers_mut());
@@ -124,5 +137,9 @@ mod tests {
         assert_eq!(network("2001:db8:1:2:ffff::1"), network("2001:db8:1:2:3:4:5:6"));
         assert_ne!(network("2001:db8:1:3::1"), network("2001:db8:1:2::1"));
         assert_eq!(network("::ffff:10.0.0.7"), "10.0.0.7");
+        let site = |text: &str| ClientAddress::new(text.parse().unwrap()).site();
+        assert_eq!(site("2001:db8:1:2:3:4:5:6").as_deref(), Some("2001:db8:1::/48"));
+        assert_eq!(site("2001:db8:1:ffff::"), site("2001:db8:1::1"));
+        assert_eq!([site("10.0.0.7"), site("::ffff:10.0.0.7")], [None, None]);
     }
 }

@@ -12,6 +12,7 @@ use std::sync::Arc;
 const FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 const PROTO: HeaderName = HeaderName::from_static("x-forwarded-proto");
 const HOST: HeaderName = HeaderName::from_static("x-forwarded-host");
+const REAL_IP: HeaderName = HeaderName::from_static("x-real-ip");
 
 /// An address, or a network in CIDR notation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,8 +122,10 @@ impl Proxies {
             if !self.trust(believed.client) {
                 break;
             }
-            if let Some(from) = &hop.from {
-                believed.client = address_in(from).ok_or_else(|| unreadable("for", from))?.to_canonical();
+            let from = hop.from.as_deref().map(|from| Node::of(from).ok_or_else(|| unreadable("for", from)));
+            let from = from.transpose()?.unwrap_or(Node::Hidden);
+            if let Node::Address(address) = from {
+                believed.client = address.to_canonical();
             }
             if let Some(proto) = &hop.proto {
                 believed.secure = Some(match proto.to_ascii_lowercase().as_str() {
@@ -134,12 +137,18 @@ impl Proxies {
             if let Some(host) = &hop.host {
                 believed.host = Some(HeaderValue::from_str(host).map_err(|_| unreadable("host", host))?);
             }
-            if hop.from.is_none() {
+            // The hop before may be the client's own text. A hidden client counts as the proxy that hides it.
+            if from == Node::Hidden {
                 break;
             }
         }
         Ok(believed)
     }
+}
+
+/// Whether a proxy of any kind says that it forwarded the request.
+pub(super) fn is_forwarded(headers: &HeaderMap) -> bool {
+    [FOR, PROTO, HOST, REAL_IP, header::FORWARDED, header::VIA].iter().any(|name| headers.contains_key(name))
 }
 
 /// Removes the headers of proxies, so that no later code reads them.
@@ -158,7 +167,8 @@ fn parts(headers: &HeaderMap, name: &HeaderName) -> Result<Vec<String>, Error> {
     let mut parts = Vec::new();
     for line in headers.get_all(name) {
         let text = line.to_str().map_err(|_| unreadable(name.as_str(), "not text"))?;
-        parts.extend(split(text, ',').into_iter().map(|part| part.trim().to_owned()).filter(|part| !part.is_empty()));
+        let split = split(text, ',').ok_or_else(|| unreadable(name.as_str(), text))?;
+        parts.extend(split.into_iter().map(|part| part.trim().to_owned()).filter(|part| !part.is_empty()));
     }
     Ok(parts)
 }
@@ -182,7 +192,8 @@ fn forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
     let mut hops = Vec::new();
     for part in parts(headers, &header::FORWARDED)? {
         let mut hop = Hop::default();
-        for pair in split(&part, ';').into_iter().filter(|pair| !pair.trim().is_empty()) {
+        let pairs = split(&part, ';').ok_or_else(|| unreadable("Forwarded", &part))?;
+        for pair in pairs.into_iter().filter(|pair| !pair.trim().is_empty()) {
             let (name, value) = pair.split_once('=').ok_or_else(|| unreadable("Forwarded", &part))?;
             let value = value.trim();
             let bare = value.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
@@ -199,17 +210,48 @@ fn forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
     Ok(hops)
 }
 
-/// Splits at separators outside quotes.
-fn split(text: &str, separator: char) -> Vec<&str> {
-    let mut quoted = false;
-    text.split(|c| {
-        quoted ^= c == '"';
-        c == separator && !quoted
-    })
-    .collect()
+/// Splits at separators outside quotes; `None` if a quote is not closed. A client that opens one would otherwise hide the
+/// hop that the proxy appends.
+fn split(text: &str, separator: char) -> Option<Vec<&str>> {
+    let (mut quoted, mut escaped) = (false, false);
+    let split = text
+        .split(|c| {
+            quoted ^= c == '"' && !escaped;
+            escaped = quoted && c == '\\' && !escaped;
+            c == separator && !quoted
+        })
+        .collect();
+    (!quoted).then_some(split)
 }
 
-/// `192.0.2.43`, `192.0.2.43:4711`, `2001:db8::7`, `[2001:db8::7]`, `[2001:db8::7]:4711`.
+/// The peer of a proxy (RFC 7239, section 6).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Node {
+    Address(IpAddr),
+    /// `unknown`, or an identifier such as `_hidden`.
+    Hidden,
+}
+
+impl Node {
+    /// `192.0.2.43`, `192.0.2.43:4711`, `2001:db8::7`, `[2001:db8::7]`, `[2001:db8::7]:4711`, `unknown`, `_hidden:_port`.
+    fn of(text: &str) -> Option<Self> {
+        if let Some(address) = address_in(text) {
+            return Some(Self::Address(address));
+        }
+        let (name, port) = text.rsplit_once(':').map_or((text, None), |(name, port)| (name, Some(port)));
+        if port.is_some_and(|port| port.parse::<u16>().is_err() && !is_obfuscated(port)) {
+            return None;
+        }
+        let is_hidden = name.eq_ignore_ascii_case("unknown") || is_obfuscated(name);
+        if is_hidden { Some(Self::Hidden) } else { address_in(name).map(Self::Address) }
+    }
+}
+
+fn is_obfuscated(text: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    text.strip_prefix('_').is_some_and(|rest| !rest.is_empty() && rest.chars().all(allowed))
+}
+
 fn address_in(text: &str) -> Option<IpAddr> {
     let bare = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(text);
     bare.parse().ok().or_else(|| text.parse().ok().map(|address: SocketAddr| address.ip()))
@@ -284,8 +326,40 @@ mod tests {
     }
 
     #[test]
+    fn hidden_client_counts_as_the_proxy() {
+        let proxy = ("127.0.0.1".to_owned(), Some(true), String::new());
+        for hidden in ["unknown", "Unknown:4711", "_hidden", "_SEVKISEK", "_a.b-c:_port"] {
+            let line = format!("for=192.0.2.9, for=\"{hidden}\";proto=https");
+            assert_eq!(believed("127.0.0.1", ProxyHeaders::Forwarded, &[("forwarded", &line)]), proxy, "{hidden}");
+            let lines = [("x-forwarded-for", &*format!("192.0.2.9, {hidden}")), ("x-forwarded-proto", "https")];
+            assert_eq!(believed("127.0.0.1", ProxyHeaders::XForwarded, &lines), proxy, "{hidden}");
+        }
+        // The nearest of two trusted proxies is known, its client is not.
+        let line = [("forwarded", "for=192.0.2.9, for=unknown, for=\"10.1.2.3:_hidden\"")];
+        assert_eq!(believed("127.0.0.1", ProxyHeaders::Forwarded, &line).0, "10.1.2.3");
+    }
+
+    #[test]
+    fn quote_of_a_client_does_not_swallow_the_hop_of_the_proxy() {
+        for start in ["for=192.0.2.1;x=\"", "for=192.0.2.1;x=\"\\\"", "for=192.0.2.1;x=\"\\"] {
+            for hop in ["for=203.0.113.9", "for=\"[2001:db8::7]\""] {
+                let lines = [("forwarded", &*format!("{start}, {hop}"))];
+                let found = proxies(ProxyHeaders::Forwarded).believe("127.0.0.1".parse().unwrap(), &headers(&lines));
+                assert!(found.is_err(), "{lines:?}: {found:?}");
+            }
+        }
+        let lines = [("forwarded", "for=192.0.2.1;x=\"a\\\", b\", for=203.0.113.9")];
+        assert_eq!(believed("127.0.0.1", ProxyHeaders::Forwarded, &lines).0, "203.0.113.9");
+    }
+
+    #[test]
     fn malformed_headers_of_trusted_proxies_are_refused() {
-        for lines in [[("x-forwarded-for", "somebody")], [("x-forwarded-proto", "gopher")]] {
+        for lines in [
+            [("x-forwarded-for", "somebody")],
+            [("x-forwarded-for", "_")],
+            [("x-forwarded-for", "unknown:port")],
+            [("x-forwarded-proto", "gopher")],
+        ] {
             let refused = proxies(ProxyHeaders::XForwarded).believe("127.0.0.1".parse().unwrap(), &headers(&lines));
             assert!(refused.is_err(), "{lines:?}");
         }

@@ -37,6 +37,12 @@ impl Hosts {
     }
 }
 
+/// Whether a host name always means the machine that resolves it (RFC 6761, section 6.3).
+pub fn is_loopback_name(name: &str) -> bool {
+    let name = name.trim_end_matches('.').to_ascii_lowercase();
+    name == "localhost" || name.ends_with(".localhost") || address_in(&name).is_some_and(|found| found.is_loopback())
+}
+
 fn address_in(host: &str) -> Option<IpAddr> {
     let bare = host.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(host);
     bare.parse().ok().or_else(|| host.parse().ok().map(|address: SocketAddr| address.ip()))
@@ -94,5 +100,15 @@ mod tests {
         }
         assert!(hosts("0.0.0.0:80").answers_to("10.0.0.7") && hosts("10.0.0.7:80").answers_to("10.0.0.7:80"));
         assert!(!hosts("0.0.0.0:80").answers_to("evil.example"));
+    }
+
+    #[test]
+    fn loopback_names_mean_this_machine_only() {
+        for name in ["localhost", "LOCALHOST.", "gait.localhost", "127.0.0.1", "127.8.8.8", "[::1]"] {
+            assert!(is_loopback_name(name), "{name}");
+        }
+        for name in ["", "gait.example", "localhost.example", "notlocalhost", "10.0.0.7", "0.0.0.0"] {
+            assert!(!is_loopback_name(name), "{name}");
+        }
     }
 }

@@ -37,7 +37,7 @@ mod visible;
 
 pub use client_address::ClientAddress;
 pub use forwarded::{NETWORKS, Network, Proxies, ProxyHeaders};
-pub use host::Hosts;
+pub use host::{Hosts, is_loopback_name};
 pub use router::{router, with_layers};
 pub use state::{Access, AppState};
 

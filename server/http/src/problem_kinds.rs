@@ -109,7 +109,8 @@ impl Kind {
                 "/problems/forbidden",
                 StatusCode::FORBIDDEN,
                 "Not allowed",
-                "The caller lacks the required right, or the request comes from another site or names an unknown host.",
+                "The caller lacks the required right, or the request comes from another site, names an unknown host, or came \
+                 through a proxy to a service without sign-in.",
                 "Ask an administrator for the right. If the detail names a host, add it to the setting host_names.",
             ),
             Self::NotFound => entry(

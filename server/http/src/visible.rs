@@ -24,7 +24,8 @@ impl<T: Located, P: Permission> FromRequestParts<AppState> for Visible<T, P> {
     }
 }
 
-async fn visible<T: Located, P: Permission>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
+/// Reads the identifier in the path, and refuses it if the subject of its study withdrew consent.
+pub(super) async fn visible<T: Located, P: Permission>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
     let (id, study) = in_path::<T, P>(parts, app).await?;
     if let Some(study) = study {
         consents::may_be_shown(&mut *app.read().await?, study).await?;

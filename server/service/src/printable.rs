@@ -1,6 +1,8 @@
 //! Checks of the text that people type: names, notes and reasons.
 
 use crate::error::{Error, FieldError};
+use icu_properties::CodePointSetData;
+use icu_properties::props::DefaultIgnorableCodePoint;
 use unicode_normalization::UnicodeNormalization;
 
 /// Characters that change the direction of text, so that one name can look like another.
@@ -8,18 +10,6 @@ const TURNING: [char; 12] = [
     '\u{061c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
     '\u{2067}', '\u{2068}', '\u{2069}',
 ];
-
-/// Whether a character leaves no mark of its own, so that names that differ in it look alike: the default ignorable code
-/// points of Unicode (DerivedCoreProperties.txt).
-fn is_invisible(c: char) -> bool {
-    matches!(
-        c,
-        '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}'..='\u{1160}' | '\u{17b4}'..='\u{17b5}' | '\u{180b}'..='\u{180f}'
-            | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}'
-            | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{ffa0}' | '\u{fff0}'..='\u{fff8}' | '\u{1bca0}'..='\u{1bca3}'
-            | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}'
-    )
-}
 
 /// The name, trimmed.
 ///
@@ -70,7 +60,8 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
 /// The form of a name that identifies a person: upper and lower case, spaces, invisible characters and the way in which
 /// accents are encoded make no difference.
 pub(crate) fn person(name: &str) -> String {
-    let visible: String = name.nfkc().filter(|c| !is_invisible(*c)).collect();
+    let invisible = CodePointSetData::new::<DefaultIgnorableCodePoint>();
+    let visible: String = name.nfkc().filter(|c| !invisible.contains(*c)).collect();
     visible.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
 }
 

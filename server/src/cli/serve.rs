@@ -8,7 +8,7 @@ use axum_server::{Handle, Server};
 use clap::Args;
 use gaitwright_http::access_log::keep_pruning;
 use gaitwright_http::connections::{LimitedListener, Peer};
-use gaitwright_http::{Access, AppState, Hosts, router};
+use gaitwright_http::{Access, AppState, Hosts, is_loopback_name, router};
 use gaitwright_service::access::people;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::catalogue;
@@ -53,6 +53,10 @@ impl Serve {
             if proxies.are_any() {
                 let allowed = "empty, because the service runs without sign-in and a proxy would let other machines change everything";
                 return Err(settings.refused("trusted_proxies", allowed));
+            }
+            if !settings.host_names().iter().all(|name| is_loopback_name(name)) {
+                let allowed = "localhost, because the service runs without sign-in and other names let other machines change everything";
+                return Err(settings.refused("host_names", allowed));
             }
         }
         let local = listen.ip().is_loopback();

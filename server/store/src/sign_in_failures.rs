@@ -1,4 +1,5 @@
-//! Stored counts of failed sign-ins: by name and source, for the back-off, and by network, for display.
+//! Stored counts of failed sign-ins: by name and source, for the back-off, and by network, for display. A source is a
+//! network, a site, a browser in which the user signed in earlier, or all networks together.
 
 use super::{Connection, Instant, StoreResult};
 use sqlx::Row;

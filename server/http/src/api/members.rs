@@ -1,7 +1,7 @@
 //! REST: members of studies, restriction of access, and invitations of raters.
 
 use crate::AppState;
-use crate::accessible::Id;
+use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
@@ -121,7 +121,7 @@ pub(super) async fn get(
 )]
 pub(super) async fn end(
     State(app): State<AppState>,
-    Id(id, _): Id<MemberId, Run>,
+    DespiteWithdrawal(id, _): DespiteWithdrawal<MemberId, Run>,
     request: Idempotent<Run>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {

@@ -5,7 +5,7 @@ use super::format;
 use super::refusal;
 use super::users::origin;
 use crate::AppState;
-use crate::accessible::{Id, Named};
+use crate::accessible::{DespiteWithdrawal, Id, Named};
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extract::Form;
@@ -19,7 +19,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::membership::{self, NewMember, StudyAccess};
 use gaitwright_store::members::{Member, MemberKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::{MemberId, StudyId, Writer, commit, studies};
+use gaitwright_store::{MemberId, StudyId, Writer, commit, consents, studies};
 use serde::Deserialize;
 
 #[derive(Template)]
@@ -31,6 +31,8 @@ struct MembersPage {
     candidates: Vec<(String, String)>,
     may_run: bool,
     may_administer: bool,
+    /// Whether the subject withdrew consent, so that members can only be removed.
+    withdrawn: bool,
     /// A new sign-in link, shown only once: user and link.
     link: Option<(String, String)>,
     refused: Option<String>,
@@ -66,7 +68,9 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Visible) -> P
     let study = studies::get(&mut reader, id).await?;
     let access = membership::access(&mut reader, id).await?;
     let may_run = caller.may(Run::NEEDED);
-    let candidates = if may_run { membership::candidates(&mut reader, &access.members).await? } else { Vec::new() };
+    let withdrawn = consents::is_withdrawn(&mut reader, id).await?;
+    let candidates =
+        if may_run && !withdrawn { membership::candidates(&mut reader, &access.members).await? } else { Vec::new() };
     let candidates = candidates.into_iter().map(|(kind, name, what)| {
         let kind = if kind == MemberKind::User { "user" } else { "token" };
         (format!("{kind} {name}"), format!("{name} ({what})"))
@@ -77,6 +81,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Visible) -> P
         candidates: candidates.collect(),
         may_run,
         may_administer: caller.may(Administer::NEEDED),
+        withdrawn,
         link: shown.link,
         refused: shown.refused,
         typed: shown.typed,
@@ -103,7 +108,7 @@ pub(super) struct Asked {
 pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
-    Id(id, _): Id<StudyId, Run>,
+    DespiteWithdrawal(id, _): DespiteWithdrawal<StudyId, Run>,
     secure: Secure,
     headers: HeaderMap,
     Form(asked): Form<Asked>,
@@ -136,6 +141,9 @@ async fn act(
     study: StudyId,
     asked: &Asked,
 ) -> Result<Option<(String, String)>, Error> {
+    if asked.act != "remove" {
+        consents::may_be_shown(writer, study).await?;
+    }
     match asked.act.as_str() {
         "add" => {
             let unknown = || Error::invalid("who", asked.who.as_str(), "a user or token from the list");

@@ -82,7 +82,8 @@ impl Visit {
             (Some(kept), Some(user)) => sessions::is_known_browser(writer, user.id, &secret::hash(kept)).await?,
             _ => false,
         };
-        Ok(Origin { network: self.address.network(), known: user.filter(|_| known).map(|user| user.id) })
+        let known = user.filter(|_| known).map(|user| user.id);
+        Ok(Origin { network: self.address.network(), site: self.address.site(), known })
     }
 
     /// The secret of the browser's cookie, and the origin that a new session records.
@@ -125,7 +126,8 @@ async fn compare<'a>(
 }
 
 fn too_many(wait: Duration) -> Error {
-    Error::TooManyAttempts(wait.as_secs().max(1))
+    // Rounded up, so that the next attempt after the wait is not refused again.
+    Error::TooManyAttempts(wait.as_secs() + u64::from(wait.subsec_nanos() > 0))
 }
 
 /// `POST /sign-in`.

@@ -1,6 +1,7 @@
-//! Sign-in back-off: each failed attempt doubles the wait before another password for the same name and network is
-//! checked. Other networks are not affected, so an attacker cannot lock a user out. Counts are in the record, so they
-//! survive a restart.
+//! Sign-in back-off: each failed attempt doubles the wait before another password for the same name is checked. Failures
+//! count separately for the network of the client, for the site that a network belongs to, and for all networks together.
+//! The wait of all networks is short, so that an attacker cannot lock a user out, and a browser in which the user signed
+//! in earlier counts only its own failures. Counts are in the record, so they survive a restart.
 
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
@@ -9,10 +10,22 @@ use gaitwright_store::{Instant, UserId, Writer};
 use serde_json::json;
 use std::time::Duration;
 
-/// Number of failures without a wait, because people mistype.
-const FREE: u32 = 3;
-/// The longest wait.
-const LONGEST: Duration = Duration::from_mins(15);
+/// The waits of one count.
+#[derive(Debug, Clone, Copy)]
+struct Limit {
+    /// Number of failures without a wait, because people mistype.
+    free: u32,
+    /// The longest wait.
+    longest: Duration,
+}
+
+const NETWORK: Limit = Limit { free: 3, longest: Duration::from_mins(15) };
+const SITE: Limit = Limit { free: 6, longest: Duration::from_mins(15) };
+/// Allows one guess each ten seconds. An attacker uses these up only with a guess from another site each time: one site
+/// has four guesses an hour.
+const EVERYWHERE: Limit = Limit { free: 50, longest: Duration::from_secs(10) };
+/// Source of the failures of all networks.
+const ALL_NETWORKS: &str = "*";
 /// Number of names of one network that are counted separately; further names share a count.
 const MOST_NAMES: u32 = 1000;
 /// Time after the last failure until failures are forgotten.
@@ -25,17 +38,18 @@ const OTHER_NAMES: &str = "\n";
 pub struct Origin {
     /// The network of the client.
     pub network: String,
-    /// The user who signed in earlier in the same browser. Failures of others in the network do not affect this user.
+    /// The larger network that may belong to the same client, if any.
+    pub site: Option<String>,
+    /// The user who signed in earlier in the same browser. Failures of others do not affect this user.
     pub known: Option<UserId>,
 }
 
-impl Origin {
-    fn source(&self) -> String {
-        match self.known {
-            Some(user) => format!("{} {user}", self.network),
-            None => self.network.clone(),
-        }
-    }
+/// A stored count of failures.
+#[derive(Debug)]
+struct Count {
+    name: String,
+    source: String,
+    limit: Limit,
 }
 
 /// An attempt whose password may be checked.
@@ -43,7 +57,7 @@ impl Origin {
 #[must_use]
 pub struct Attempt {
     name: String,
-    counted_as: String,
+    counts: Vec<Count>,
     origin: Origin,
     attempts: u32,
 }
@@ -60,25 +74,36 @@ pub async fn begin(
     origin: Origin,
 ) -> Result<Result<Attempt, Duration>, Error> {
     prune(writer, now).await?;
-    let (name, source) = (normal(name), origin.source());
-    let mut counted_as = name.clone();
-    let mut before = failures::find(writer, &name, &source).await?;
-    if before.is_none() && origin.known.is_none() {
+    let name = normal(name);
+    let mut own = Count::of_origin(&name, &origin);
+    let mut is_new_name = own.failures(writer).await?.is_none();
+    if is_new_name && origin.known.is_none() {
         let network = failures::of_network(writer, &origin.network).await?;
         if network.is_some_and(|network| network.names >= MOST_NAMES) {
-            OTHER_NAMES.clone_into(&mut counted_as);
-            before = failures::find(writer, OTHER_NAMES, &source).await?;
+            OTHER_NAMES.clone_into(&mut own.name);
+            is_new_name = own.failures(writer).await?.is_none();
         }
     }
-    let attempts = failures::count(writer, &origin.network, now, before.is_none()).await?;
-    let wait = before.map_or(0.0, |before| before.waits_until.seconds_since(now));
+    let attempts = failures::count(writer, &origin.network, now, is_new_name).await?;
+    let mut counts = vec![own];
+    if origin.known.is_none() {
+        counts.extend(origin.site.clone().map(|site| Count { name: name.clone(), source: site, limit: SITE }));
+        counts.push(Count { name: name.clone(), source: ALL_NETWORKS.to_owned(), limit: EVERYWHERE });
+    }
+    let mut wait = 0.0_f64;
+    for count in &counts {
+        let found = count.failures(writer).await?;
+        wait = wait.max(found.map_or(0.0, |found| found.waits_until.seconds_since(now)));
+    }
     if wait > 0.0 {
         note(writer, "session.wait", &name, &origin, attempts).await?;
         return Ok(Err(Duration::from_secs_f64(wait)));
     }
-    let count = before.map_or(0, |before| before.count).saturating_add(1);
-    set(writer, &counted_as, &source, now, count).await?;
-    Ok(Ok(Attempt { name, counted_as, origin, attempts }))
+    for count in &counts {
+        let before = count.failures(writer).await?.map_or(0, |found| found.count);
+        count.set(writer, now, before.saturating_add(1)).await?;
+    }
+    Ok(Ok(Attempt { name, counts, origin, attempts }))
 }
 
 impl Attempt {
@@ -87,33 +112,58 @@ impl Attempt {
     /// # Errors
     /// Errors of the database.
     pub async fn failed(self, writer: &mut Writer, now: Instant) -> Result<(), Error> {
-        let source = self.origin.source();
-        let count = failures::find(writer, &self.counted_as, &source).await?.map_or(1, |found| found.count);
-        set(writer, &self.counted_as, &source, now, count).await?;
+        for count in &self.counts {
+            let counted = count.failures(writer).await?.map_or(1, |found| found.count);
+            count.set(writer, now, counted).await?;
+        }
         note(writer, "session.refuse", &self.name, &self.origin, self.attempts).await
     }
 
-    /// Records a correct password and clears the count of this name. The shared count stays, or anyone with an account
+    /// Records a correct password and clears the counts of this name. The shared count stays, or anyone with an account
     /// could clear that of their guesses at other names.
     ///
     /// # Errors
     /// Errors of the database.
     pub async fn succeeded(self, writer: &mut Writer) -> Result<(), Error> {
-        if self.counted_as != OTHER_NAMES {
-            failures::forget(writer, &self.counted_as, &self.origin.source()).await?;
+        for count in self.counts.iter().filter(|count| count.name != OTHER_NAMES) {
+            failures::forget(writer, &count.name, &count.source).await?;
         }
         Ok(failures::uncount(writer, &self.origin.network).await?)
+    }
+}
+
+impl Count {
+    /// The count of a network, or of a browser in which the user signed in earlier.
+    fn of_origin(name: &str, origin: &Origin) -> Self {
+        let source = match origin.known {
+            Some(user) => format!("{} {user}", origin.network),
+            None => origin.network.clone(),
+        };
+        Self { name: name.to_owned(), source, limit: NETWORK }
+    }
+
+    async fn failures(&self, writer: &mut Writer) -> Result<Option<Failures>, Error> {
+        Ok(failures::find(writer, &self.name, &self.source).await?)
+    }
+
+    async fn set(&self, writer: &mut Writer, now: Instant, count: u32) -> Result<(), Error> {
+        let failures = Failures { count, waits_until: now.after(self.limit.wait_after(count)) };
+        Ok(failures::set(writer, &self.name, &self.source, now, failures).await?)
+    }
+}
+
+impl Limit {
+    fn wait_after(self, failures: u32) -> Duration {
+        match failures.checked_sub(self.free) {
+            None | Some(0) => Duration::ZERO,
+            Some(more) => Duration::from_secs(1 << more.min(10)).min(self.longest),
+        }
     }
 }
 
 /// Normalises a name for counting: lower case, without characters that names cannot have.
 fn normal(name: &str) -> String {
     name.to_lowercase().chars().filter(|c| !c.is_control()).take(80).collect()
-}
-
-async fn set(writer: &mut Writer, name: &str, source: &str, now: Instant, count: u32) -> Result<(), Error> {
-    let waits_until = now.after(wait_after(count));
-    Ok(failures::set(writer, name, source, now, Failures { count, waits_until }).await?)
 }
 
 /// Writes a row of the audit trail for the first attempts of a network, then for the 10th, 20th, 50th, 100th and so on,
@@ -148,22 +198,17 @@ fn is_noted(attempts: u32) -> bool {
     attempts <= 5 || matches!(leading, 1 | 2 | 5)
 }
 
-fn wait_after(failures: u32) -> Duration {
-    match failures.checked_sub(FREE) {
-        None | Some(0) => Duration::ZERO,
-        Some(more) => Duration::from_secs(1 << more.min(10)).min(LONGEST),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn waits_double_after_three_failures_up_to_a_quarter_of_an_hour() {
-        let waits: Vec<u64> = (1..8).map(|failures| wait_after(failures).as_secs()).collect();
-        assert_eq!(waits, [0, 0, 0, 2, 4, 8, 16]);
-        assert_eq!(wait_after(u32::MAX), LONGEST);
+    fn waits_double_after_the_free_failures_up_to_the_longest() {
+        let waits = |limit: Limit, from: u32| [0, 1, 2, 3, 4].map(|more| limit.wait_after(from + more).as_secs());
+        assert_eq!(waits(NETWORK, 3), [0, 2, 4, 8, 16]);
+        assert_eq!(waits(SITE, 6), [0, 2, 4, 8, 16]);
+        assert_eq!(waits(EVERYWHERE, 50), [0, 2, 4, 8, 10]);
+        assert_eq!(NETWORK.wait_after(u32::MAX), Duration::from_mins(15));
     }
 
     #[test]

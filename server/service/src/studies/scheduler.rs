@@ -17,7 +17,7 @@ use super::solve_input::{PackedInput, SolveInput};
 use super::trial_result;
 use crate::error::Error;
 use crate::supervise::{Task, Tasks};
-use crate::workers::{AfterSolves, Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
+use crate::workers::{AfterSolves, Assignment, Attempt, Board, Dispatch, DispatchError, Finding, IN_PROCESS, News};
 use futures_util::future::BoxFuture;
 use gait_optimizer::SolveStatus;
 use gaitwright_compute::OnPool;
@@ -38,6 +38,8 @@ use tokio_util::task::TaskTracker;
 const HEARTBEATS_PER_LEASE: u32 = 3;
 /// The longest time between two rounds of planning.
 const IDLE: Duration = Duration::from_secs(5);
+/// Pause before asking an engine in trouble again whether it can take jobs.
+const ENGINE_AGAIN: Duration = Duration::from_millis(100);
 /// Changes within this time are planned together.
 const TOGETHER: Duration = Duration::from_millis(10);
 
@@ -292,7 +294,7 @@ impl Scheduler {
                             break;
                         }
                     }
-                    () = tokio::time::sleep_until(hand_out_at.unwrap_or_else(Instant::now).into()), if since.is_some() => {
+                    () = self.can_hand_out(hand_out_at), if since.is_some() => {
                         self.dispatch().await?;
                         since = None;
                     }
@@ -304,6 +306,14 @@ impl Scheduler {
                     }
                 }
             }
+        }
+    }
+
+    /// Waits until the engine can take jobs, and until this time at least.
+    async fn can_hand_out(&self, at: Option<Instant>) {
+        tokio::time::sleep_until(at.unwrap_or_else(Instant::now).into()).await;
+        while self.0.engine.trouble().is_some() {
+            tokio::time::sleep(ENGINE_AGAIN).await;
         }
     }
 
@@ -363,8 +373,11 @@ impl Scheduler {
     async fn look_after(&self, lease: &Lease) -> Result<(), Error> {
         let state = trials::get(&mut *self.0.store.read().await?, lease.trial).await?.state;
         if state == TrialState::Queued {
-            self.live_on(lease).await?;
-            return self.submit(lease).await;
+            if self.0.engine.trouble().is_none() {
+                self.live_on(lease).await?;
+                self.submit(lease).await?;
+            }
+            return Ok(());
         }
         self.cancel_solve(lease.trial).await;
         trial_result::silent(&self.0.store, lease).await?;
@@ -467,7 +480,7 @@ impl Scheduler {
         let engine = &self.0.engine;
         // This runs on every change, so it must not occupy the only writer.
         let (queued, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
-        if queued == 0 || leased as usize >= engine.size() {
+        if queued == 0 || leased as usize >= engine.size() || engine.trouble().is_some() {
             return Ok(None);
         }
         let mut writer = self.0.store.write().await?;
@@ -504,8 +517,11 @@ impl Scheduler {
             self.withdraw(self.0.prefetches.forget_running()).await;
         }
         if let Err(error) = self.0.engine.submit(assignment).await {
-            // The lease will expire, and the job is dispatched again.
+            // An expired lease is dispatched again.
             tracing::error!(trial = %lease.trial, %error, "the engine refused a job");
+            if matches!(error, DispatchError::Unreachable(_)) {
+                self.lease_until(lease, now()).await?;
+            }
         }
         Ok(())
     }
@@ -655,8 +671,13 @@ impl Scheduler {
 
     /// Renews a lease. Returns `false` if it has passed to another attempt.
     async fn live_on(&self, lease: &Lease) -> Result<bool, Error> {
+        self.lease_until(lease, now().after(self.0.engine.lease())).await
+    }
+
+    /// Sets the end of a lease. Returns `false` if it has passed to another attempt.
+    async fn lease_until(&self, lease: &Lease, until: gaitwright_store::Instant) -> Result<bool, Error> {
         let mut writer = self.0.store.write().await?;
-        let ours = jobs::heartbeat(&mut writer, lease, now().after(self.0.engine.lease())).await?;
+        let ours = jobs::heartbeat(&mut writer, lease, until).await?;
         commit(writer).await?;
         Ok(ours)
     }

@@ -43,7 +43,7 @@ impl JetStream {
         let link = Link::open(url, queue, lease).await?;
         let (news, heard) = mpsc::channel(WAITING);
         let ends = CancellationToken::new();
-        let (trouble, listening) = watch::channel(None);
+        let (trouble, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
         for task in [0, 1] {
             let (link, news, ends, trouble) = (link.clone(), news.clone(), ends.clone(), trouble.clone());
             tokio::spawn(ends.run_until_cancelled_owned(async move {
