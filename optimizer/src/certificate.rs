@@ -148,7 +148,7 @@ fn objections(certificate: &Certificate) -> Vec<String> {
     for map in [&certificate.return_map, &certificate.free_hip_return_map].into_iter().flatten() {
         if !map.methods_agree() {
             objections.push(format!(
-                "two computations of the largest multiplier disagree: {:.6e} by variational equations and {:.6e} by differences (resolution \
+                "two computations of the largest multiplier disagree: {:.6e} by variational equations and {:.6e} by finite differences (resolution \
                  {:.1e})",
                 map.largest, map.largest_by_differences, map.differences_resolve
             ));

@@ -136,7 +136,7 @@ impl Solve {
         let solved = pool.run(move |_| {
             let mut observer = |record: &gait_optimizer::IterationRecord| {
                 shown.set_message(format!(
-                    "iteration {}, objective {:.6}, violation {:.1e}, barrier {:.1e}",
+                    "iteration {}, objective {:.6}, violation {:.1e}, barrier parameter {:.1e}",
                     record.iteration, record.objective, record.constraint_violation, record.barrier
                 ));
                 shown.tick();

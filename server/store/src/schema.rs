@@ -394,7 +394,7 @@ pub struct ReturnMap {
     pub largest: f64,
     /// Largest modulus of the multipliers from differences of simulated domains.
     pub largest_by_differences: f64,
-    /// Resolution of the differences.
+    /// Resolution of the finite differences.
     pub differences_resolve: f64,
     /// Fraction of a proportional change of all velocities that remains after one stride.
     pub speed_kept: f64,

@@ -140,7 +140,7 @@ pub enum NotWalkable {
         number: u32,
     },
     /// The trajectory was pruned before it was certified.
-    #[error("The gait of trial {number} was pruned before it was certified.")]
+    #[error("The trajectory of trial {number} was deleted before its gait was certified.")]
     Pruned {
         /// Number of the trial.
         number: u32,

@@ -30,7 +30,8 @@ const LONGEST_NOTE: usize = 2000;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewLabAnswer)]
 pub struct NewAnswer {
-    /// Number of the answer, as in the question. An answer that is sent twice counts once.
+    /// Number of the answer: `asks` or, for a report of an unsafe walk, `reports` of the session. An answer that is sent
+    /// twice counts once.
     #[schema(minimum = 1)]
     pub number: u32,
     /// The answer. First is walk 2, second is walk 3. `withdrawn` is reserved for the service.
