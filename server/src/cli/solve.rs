@@ -70,7 +70,7 @@ pub(super) struct Solve {
     /// Print the figures as one JSON object.
     #[arg(long)]
     json: bool,
-    /// If no gait is found, explain which bounds conflict and which one, relaxed alone, gives a gait. Takes up to eight
+    /// If no gait is found, explain which bounds conflict and which bound, relaxed alone, gives a gait. Takes up to eight
     /// solves for each bound.
     #[arg(long)]
     explain: bool,

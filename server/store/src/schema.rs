@@ -264,7 +264,7 @@ pub struct SolveReport {
     pub max_violation: f64,
     /// How well the conditions of a local optimum are met. Null if unknown.
     pub optimality: Option<Optimality>,
-    /// Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes too.
+    /// Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes as well.
     pub tightened_bounds: u64,
     /// Wall time, s.
     pub seconds_total: f64,

@@ -42,11 +42,11 @@ pub struct NewAnswer {
     pub note: String,
 }
 
-/// Records the answer of the subject. A safety report is accepted at any time, also in a closed session.
+/// Records the answer of the subject. A safety report is accepted at any time, even in a closed session.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the subject withdrew consent; for an answer other than a
-/// safety report also if there is another answer, before all walks are recorded, and in a closed session.
+/// safety report even if there is another answer, before all walks are recorded, and in a closed session.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
     if new.answer == Judgement::Withdrawn {
         return Err(Error::invalid(
