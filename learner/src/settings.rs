@@ -297,7 +297,10 @@ impl LearnerSettings {
         if self.additive_share + self.pairwise_share > 1.0 {
             return refuse(
                 "pairwise_share",
-                format!("is {}; its sum with additive_share ({}) must be at most 1", self.pairwise_share, self.additive_share),
+                format!(
+                    "is {}; its sum with additive_share ({}) must be at most 1",
+                    self.pairwise_share, self.additive_share
+                ),
             );
         }
         if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {

@@ -164,7 +164,11 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
             change(&row, &format!("{row}\t1")),
             "walk.mot, line 11: the number of cells is 11; it must be 10",
         ),
-        ("an empty line", change(&row, &format!("\n{row}")), "walk.mot, line 11: the number of cells is 0; it must be 10"),
+        (
+            "an empty line",
+            change(&row, &format!("\n{row}")),
+            "walk.mot, line 11: the number of cells is 0; it must be 10",
+        ),
         (
             "time stands still",
             with(1, "0.0200"),
@@ -288,7 +292,11 @@ fn malformed_emg_files_are_rejected_with_place_and_reason() {
                 "emg.csv, line 902, column 1: time 7.9 is 7.001000 s after 0.899, but the usual spacing is 0.001000 s; rows \
                  must be evenly spaced",
             ),
-            ("cut off", whole[..whole.len() - 6].to_owned(), "emg.csv, line 1001: the number of cells is 3; it must be 4"),
+            (
+                "cut off",
+                whole[..whole.len() - 6].to_owned(),
+                "emg.csv, line 1001: the number of cells is 3; it must be 4",
+            ),
             (
                 "ten samples",
                 whole.lines().take(11).collect::<Vec<_>>().join("\n"),

@@ -427,7 +427,7 @@ fn impossible_mean_strides_are_rejected() {
         ),
         (
             |angles| with_knee(angles, 0.25 * angles[2]),
-            "knee_L_rad bends to at most 16.5° in the stride; at least 20° is plausible; check sign and unit",
+            "knee_L_rad bends to at most 16.5° in the stride; at least 20° is plausible; check the sign and the unit",
         ),
         (
             |angles| with_knee(angles, angles[2] + 0.8),

@@ -150,7 +150,11 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
         ("trial_budget", "-1", "it must be 1 to 10000"),
         ("parallel_trials", "1.5", "it must be 1 to 64"),
         ("seed", "-1", "it must be 0 to 9007199254740991"),
-        ("basin_within_percent", "101", "\u{201c}Objective tolerance, %\u{201d} is \u{201c}101\u{201d}; it must be 0 to 100, or empty"),
+        (
+            "basin_within_percent",
+            "101",
+            "\u{201c}Objective tolerance, %\u{201d} is \u{201c}101\u{201d}; it must be 0 to 100, or empty",
+        ),
         ("basin_within_percent", "all", "it must be 0 to 100, or empty"),
         ("subject", "paper-1", "a subject from the list"),
         ("pseudonym", "S09", "A new subject"),
@@ -483,7 +487,11 @@ async fn refused_forms_name_fields_by_their_labels() {
             "height_m=17.2&body_mass_kg=70&reason=r&before=0".to_owned(),
             "\u{201c}Height, m\u{201d} is 17.2; it must be 1.4 to 2.2.",
         ),
-        ("correct", "height_m=1.72&body_mass_kg=70&reason=&before=0".to_owned(), "\u{201c}Reason\u{201d} must be 1 to 2000 characters"),
+        (
+            "correct",
+            "height_m=1.72&body_mass_kg=70&reason=&before=0".to_owned(),
+            "\u{201c}Reason\u{201d} must be 1 to 2000 characters",
+        ),
         (
             "correct",
             format!("height_m=1.72&body_mass_kg=70&reason={long}&before=0"),
@@ -498,7 +506,11 @@ async fn refused_forms_name_fields_by_their_labels() {
     is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Height, m\u{201d} is 17.2; it must be 1.4 to 2.2.");
     let other = "name=x&form=csv&recording=y&strikes=ends&height_m=tall";
     let refused = service.post_text("/reference-gaits", FORM, other).await;
-    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Height, m\u{201d} is \u{201c}tall\u{201d}; it must be a number.");
+    is_page(
+        &refused,
+        StatusCode::UNPROCESSABLE_ENTITY,
+        "\u{201c}Height, m\u{201d} is \u{201c}tall\u{201d}; it must be a number.",
+    );
     service.stop().await;
 }
 
@@ -572,7 +584,11 @@ async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_f
         assert!(taken.text.contains(kept), "{kept}: {}", taken.text);
     }
     let refused = send("act=make_token&name=treadmill&days=soon&run=on").await;
-    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Expires after, days\u{201d} is \u{201c}soon\u{201d}; it must be");
+    is_page(
+        &refused,
+        StatusCode::UNPROCESSABLE_ENTITY,
+        "\u{201c}Expires after, days\u{201d} is \u{201c}soon\u{201d}; it must be",
+    );
     for kept in ["value=\"treadmill\"", "value=\"soon\"", "name=\"run\" checked"] {
         assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
     }

@@ -549,13 +549,21 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         assert!(refused.text.contains(typed), "{typed} comes back: {}", refused.text);
     }
     for (kind, form, expected) in [
-        ("emg", "walk=1&form=opensim&recording=x&rate_hz=1000", "\u{201c}Sampling rate, Hz\u{201d} is 1000.0; it must be omitted"),
+        (
+            "emg",
+            "walk=1&form=opensim&recording=x&rate_hz=1000",
+            "\u{201c}Sampling rate, Hz\u{201d} is 1000.0; it must be omitted",
+        ),
         (
             "emg",
             "walk=1&form=csv&recording=x&rate_hz=fast",
             "\u{201c}Sampling rate, Hz\u{201d} is \u{201c}fast\u{201d}; it must be a number",
         ),
-        ("motion", "walk=1&form=csv&recording=x&cutoff_hz=fast", "\u{201c}Low-pass cut-off, Hz\u{201d} is \u{201c}fast\u{201d}"),
+        (
+            "motion",
+            "walk=1&form=csv&recording=x&cutoff_hz=fast",
+            "\u{201c}Low-pass cut-off, Hz\u{201d} is \u{201c}fast\u{201d}",
+        ),
     ] {
         let refused = service.post_text(&format!("{page}/measurement-files/{kind}"), FORM, form).await;
         assert!(refused.text.contains(expected), "{expected}: {}", refused.text);

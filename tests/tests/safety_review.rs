@@ -58,7 +58,10 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
     assert_eq!((stays.status, &stays.json()["verdict"]), (StatusCode::OK, &json!("unsafe")));
     assert!(!waits_at_home(&service).await);
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
-    assert!(shown.contains("K1 reviewed the report and decided that the gait stays unsafe: <q>the knee buckles</q>"), "{shown}");
+    assert!(
+        shown.contains("K1 reviewed the report and decided that the gait stays unsafe: <q>the knee buckles</q>"),
+        "{shown}"
+    );
     let heard = service.feedback(study).await;
     assert!(heard.iter().all(|row| row.retraction.is_none()));
 

@@ -339,7 +339,10 @@ mod tests {
              (ankle angle) instead of 5 °, gives a gait; with a4 = 0.61 m/s and a8 = 8.6 °, no gait was found from 3 starts."
         );
         let in_vain = together(None).in_words();
-        assert!(in_vain.contains("is not sufficient") && in_vain.ends_with("no gait was found from 3 starts."), "{in_vain}");
+        assert!(
+            in_vain.contains("is not sufficient") && in_vain.ends_with("no gait was found from 3 starts."),
+            "{in_vain}"
+        );
         let both = Explanation { together: vec![together(None), together(Some([0.65, 9.1]))], ..explanation() };
         let remedies = both.remedies_in_words();
         assert!(remedies[2].contains("gives a gait") && remedies[3].contains("is not sufficient"), "{remedies:?}");

@@ -332,7 +332,10 @@ mod tests {
     #[test]
     fn a_label_says_what_was_perturbed() {
         assert_eq!(InitialGuess::MULTI_START[4].label(), "cold, muscle tracking, early heel rise");
-        assert_eq!(InitialGuess::MULTI_START[12].label(), "cold, direct, heel rise late on the right, early on the left");
+        assert_eq!(
+            InitialGuess::MULTI_START[12].label(),
+            "cold, direct, heel rise late on the right, early on the left"
+        );
         assert_eq!(
             InitialGuess::perturbed(0).label(),
             "cold, direct, heel rise at 0.399 on the right, at 0.308 on the left, knee flexion × 0.743, stride time 1.079 s, \

@@ -53,7 +53,11 @@ const RULES: [(&str, &str, &str); 27] = [
     ("Unblind", "rater", "A rater who was shown a pair of this study."),
     ("SafetyReviewToMake", "reports", "Includes every open safety report about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
-    ("NewEmg", "reading", "An OpenSim file has no `rate_hz`. Heel strikes are given as two or more times in seconds, or as a column instead."),
+    (
+        "NewEmg",
+        "reading",
+        "An OpenSim file has no `rate_hz`. Heel strikes are given as two or more times in seconds, or as a column instead.",
+    ),
     ("NewMotion", "recording", MOTION_FILE),
     ("NewMotion", "reading", "`cutoff_hz` is at most 0.45 of the sampling rate."),
     ("NewReferenceGait", "recording", REFERENCE_FILE),

@@ -43,9 +43,7 @@ pub(super) fn of_field(label: &str, fault: &FieldError) -> String {
     let Some(allowed) = fault.allowed.as_deref() else { return fault.message.clone() };
     let given = match &fault.value {
         // The form shows names in place of identifiers.
-        Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => {
-            Some(quoted(text))
-        }
+        Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => Some(quoted(text)),
         Some(Value::Number(number)) => Some(number.to_string()),
         _ => None,
     };
