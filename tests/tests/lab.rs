@@ -519,7 +519,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         (json!({"walk": 1, "recording": whole}), "at least two heel-strike times, or none if a heel strike column"),
         (
             json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 0.2]}}),
-            "no stride is within the recording",
+            "no stride within the recording lasts",
         ),
         (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel_strikes_s is 99"),
         (json!({"walk": 1, "recording": whole, "reading": {"channels": {"XX": "TA_L"}}}), "RF_L, TA_L, BF_L"),
