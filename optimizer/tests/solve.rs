@@ -189,7 +189,7 @@ fn bounds_without_a_posture_are_solved_from_a_relaxed_guess() {
         "cold, direct, more regularisation",
         "cold, direct, adaptive barrier",
         "cold, direct, early restoration",
-        "cold, direct, rises early right, early left",
+        "cold, direct, heel rise early on the right, early on the left",
         "cold, direct, heel rise late on the right, early on the left",
         "cold, direct, heel rise late on the right, late on the left",
     ];

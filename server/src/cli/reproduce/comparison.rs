@@ -314,11 +314,11 @@ mod tests {
         assert!(found[1].throughout());
         let words = conclusion(&found);
         assert!(words.contains("only some pairs, depending on local optima (1 of 2)."), "{words}");
-        assert!(words.contains("lower at 4 of 5 iterations, and at the end in 1 of 2 pairs"), "{words}");
+        assert!(words.contains("lower with muscles at 4 of 5 iterations, and at the end in 1 of 2 pairs"), "{words}");
         assert!(words.contains("by a median of 0.050 rad (-0.100 to 0.200)"), "{words}");
         assert!(conclusion(&found[1..]).contains("holds in the only pair, which says little"));
         assert!(conclusion(&[found[1].clone(), found[1].clone()]).contains("holds in every pair (2 of 2)"));
-        assert!(conclusion(&found[..1]).contains("they raise the final Gait RMSE by a median of 0.100 rad"));
+        assert!(conclusion(&found[..1]).contains("muscles raise the final Gait RMSE by a median of 0.100 rad"));
         assert!(conclusion(&[]).contains("cannot be tested"));
     }
 
