@@ -44,7 +44,7 @@ pub enum LearnerError {
         actions: u64,
     },
     /// The number of levels or values differs from the number of dimensions.
-    #[error("the action has {given} coordinates, but the search space has {expected} dimensions")]
+    #[error("the number of coordinates is {given}; it must be {expected}, the number of dimensions")]
     WrongDimensionCount {
         /// Number of coordinates given.
         given: usize,

@@ -297,7 +297,10 @@ impl LearnerSettings {
         if self.additive_share + self.pairwise_share > 1.0 {
             return refuse(
                 "pairwise_share",
-                format!("is {}; with additive_share {} it must be at most 1", self.pairwise_share, self.additive_share),
+                format!(
+                    "is {}; its sum with additive_share ({}) must be at most 1",
+                    self.pairwise_share, self.additive_share
+                ),
             );
         }
         if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
@@ -311,7 +314,7 @@ impl LearnerSettings {
         let narrowest = 1e-3 * deviation;
         if let Some([below, above]) = self.ordinal_thresholds.array_windows().find(|[a, b]| b - a < narrowest) {
             let reason =
-                format!("has {above} after {below}; each must exceed the one before it by at least {narrowest}");
+                format!("has {above} after {below}; each must exceed the previous one by at least {narrowest}");
             return refuse("ordinal_thresholds", reason);
         }
         if self.ordinal_thresholds.len() > 100 {

@@ -46,7 +46,7 @@ fn print(certificate: &Certificate, all: bool) {
     }
     if let Some(map) = &certificate.return_map {
         println!(
-            "   multipliers: largest {:.5e} (variational), {:.5e} (differences, resolution {:.1e}), relative difference {:.1e}",
+            "   multipliers: largest {:.5e} (variational), {:.5e} (finite differences, resolution {:.1e}), relative difference {:.1e}",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
@@ -60,7 +60,7 @@ fn print(certificate: &Certificate, all: bool) {
     }
     if let Some(map) = &certificate.free_hip_return_map {
         println!(
-            "   free hip velocity: largest {:.6} (variational), {:.6} (differences), relative difference {:.1e}",
+            "   free hip velocity: largest {:.6} (variational), {:.6} (finite differences), relative difference {:.1e}",
             map.largest,
             map.largest_by_differences,
             map.disagreement()

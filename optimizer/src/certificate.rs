@@ -6,7 +6,7 @@
 //! 1. Residuals of C1 to C12 at the nodes and on a grid ten times finer (`residuals`).
 //! 2. The closed loop of the hybrid system under feedback linearisation with the virtual constraints of the gait:
 //!    [`STRIDES`] strides, and contacts, friction and torques over the periodic stride (`closed_loop`).
-//! 3. Multipliers of the stride-to-stride map, by variational equations and by differences ([`ReturnMap`]), with a
+//! 3. Multipliers of the stride-to-stride map, by variational equations and by finite differences ([`ReturnMap`]), with a
 //!    regulated and with a free hip velocity.
 //! 4. The largest pushes from which the walker recovers ([`Pushes`]).
 //!
@@ -148,7 +148,7 @@ fn objections(certificate: &Certificate) -> Vec<String> {
     for map in [&certificate.return_map, &certificate.free_hip_return_map].into_iter().flatten() {
         if !map.methods_agree() {
             objections.push(format!(
-                "two computations of the largest multiplier disagree: {:.6e} by variational equations and {:.6e} by differences (resolution \
+                "two computations of the largest multiplier disagree: {:.6e} by variational equations and {:.6e} by finite differences (resolution \
                  {:.1e})",
                 map.largest, map.largest_by_differences, map.differences_resolve
             ));

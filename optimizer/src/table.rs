@@ -117,7 +117,7 @@ impl Table {
             before = word;
         }
         if table.rows.len() < FEWEST_ROWS {
-            let reason = format!("the table has {} rows; at least {FEWEST_ROWS} are needed", table.rows.len());
+            let reason = format!("the number of rows is {}; it must be at least {FEWEST_ROWS}", table.rows.len());
             return Err(malformed(first_line + filled, reason));
         }
         Ok(table)
@@ -127,7 +127,7 @@ impl Table {
     fn add_row(&mut self, line: usize, cells: &[&str], opens: bool) -> Result<(), ModelError> {
         let columns = self.names.len() + usize::from(self.words.is_some());
         if cells.len() != columns {
-            let reason = format!("the row has {} cells; {columns} are expected", cells.len());
+            let reason = format!("the number of cells is {}; it must be {columns}", cells.len());
             return Err(malformed(&self.what, line, None, reason));
         }
         let mut row = Vec::with_capacity(cells.len());

@@ -104,7 +104,7 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
         (
             "cut in half",
             whole[..whole.len() / 2].to_owned(),
-            "walk.mot, line 117: the row has 7 cells; 10 are expected",
+            "walk.mot, line 117: the number of cells is 7; it must be 10",
         ),
         (
             "a row taken out",
@@ -157,14 +157,18 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
         (
             "a cell missing",
             change(&row, &cells[..9].join("\t")),
-            "walk.mot, line 11: the row has 9 cells; 10 are expected",
+            "walk.mot, line 11: the number of cells is 9; it must be 10",
         ),
         (
             "a cell too many",
             change(&row, &format!("{row}\t1")),
-            "walk.mot, line 11: the row has 11 cells; 10 are expected",
+            "walk.mot, line 11: the number of cells is 11; it must be 10",
         ),
-        ("an empty line", change(&row, &format!("\n{row}")), "walk.mot, line 11: the row has 0 cells; 10 are expected"),
+        (
+            "an empty line",
+            change(&row, &format!("\n{row}")),
+            "walk.mot, line 11: the number of cells is 0; it must be 10",
+        ),
         (
             "time stands still",
             with(1, "0.0200"),
@@ -174,7 +178,7 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
         (
             "ten rows",
             changed(&whole.lines().take(17).collect::<Vec<_>>().join("\n"), "nRows=221\n", ""),
-            "walk.mot, line 16: the table has 10 rows; at least 20 are needed",
+            "walk.mot, line 16: the number of rows is 10; it must be at least 20",
         ),
     ];
     check("motion file", read, &cases);
@@ -210,7 +214,7 @@ fn malformed_tables_are_rejected_with_place_and_reason() {
             (
                 "cut off",
                 whole[..whole.len() - 30].to_owned(),
-                "AB06.csv, line 222: the row has 8 cells; 10 are expected",
+                "AB06.csv, line 222: the number of cells is 8; it must be 10",
             ),
         ],
     );
@@ -288,11 +292,15 @@ fn malformed_emg_files_are_rejected_with_place_and_reason() {
                 "emg.csv, line 902, column 1: time 7.9 is 7.001000 s after 0.899, but the usual spacing is 0.001000 s; rows \
                  must be evenly spaced",
             ),
-            ("cut off", whole[..whole.len() - 6].to_owned(), "emg.csv, line 1001: the row has 3 cells; 4 are expected"),
+            (
+                "cut off",
+                whole[..whole.len() - 6].to_owned(),
+                "emg.csv, line 1001: the number of cells is 3; it must be 4",
+            ),
             (
                 "ten samples",
                 whole.lines().take(11).collect::<Vec<_>>().join("\n"),
-                "emg.csv, line 11: the table has 10 rows; at least 20 are needed",
+                "emg.csv, line 11: the number of rows is 10; it must be at least 20",
             ),
         ],
     );
@@ -312,7 +320,7 @@ fn malformed_emg_files_are_rejected_with_place_and_reason() {
         "emg.csv: column \"BF_L\" is selected for both RF_L and GAS_L; each channel needs its own column.",
         "emg.csv, line 1: the file has a time column, \"time_s\"; a sampling rate is for files without one.",
         "emg.csv: column \"toe\" is missing; the columns are TA_L, BF_L, heel.",
-        "emg.csv: column \"heel\" rises 0 times above 2; a stride needs two heel strikes.",
+        "emg.csv: column \"heel\" has no heel strike (a rise above 2); a stride needs two.",
         "heel_strikes_s is 9; it must be 0 to 0.999.",
         "emg.csv: the heel strikes must increase.",
         "rate_hz is 5; it must be 100 to 20000.",

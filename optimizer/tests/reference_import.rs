@@ -182,7 +182,7 @@ fn implausible_reference_is_rejected_with_the_field() {
         (|r| r.standard_deviation_rad = Some(vec![[-0.1; 5]; 101]), "standard_deviation_rad[0][0] is -0.1;"),
         (
             |r| r.standard_deviation_rad = Some(vec![[0.1; 5]; 50]),
-            "standard_deviation_rad: the curve has 50 rows; 101 are expected",
+            "standard_deviation_rad: the number of rows is 50; it must be 101",
         ),
         (|r| r.height_m = Some(175.0), "height_m is 175;"),
         (|r| r.body_mass_kg = Some(f64::NAN), "body_mass_kg is NaN;"),
@@ -358,7 +358,7 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
     let refused = |strikes: Vec<f64>| {
         recording.reference("x", &HeelStrikes::Given(strikes), Walker::default()).unwrap_err().to_string()
     };
-    assert!(refused(vec![0.5]).contains("1 right heel strikes found; a stride needs two"));
+    assert!(refused(vec![0.5]).contains("right heel strikes found: 1; a stride needs two"));
     assert!(refused(vec![0.5, 0.9]).contains("no stride lasts 0.8 to 1.6 s"));
     assert!(refused(vec![1.5, 0.5]).contains("must increase"));
     assert!(refused(vec![0.5, 9.0]).contains("heel_strikes_s is 9; it must be"));
@@ -367,7 +367,7 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
     let early = MotionRecording { right_force: Some(force), ..recording.clone() };
     let early = early.reference("x", &HeelStrikes::Force, Walker::default()).unwrap_err().to_string();
     let expected =
-        "0 right heel strikes found (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s); a stride needs two";
+        "right heel strikes found: 0 (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s); a stride needs two";
     assert!(early.contains(expected), "{early}");
     let unforced = MotionRecording::from_opensim("x", &opensim(2), None, None).unwrap();
     assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));
@@ -427,7 +427,7 @@ fn impossible_mean_strides_are_rejected() {
         ),
         (
             |angles| with_knee(angles, 0.25 * angles[2]),
-            "knee_L_rad bends to at most 16.5° in the stride; at least 20° is plausible; check sign and unit",
+            "knee_L_rad bends to at most 16.5° in the stride; at least 20° is plausible; check the sign and the unit",
         ),
         (
             |angles| with_knee(angles, angles[2] + 0.8),
@@ -568,5 +568,5 @@ fn noise_and_offset_of_a_force_plate_cause_no_heel_strikes() {
     // With an offset above the threshold the contact never ends.
     let lifted = MotionRecording { right_force: Some(plate(|_| 25.0)), ..read(&opensim(5)).unwrap() };
     let refused = lifted.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string();
-    assert!(refused.starts_with("walk.mot: 0 right heel strikes"), "{refused}");
+    assert!(refused.starts_with("walk.mot: right heel strikes found: 0"), "{refused}");
 }

@@ -182,16 +182,16 @@ fn bounds_without_a_posture_are_solved_from_a_relaxed_guess() {
     let strategies = [
         "warm start",
         "cold, direct",
-        "cold, direct, early rise",
-        "cold, direct, whole Hessian",
+        "cold, direct, early heel rise",
+        "cold, direct, exact Hessian from the start",
         "cold, direct, stride time 1.1 s, stride length 1.25 m",
-        "cold, direct, early rise, stride time 1.1 s, stride length 1.25 m",
+        "cold, direct, early heel rise, stride time 1.1 s, stride length 1.25 m",
         "cold, direct, more regularisation",
         "cold, direct, adaptive barrier",
         "cold, direct, early restoration",
-        "cold, direct, rises early right, early left",
-        "cold, direct, rises late right, early left",
-        "cold, direct, rises late right, late left",
+        "cold, direct, heel rise early on the right, early on the left",
+        "cold, direct, heel rise late on the right, early on the left",
+        "cold, direct, heel rise late on the right, late on the left",
     ];
     for (bounds, retry, tried) in [("a6=0,a7=10,a8=10", true, 12), ("a7=5,a8=5", false, 3)] {
         let attempt = |warm: Option<&WarmStart>, retry: bool| {

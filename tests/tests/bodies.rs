@@ -76,7 +76,7 @@ async fn muscles_of_a_person_are_written_down_and_new_studies_take_them_up() {
     service.wait_for(before, &[StudyState::Finished]).await;
     let (page, api) = (format!("/subjects/{subject}/muscles"), format!("/api/v1/subjects/{subject}/muscles"));
     for (typed, expected) in [
-        ("sol_max_force_n=1", "soleus: maximum isometric force, N is 1.0; it must be 50 to 20000."),
+        ("sol_max_force_n=1", "\u{201c}soleus: maximum isometric force, N\u{201d} is 1.0; it must be 50 to 20000."),
         ("sol_max_force_n=much", "a number, or empty"),
         ("sol_knee_lever_m=0.05", "sol does not span the knee"),
         ("sol_colour=1", "a field of this form"),

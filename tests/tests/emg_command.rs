@@ -111,7 +111,7 @@ fn unprocessable_file_is_refused_and_writes_nothing() {
         (&["word.csv", column[0], column[1]], "word.csv, line 1502, column 2"),
         (&["walk.csv", "--normal", "word.csv", column[0], column[1]], "word.csv, line 1502, column 2"),
         (&["nowhere.csv", column[0], column[1]], "Cannot read nowhere.csv"),
-        (&["walk.csv"], "at least two times"),
+        (&["walk.csv"], "at least two heel-strike times"),
         (&["walk.csv", "--heel-strike-column", "toe"], "column \"toe\" is missing"),
         (&["walk.csv", "--heel-strikes-s", "0.4,99"], "heel_strikes_s is 99;"),
         (&["walk.csv", column[0], column[1], "--band-high-hz", "500"], "emg.band_high_hz is 500;"),

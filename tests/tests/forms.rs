@@ -144,13 +144,17 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
     };
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     for (field, value, says) in [
-        ("muscles", "maybe", "it must be on or off"),
-        ("muscles", "", "it must be on or off"),
+        ("muscles", "maybe", "must be on or off"),
+        ("muscles", "", "must be on or off"),
         ("feedback_mode", "both", "it must be automatic, human or mixed"),
         ("trial_budget", "-1", "it must be 1 to 10000"),
         ("parallel_trials", "1.5", "it must be 1 to 64"),
         ("seed", "-1", "it must be 0 to 9007199254740991"),
-        ("basin_within_percent", "101", "Objective tolerance, % is \"101\"; it must be 0 to 100, or empty"),
+        (
+            "basin_within_percent",
+            "101",
+            "\u{201c}Objective tolerance, %\u{201d} is \u{201c}101\u{201d}; it must be 0 to 100, or empty",
+        ),
         ("basin_within_percent", "all", "it must be 0 to 100, or empty"),
         ("subject", "paper-1", "a subject from the list"),
         ("pseudonym", "S09", "A new subject"),
@@ -420,12 +424,12 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
         format!("{changed}&subject={subject}&muscles=on&feedback_mode=automatic&parallel_trials=1&{}", rest.join("&"))
     };
     for (changed, field, said) in [
-        ("lengthscale_a1=-5", "lengthscale_a1", "Lengthscale of a1 is -5.0; it must be 0.05 to 50000"),
-        ("lengthscale_a3=0", "lengthscale_a3", "Lengthscale of a3 is 0.0; it must be 0.001 to 2000"),
-        ("values_a1=15,x", "values_a1", "Values of a1 is "),
-        ("trial_budget=many", "trial_budget", "Trials is "),
-        ("seed=x", "seed", "Seed is "),
-        ("height_m=1.7", "height_m", "Height, m is "),
+        ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5.0; it must be 0.05 to 50000"),
+        ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0.0; it must be 0.001 to 2000"),
+        ("values_a1=15,x", "values_a1", "\u{201c}Values of a1\u{201d} is "),
+        ("trial_budget=many", "trial_budget", "\u{201c}Trials\u{201d} is "),
+        ("seed=x", "seed", "\u{201c}Seed\u{201d} is "),
+        ("height_m=1.7", "height_m", "\u{201c}Height, m\u{201d} is "),
     ] {
         let refused = service.post_text("/studies/new", FORM, &form(changed)).await;
         is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, said);
@@ -481,13 +485,17 @@ async fn refused_forms_name_fields_by_their_labels() {
         (
             "correct",
             "height_m=17.2&body_mass_kg=70&reason=r&before=0".to_owned(),
-            "Height, m is 17.2; it must be 1.4 to 2.2.",
+            "\u{201c}Height, m\u{201d} is 17.2; it must be 1.4 to 2.2.",
         ),
-        ("correct", "height_m=1.72&body_mass_kg=70&reason=&before=0".to_owned(), "Reason must be 1 to 2000 characters"),
+        (
+            "correct",
+            "height_m=1.72&body_mass_kg=70&reason=&before=0".to_owned(),
+            "\u{201c}Reason\u{201d} must be 1 to 2000 characters",
+        ),
         (
             "correct",
             format!("height_m=1.72&body_mass_kg=70&reason={long}&before=0"),
-            "Reason must be at most 2000 characters long.",
+            "\u{201c}Reason\u{201d} must be at most 2000 characters long.",
         ),
     ] {
         let refused = service.post_text(&format!("/subjects/{subject}/{path}"), FORM, &form).await;
@@ -495,10 +503,14 @@ async fn refused_forms_name_fields_by_their_labels() {
     }
     let other = "pseudonym=S08&height_m=17.2&body_mass_kg=70";
     let refused = service.post_text("/subjects", FORM, other).await;
-    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Height, m is 17.2; it must be 1.4 to 2.2.");
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Height, m\u{201d} is 17.2; it must be 1.4 to 2.2.");
     let other = "name=x&form=csv&recording=y&strikes=ends&height_m=tall";
     let refused = service.post_text("/reference-gaits", FORM, other).await;
-    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Height, m is \u{201c}tall\u{201d}; it must be a number.");
+    is_page(
+        &refused,
+        StatusCode::UNPROCESSABLE_ENTITY,
+        "\u{201c}Height, m\u{201d} is \u{201c}tall\u{201d}; it must be a number.",
+    );
     service.stop().await;
 }
 
@@ -572,7 +584,11 @@ async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_f
         assert!(taken.text.contains(kept), "{kept}: {}", taken.text);
     }
     let refused = send("act=make_token&name=treadmill&days=soon&run=on").await;
-    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Expires after, days is \u{201c}soon\u{201d}; it must be");
+    is_page(
+        &refused,
+        StatusCode::UNPROCESSABLE_ENTITY,
+        "\u{201c}Expires after, days\u{201d} is \u{201c}soon\u{201d}; it must be",
+    );
     for kept in ["value=\"treadmill\"", "value=\"soon\"", "name=\"run\" checked"] {
         assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
     }
@@ -580,6 +596,6 @@ async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_f
     assert_eq!(refused.text.matches("aria-invalid").count(), 1);
     assert!(!refused.text.contains("gait_"), "no secret");
     let nothing = send("act=make_token&name=treadmill&days=").await;
-    is_page(&nothing, StatusCode::UNPROCESSABLE_ENTITY, "Scopes must be one or more of");
+    is_page(&nothing, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Scopes\u{201d} must be one or more of");
     service.stop().await;
 }

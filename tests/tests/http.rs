@@ -401,7 +401,7 @@ async fn the_form_for_a_new_study_comes_back_with_what_was_wrong() {
     let kind = "application/x-www-form-urlencoded";
     let refused = service.post_text("/studies/new", kind, &form("17.27", "3")).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
-    assert!(refused.text.contains("Height, m is 17.27; it must be 1.4 to 2.2."));
+    assert!(refused.text.contains("\u{201c}Height, m\u{201d} is 17.27; it must be 1.4 to 2.2."));
     assert!(refused.text.contains("value=\"17.27\""), "what was typed is kept");
     let refused = service.post_text("/studies/new", kind, &form("1.7", "many")).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);

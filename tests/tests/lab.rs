@@ -516,10 +516,10 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         (with_heel(1, &whole.replace("\n1.5,", "\n1.5,x")), "recording, line 1502, column 2"),
         (with_heel(1, &whole.replace("TA_L", "TA")), "column \\\"TA_L\\\" is missing"),
         (with_heel(4, &whole), "1, 2 or 3"),
-        (json!({"walk": 1, "recording": whole}), "at least two times, or none if a heel strike column"),
+        (json!({"walk": 1, "recording": whole}), "at least two heel-strike times, or none if a heel strike column"),
         (
             json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 0.2]}}),
-            "no stride is within the recording",
+            "no stride within the recording lasts",
         ),
         (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel_strikes_s is 99"),
         (json!({"walk": 1, "recording": whole, "reading": {"channels": {"XX": "TA_L"}}}), "RF_L, TA_L, BF_L"),
@@ -549,13 +549,21 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         assert!(refused.text.contains(typed), "{typed} comes back: {}", refused.text);
     }
     for (kind, form, expected) in [
-        ("emg", "walk=1&form=opensim&recording=x&rate_hz=1000", "Sampling rate, Hz is 1000.0; it must be omitted"),
+        (
+            "emg",
+            "walk=1&form=opensim&recording=x&rate_hz=1000",
+            "\u{201c}Sampling rate, Hz\u{201d} is 1000.0; it must be omitted",
+        ),
         (
             "emg",
             "walk=1&form=csv&recording=x&rate_hz=fast",
-            "Sampling rate, Hz is \u{201c}fast\u{201d}; it must be a number",
+            "\u{201c}Sampling rate, Hz\u{201d} is \u{201c}fast\u{201d}; it must be a number",
         ),
-        ("motion", "walk=1&form=csv&recording=x&cutoff_hz=fast", "Low-pass cutoff, Hz is \u{201c}fast\u{201d}"),
+        (
+            "motion",
+            "walk=1&form=csv&recording=x&cutoff_hz=fast",
+            "\u{201c}Low-pass cut-off, Hz\u{201d} is \u{201c}fast\u{201d}",
+        ),
     ] {
         let refused = service.post_text(&format!("{page}/measurement-files/{kind}"), FORM, form).await;
         assert!(refused.text.contains(expected), "{expected}: {}", refused.text);

@@ -162,7 +162,7 @@ async fn full_file_system_loses_nothing_acknowledged_and_is_reported() {
     let backup = service.post("/api/v1/backups", &json!({})).await;
     assert_eq!(backup.status, StatusCode::INSUFFICIENT_STORAGE, "{}", backup.text);
     assert_eq!(service.fetch("/health").await.json()["status"], "short_of_space");
-    assert!(service.fetch("/subjects").await.text.contains("0 MB are free"));
+    assert!(service.fetch("/subjects").await.text.contains("0 MB is free"));
 
     std::fs::remove_file(&filler).unwrap();
     let answer = service.post("/api/v1/subjects", &subject(3000)).await;

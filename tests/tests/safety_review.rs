@@ -1,4 +1,4 @@
-//! Safety reviews: staff decide about a safety report, with a reason, and the report stays in the record.
+//! Safety reviews: staff decide on a safety report, with a reason, and the report stays in the record.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -58,7 +58,10 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
     assert_eq!((stays.status, &stays.json()["decision"]), (StatusCode::OK, &json!("unsafe")));
     assert!(!waits_at_home(&service).await);
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
-    assert!(shown.contains("K1 reviewed the report and kept the gait unsafe: <q>the knee buckles</q>"), "{shown}");
+    assert!(
+        shown.contains("K1 reviewed the report and decided that the gait stays unsafe: <q>the knee buckles</q>"),
+        "{shown}"
+    );
     let heard = service.feedback(study).await;
     assert!(heard.iter().all(|row| row.retraction.is_none()));
 

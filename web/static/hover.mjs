@@ -1,6 +1,6 @@
 // @ts-check
 // Shows the values of the nearest point of a line chart beside the pointer or finger. They are read from the drawing, to a tenth
-// of its units. The CSV file of each figure has the exact values, also for users without a pointer.
+// of its units. The CSV file of each figure has the exact values, even for users without a pointer.
 
 /** How far from a point the pointer may be, in units of the drawing. */
 const REACH = 60;

@@ -122,7 +122,7 @@ pub struct NlpSettings {
 
     /// Until the unscaled violation has first reached this value, the Hessian is that of the objective alone. Far
     /// from a feasible point large multipliers give the rows a curvature that leads to regularisation and short
-    /// steps. Default infinite (JSON: null): always the whole Hessian. From 0.
+    /// steps. Default infinite (JSON: null): always the exact Hessian. From 0.
     #[serde(with = "infinite_as_null")]
     pub curvature_from_violation: f64,
     /// First regularisation of the Hessian. Default 1e-4 (WB06 delta_w^0).

@@ -1,4 +1,4 @@
-//! The derivative of the stride-to-stride map by differences of simulated domains, without derivatives of motion,
+//! The derivative of the stride-to-stride map by finite differences of simulated domains, without derivatives of motion,
 //! guards or impacts.
 //!
 //! The map of a stride is the composition of its eight domains, so its derivative is the product of theirs. Each domain

@@ -51,7 +51,7 @@ pub struct ReturnMap {
     pub multipliers: Vec<Multiplier>,
     /// Largest modulus of these multipliers.
     pub largest: f64,
-    /// Largest modulus of the multipliers by differences of simulated domains.
+    /// Largest modulus of the multipliers, from finite differences of simulated domains.
     pub largest_by_differences: f64,
     /// Change of that modulus by the last extrapolation: the resolution of the differences.
     pub differences_resolve: f64,

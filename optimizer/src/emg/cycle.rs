@@ -32,8 +32,7 @@ impl CycleActivity {
             .filter(|(start, end)| *start >= envelope.start_s && *end <= envelope.end_s())
             .collect();
         if strides.is_empty() {
-            let reason =
-                format!("no stride is within the recording and lasts {} to {} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
+            let reason = format!("no stride within the recording lasts {} to {} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
             return Err(ModelError::Malformed { what: format!("channel {}", envelope.channel), reason });
         }
         let count = strides.len() as f64;

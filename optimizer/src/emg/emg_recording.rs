@@ -124,10 +124,11 @@ impl EmgRecording {
         let times: Vec<f64> = (0..signal.len()).map(|k| self.start_s + k as f64 / self.rate_hz).collect();
         let strikes = contacts(&times, signal, threshold);
         if strikes.len() < 2 {
-            let reason = format!(
-                "column {column:?} rises {} times above {threshold}; a stride needs two heel strikes",
-                strikes.len()
-            );
+            let found = match strikes.len() {
+                0 => "no heel strike",
+                _ => "only one heel strike",
+            };
+            let reason = format!("column {column:?} has {found} (a rise above {threshold}); a stride needs two");
             return Err(ModelError::Malformed { what: what.to_owned(), reason });
         }
         Ok(strikes)

@@ -90,29 +90,29 @@ impl Conflict {
                 let naturalness_terms = if self.naturalness_terms.is_empty() {
                     String::new()
                 } else {
-                    format!(", among them: {}", list(&self.naturalness_terms))
+                    format!(" (among them {})", list(&self.naturalness_terms))
                 };
                 (
                     format!(
                         "The conflict does not depend on tuned bounds: fixed constraints conflict with each other{naturalness_terms}"
                     ),
-                    "with every tuned bound at its loosest value".to_owned(),
+                    ". With every tuned bound at its loosest value".to_owned(),
                     "",
                 )
             }
             [one] => (
                 format!("{one} cannot be satisfied, whatever the values of the other tuned bounds"),
-                "with it, and the others at their loosest values".to_owned(),
+                ": with it, and the others at their loosest values".to_owned(),
                 " With it at its loosest value as well, there is a gait.",
             ),
             [_, _] => (
                 format!("{} conflict with each other", list(&quantities)),
-                "with both, and the other tuned bounds at their loosest values".to_owned(),
+                ": with both, and the other tuned bounds at their loosest values".to_owned(),
                 " With either of them at its loosest value as well, there is a gait.",
             ),
             _ => (
                 format!("{} conflict with each other", list(&quantities)),
-                "with all of them, and the other tuned bounds at their loosest values".to_owned(),
+                ": with all of them, and the other tuned bounds at their loosest values".to_owned(),
                 " With any one of them at its loosest value as well, there is a gait.",
             ),
         };
@@ -120,7 +120,7 @@ impl Conflict {
             format!("; the nearest motion violates {} by {} {}", worst.row, figure(worst.amount), worst.unit)
         });
         let (from, caveat) = (from_starts(self.starts), caveat(self.undecided));
-        format!("{without}{claim}: {tried}, no gait was found{from}{caveat}{missed}.{relief}")
+        format!("{without}{claim}{tried}, no gait was found{from}{caveat}{missed}.{relief}")
     }
 }
 
@@ -138,14 +138,15 @@ impl Relaxation {
         let (limited, unit) = parts(meaning);
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
         if let Some(to) = to {
-            let with = quantity(bound, meaning, *to);
             return format!(
-                "With {with} instead of {from}{unit} alone, a gait converges; with {not_with}{unit}, no gait was found{starts}{caveat}."
+                "Relaxing {bound} ({limited}) alone, to {to}{unit} instead of {from}{unit}, gives a gait; with {not_with}{unit}, \
+                 no gait was found{starts}{caveat}."
             );
         }
         let direction = if not_with < from { "down" } else { "up" };
         format!(
-            "{bound} ({limited}) alone, {direction} to its loosest value, {not_with}{unit}, is not sufficient: no gait was found{starts}{caveat}."
+            "Relaxing {bound} ({limited}) alone, {direction} to its loosest value, {not_with}{unit}, is not sufficient: no gait \
+             was found{starts}{caveat}."
         )
     }
 }
@@ -160,7 +161,8 @@ impl JointRelaxation {
         let not_with = named(&|one| format!("{} = {}", one.bound, in_unit(&one.meaning, one.not_with)));
         if self.bounds.iter().any(|one| one.to.is_none()) {
             return format!(
-                "{not_with}, the loosest values together, are not sufficient: no gait was found{starts}{caveat}."
+                "Relaxing these bounds together is not sufficient: even at their loosest values, {not_with}, no gait was \
+                 found{starts}{caveat}."
             );
         }
         let with = named(&|one| {
@@ -168,7 +170,9 @@ impl JointRelaxation {
             let from = in_unit(&one.meaning, one.from);
             format!("{} instead of {from}", quantity(&one.bound, &one.meaning, to))
         });
-        format!("With {with} together, a gait converges; with {not_with}, no gait was found{starts}{caveat}.")
+        format!(
+            "Relaxing these bounds together, to {with}, gives a gait; with {not_with}, no gait was found{starts}{caveat}."
+        )
     }
 }
 
@@ -293,10 +297,10 @@ mod tests {
                  the other tuned bounds at their loosest values, no gait was found from 5 starts; the nearest motion violates \
                  SS1_R node 12, C3 forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
                  there is a gait.",
-                "With a7 = 15 ° (hip angle) instead of 5 ° alone, a gait converges; with 14.6 °, no gait was found from 3 \
+                "Relaxing a7 (hip angle) alone, to 15 ° instead of 5 °, gives a gait; with 14.6 °, no gait was found from 3 \
                  starts.",
-                "a4 (hip velocity upper bound) alone, up to its loosest value, 3 m/s, is not sufficient: no gait was found from \
-                 3 starts.",
+                "Relaxing a4 (hip velocity upper bound) alone, up to its loosest value, 3 m/s, is not sufficient: no gait was \
+                 found from 3 starts.",
                 "a2 = 20 rad/s² (coordinate acceleration) is reached in DS2_L and SS1_L.",
                 "a4 = 0.5 m/s (hip velocity upper bound) is reached in the stride as a whole.",
             ]
@@ -319,8 +323,8 @@ mod tests {
         let fixed = Conflict { naturalness_terms: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
         assert_eq!(
             fixed,
-            "The conflict does not depend on tuned bounds: fixed constraints conflict with each other, among them: a slow start: \
-             with every tuned bound at its loosest value, no gait was found from 5 starts; the nearest motion violates SS1_R \
+            "The conflict does not depend on tuned bounds: fixed constraints conflict with each other (among them a slow start). \
+             With every tuned bound at its loosest value, no gait was found from 5 starts; the nearest motion violates SS1_R \
              node 12, C3 forward hip velocity by 0.107 m/s."
         );
         let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words();
@@ -331,14 +335,17 @@ mod tests {
     fn joint_relaxations_name_their_bounds_together() {
         assert_eq!(
             together(Some([0.65, 9.1])).in_words(),
-            "With a4 = 0.65 m/s (hip velocity upper bound) instead of 0.5 m/s and a8 = 9.1 ° (ankle angle) instead of \
-             5 ° together, a gait converges; with a4 = 0.61 m/s and a8 = 8.6 °, no gait was found from 3 starts."
+            "Relaxing these bounds together, to a4 = 0.65 m/s (hip velocity upper bound) instead of 0.5 m/s and a8 = 9.1 ° \
+             (ankle angle) instead of 5 °, gives a gait; with a4 = 0.61 m/s and a8 = 8.6 °, no gait was found from 3 starts."
         );
         let in_vain = together(None).in_words();
-        assert!(in_vain.contains("are not sufficient: no gait was found from 3 starts"), "{in_vain}");
+        assert!(
+            in_vain.contains("is not sufficient") && in_vain.ends_with("no gait was found from 3 starts."),
+            "{in_vain}"
+        );
         let both = Explanation { together: vec![together(None), together(Some([0.65, 9.1]))], ..explanation() };
         let remedies = both.remedies_in_words();
-        assert!(remedies[2].contains("a gait converges") && remedies[3].contains("are not sufficient"), "{remedies:?}");
+        assert!(remedies[2].contains("gives a gait") && remedies[3].contains("is not sufficient"), "{remedies:?}");
     }
 
     #[test]

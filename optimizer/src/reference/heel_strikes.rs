@@ -114,7 +114,7 @@ impl MotionRecording {
                 HeelStrikes::Kinematics => "; for a recording of exactly one stride, use its ends",
                 _ => "",
             };
-            let reason = format!("{} right heel strikes found{recorded}; a stride needs two{hint}", found.len());
+            let reason = format!("right heel strikes found: {}{recorded}; a stride needs two{hint}", found.len());
             return Err(malformed(reason));
         }
         Ok(found)

@@ -23,7 +23,7 @@ const MANY_STRIKES: usize = 200;
 /// is ahead of the left one, and the left leg swings in the first half of the stride.
 fn not_from_right_heel_strike(mean: &[[f64; 5]]) -> Option<String> {
     let [_, hip_l, _, _, hip_r] = mean[0];
-    let cause = "check sides, the signs of the hip angles, and that the heel strikes are those of the right foot";
+    let cause = "check the sides, the signs of the hip angles, and that the heel strikes are those of the right foot";
     if hip_l - hip_r > BEHIND_RAD {
         let behind = (hip_l - hip_r).to_degrees();
         return Some(format!("at right heel strike the right thigh is {behind:.0}° behind the left one; {cause}"));

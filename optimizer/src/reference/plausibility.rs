@@ -48,7 +48,7 @@ fn knee(degrees: &[f64]) -> Option<String> {
     if peak < SMALLEST_KNEE_PEAK_DEG {
         let reason =
             format!("bends to at most {peak:.1}° in the stride; at least {SMALLEST_KNEE_PEAK_DEG}° is plausible");
-        return Some(format!("{reason}; check sign and unit"));
+        return Some(format!("{reason}; check the sign and the unit"));
     }
     (least > LARGEST_LEAST_FLEXION_DEG).then(|| {
         let straight = format!("its minimum must be at most {LARGEST_LEAST_FLEXION_DEG}°");
@@ -81,7 +81,9 @@ pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelE
             None => Some(format!("{name} (constant)")),
         })
         .collect();
-    let warning = || format!("unlike the built-in reference: {}; check sign, side and heel strikes", unlike.join(", "));
+    let warning = || {
+        format!("unlike the built-in reference: {}; check the sign, the side and the heel strikes", unlike.join(", "))
+    };
     Ok((!unlike.is_empty()).then(warning))
 }
 

@@ -186,7 +186,7 @@ impl Walker {
 /// Checks five curves over the cycle: 101 rows with values from `least` to the largest plausible angle.
 fn check_curves(field: &str, curves: &[[f64; 5]], least: f64) -> Result<(), ModelError> {
     if curves.len() != REFERENCE_ROWS {
-        let reason = format!("the curve has {} rows; {REFERENCE_ROWS} are expected", curves.len());
+        let reason = format!("the number of rows is {}; it must be {REFERENCE_ROWS}", curves.len());
         return Err(ModelError::Malformed { what: field.to_owned(), reason });
     }
     for (row, values) in curves.iter().enumerate() {

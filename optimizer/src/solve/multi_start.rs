@@ -256,7 +256,7 @@ impl InitialGuess {
         .to_owned();
         let early_rise = self.timing == GuessTiming::EARLY_RISE;
         if early_rise {
-            label.push_str(", early rise");
+            label.push_str(", early heel rise");
         }
         if let Some(strategy) = self.strategy.in_words() {
             label.push_str(", ");
@@ -270,20 +270,20 @@ impl InitialGuess {
                 1.0 => "late".to_owned(),
                 between => format!("at {between}"),
             };
-            for part in [", rises ", &when(right), " right, ", &when(left), " left"] {
+            for part in [", heel rise ", &when(right), " on the right, ", &when(left), " on the left"] {
                 label.push_str(part);
             }
         }
         let normal = if early_rise { Self::EARLY_RISE } else { Self::NATURAL };
         for (name, value, usual, unit) in [
-            ("knee flexion x", self.knee_flexion, normal.knee_flexion, ""),
+            ("knee flexion × ", self.knee_flexion, normal.knee_flexion, ""),
             ("stride time ", self.stride_time_s, normal.stride_time_s, " s"),
             ("stride length ", self.stride_length_m, normal.stride_length_m, " m"),
             ("barrier ", self.barrier, normal.barrier, ""),
-            ("curvature from violation ", self.curvature_from, normal.curvature_from, ""),
+            ("constraint curvature below a violation of ", self.curvature_from, normal.curvature_from, ""),
         ] {
             if value == WHOLE_HESSIAN {
-                label.push_str(", whole Hessian");
+                label.push_str(", exact Hessian from the start");
             } else if value != usual {
                 for part in [", ", name, &value.to_string(), unit] {
                     label.push_str(part);
@@ -331,12 +331,15 @@ mod tests {
 
     #[test]
     fn a_label_says_what_was_perturbed() {
-        assert_eq!(InitialGuess::MULTI_START[4].label(), "cold, muscle tracking, early rise");
-        assert_eq!(InitialGuess::MULTI_START[12].label(), "cold, direct, rises late right, early left");
+        assert_eq!(InitialGuess::MULTI_START[4].label(), "cold, muscle tracking, early heel rise");
+        assert_eq!(
+            InitialGuess::MULTI_START[12].label(),
+            "cold, direct, heel rise late on the right, early on the left"
+        );
         assert_eq!(
             InitialGuess::perturbed(0).label(),
-            "cold, direct, rises at 0.399 right, at 0.308 left, knee flexion x0.743, stride time 1.079 s, \
-             stride length 1.061 m, curvature from violation 0.043"
+            "cold, direct, heel rise at 0.399 on the right, at 0.308 on the left, knee flexion × 0.743, stride time 1.079 s, \
+             stride length 1.061 m, constraint curvature below a violation of 0.043"
         );
     }
 }

@@ -335,11 +335,12 @@ fn of_iterations(iterations: &[IterationRecord]) -> Chart {
     let line = |f: fn(&IterationRecord) -> f64| -> Vec<(f64, f64)> {
         iterations.iter().enumerate().map(|(i, r)| (i as f64, f(r))).collect()
     };
-    let mut chart = Chart::new("Objective, violation and barrier by iteration", "iteration", "scaled, no unit")
-        .with("constraint violation", 0, Stroke::Solid, line(|r| r.constraint_violation))
-        .with("dual infeasibility", 1, Stroke::Dashed, line(|r| r.dual_infeasibility))
-        .with("barrier", 2, Stroke::Solid, line(|r| r.barrier))
-        .with("objective", 3, Stroke::Dashed, line(|r| r.objective.abs()));
+    let mut chart =
+        Chart::new("Objective, violation and barrier parameter by iteration", "iteration", "scaled, no unit")
+            .with("violation", 0, Stroke::Solid, line(|r| r.constraint_violation))
+            .with("dual infeasibility", 1, Stroke::Dashed, line(|r| r.dual_infeasibility))
+            .with("barrier parameter", 2, Stroke::Solid, line(|r| r.barrier))
+            .with("objective", 3, Stroke::Dashed, line(|r| r.objective.abs()));
     chart.whole_x = true;
     chart.log_y = true;
     chart.marks = solve_phases(&iterations);

@@ -23,7 +23,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use uuid::Uuid;
 
-/// Routes that show nothing of a subject.
+/// Routes that show no subject data.
 pub const NO_SUBJECT_DATA: [&str; 30] = [
     "/static/{*path}",
     "/health",
@@ -277,7 +277,7 @@ pub(super) async fn note(
     Ok(answer)
 }
 
-/// The kind of access; `None` if the response has no data of a subject, or the audit trail has the entry.
+/// The kind of access; `None` if the response has no subject data, or the audit trail has the entry.
 fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Option<Kind> {
     let status = answer.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;

@@ -72,7 +72,7 @@ fn named(request: &Request) -> Result<Option<&str>, Error> {
     let Some(first) = first else {
         return if request.version() < Version::HTTP_11 { Ok(None) } else { malformed("is missing") };
     };
-    let Ok(host) = first.to_str() else { return malformed("contains characters that no host name has") };
+    let Ok(host) = first.to_str() else { return malformed("contains characters that a host name cannot have") };
     match request.uri().authority() {
         Some(other) if !other.as_str().eq_ignore_ascii_case(host) => {
             malformed("differs from the host in the request line")

@@ -17,11 +17,11 @@ const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise sca
                        `probit`.";
 const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
-const EMG_FILE: &str = "A file of the given form with the columns of the muscles, sampled at 100 Hz or more, with one whole \
+const EMG_FILE: &str = "A file in the format that `form` names, with the columns of the muscles, sampled at 100 Hz or more, with one whole \
                         stride or more. It has all columns and heel strikes that are named in the request.";
-const MOTION_FILE: &str = "A file of the given form with the angle of one joint or more over several strides, as optimizer/data/README.md \
+const MOTION_FILE: &str = "A file in the format that `form` names, with the angle of one joint or more over several strides, as optimizer/data/README.md \
                            describes it.";
-const REFERENCE_FILE: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five \
+const REFERENCE_FILE: &str = "A file in the format that `form` names, with its columns, as optimizer/data/README.md describes it: five \
                               joint angles over at least one whole stride of a walking person. It has all columns and heel \
                               strikes that are named in the request.";
 
@@ -53,7 +53,11 @@ const RULES: [(&str, &str, &str); 27] = [
     ("Unblind", "rater", "A rater who was shown a pair of this study."),
     ("SafetyReviewToMake", "reports", "Includes every open safety report about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
-    ("NewEmg", "reading", "An OpenSim file has no `rate_hz`. Heel strikes are two or more times, or a column instead."),
+    (
+        "NewEmg",
+        "reading",
+        "An OpenSim file has no `rate_hz`. Heel strikes are given as two or more times in seconds, or as a column instead.",
+    ),
     ("NewMotion", "recording", MOTION_FILE),
     ("NewMotion", "reading", "`cutoff_hz` is at most 0.45 of the sampling rate."),
     ("NewReferenceGait", "recording", REFERENCE_FILE),
@@ -63,7 +67,7 @@ const RULES: [(&str, &str, &str); 27] = [
         "`band_high_hz` exceeds `band_low_hz` by 1 or more, and is at most 0.495 times the sampling rate. The other \
          frequencies are at most 0.45 times the sampling rate.",
     ),
-    ("NewLabAnswer", "number", "At most the number of the current question."),
+    ("NewLabAnswer", "number", "At most the current `asks` or `reports`."),
 ];
 
 /// Adds the rules to the fields.

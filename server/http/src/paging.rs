@@ -61,7 +61,7 @@ impl TryFrom<String> for SearchText {
     fn try_from(text: String) -> Result<Self, String> {
         match text.chars().count() {
             length if length > Self::LONGEST => Err(format!(
-                "contains is {length} characters long; it must be at most {} characters long",
+                "the search text (`contains`) has {length} characters; it must have at most {}",
                 Self::LONGEST
             )),
             _ => Ok(Self(text)),

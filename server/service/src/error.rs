@@ -26,16 +26,26 @@ impl FieldError {
     /// Refuses a value. `allowed` completes the sentence "it must be ...".
     pub fn new(field: &str, value: impl Into<Value>, allowed: &str) -> Self {
         let value = value.into();
-        let message = format!("{field} is {value}; it must be {}.", allowed.trim_end_matches('.'));
+        let message = Self::sentence(field, Some(&value.to_string()), allowed);
         Self { field: field.to_owned(), value: Some(value), allowed: Some(allowed.to_owned()), message }
     }
 }
 
 impl FieldError {
+    /// The sentence of every refusal: in problem documents, on the command line and on pages. `name` is the name of the
+    /// field, or its label in quotation marks, which read as a name whatever words a label has.
+    pub fn sentence(name: &str, given: Option<&str>, allowed: &str) -> String {
+        let allowed = allowed.trim_end_matches('.');
+        match given {
+            Some(given) => format!("{name} is {given}; it must be {allowed}."),
+            None => format!("{name} must be {allowed}."),
+        }
+    }
+
     /// Refuses a value that the error describes instead of repeating it. `is` and `allowed` complete the sentences "it is
     /// ..." and "it must be ...".
     pub fn described(field: &str, is: &str, allowed: &str) -> Self {
-        let message = format!("{field} is {is}; it must be {allowed}.");
+        let message = Self::sentence(field, Some(is), allowed);
         Self { field: field.to_owned(), value: None, allowed: Some(allowed.to_owned()), message }
     }
 

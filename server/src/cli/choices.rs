@@ -17,8 +17,8 @@ pub(super) const JOINT_ANGLE_FORMATS: [Choice; 3] = [
 pub(super) const ANGLE_UNITS: [Choice; 2] = [("degrees", "Degrees"), ("radians", "Radians")];
 /// Ways to find right heel strikes.
 pub(super) const HEEL_STRIKES: [Choice; 3] = [
-    ("force", "At instants where the vertical force under the right foot rises above 20 N"),
-    ("kinematics", "At instants where the right heel is farthest ahead of the pelvis"),
+    ("force", "At instants at which the vertical force under the right foot rises above 20 N"),
+    ("kinematics", "At instants at which the right heel is farthest ahead of the pelvis"),
     ("ends", "At the first and the last row: the file is one stride"),
 ];
 /// Formats of an EMG recording.

@@ -56,7 +56,7 @@ pub(super) struct Lineage {
     pub(super) id: String,
     /// Its basin, as numbered by this solve; `None` if the solve did not converge.
     pub(super) basin: Option<usize>,
-    /// Its ancestors by warm starts, the nearest first. Empty after a cold start, also if that followed a failed warm
+    /// Its ancestors by warm starts, the nearest first. Empty after a cold start, even if that followed a failed warm
     /// start.
     #[serde(default)]
     pub(super) ancestors: Vec<Ancestor>,

@@ -93,13 +93,13 @@ enum Command {
     Config(config::Config),
     /// Print the description of the REST interface (OpenAPI 3.1).
     Openapi,
-    /// Back up a record, also while the service is running.
+    /// Back up a record, even while the service is running.
     Backup(backup::Backup),
     /// Replace a record with a backup, while the service is stopped.
     ///
     /// The replaced record is kept next to it.
     Restore(backup::Restore),
-    /// Export a study to an archive, also while the service is running.
+    /// Export a study to an archive, even while the service is running.
     Export(study::Export),
     /// Import a study from an archive, while the service is stopped.
     Import(study::Import),

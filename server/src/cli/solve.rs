@@ -70,7 +70,7 @@ pub(super) struct Solve {
     /// Print the figures as one JSON object.
     #[arg(long)]
     json: bool,
-    /// If no gait is found, explain which bounds conflict and which one, relaxed alone, gives a gait. Takes up to eight
+    /// If no gait is found, explain which bounds conflict and which bound, relaxed alone, gives a gait. Takes up to eight
     /// solves for each bound.
     #[arg(long)]
     explain: bool,
@@ -136,7 +136,7 @@ impl Solve {
         let solved = pool.run(move |_| {
             let mut observer = |record: &gait_optimizer::IterationRecord| {
                 shown.set_message(format!(
-                    "iteration {}, objective {:.6}, violation {:.1e}, barrier {:.1e}",
+                    "iteration {}, objective {:.6}, violation {:.1e}, barrier parameter {:.1e}",
                     record.iteration, record.objective, record.constraint_violation, record.barrier
                 ));
                 shown.tick();

@@ -80,7 +80,7 @@ impl Tune {
         let best = store.compute(choose).await?.map_err(Error::Learner)?;
         self.print(&summary::of(&ran.snapshot, best, judged))?;
         if !self.json {
-            tell(&format!("to look at the study: gaitwright serve --database {}", settings.database().display()));
+            tell(&format!("to view the study: gaitwright serve --database {}", settings.database().display()));
         }
         if ran.interrupted {
             let done = ran.snapshot.trials.len() - ran.snapshot.open();

@@ -17,7 +17,7 @@ pub(super) struct Users {
 
 #[derive(Debug, Subcommand)]
 enum UsersCommand {
-    /// List users with name, role, way to sign in, and whether they are disabled.
+    /// List users: name, role, way to sign in, and whether they are disabled.
     List {
         #[command(flatten)]
         record: AnchoredFlags,

@@ -14,7 +14,7 @@ pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
     into_file(&store.readers, to, store.path()).await
 }
 
-/// Writes a backup next to the record (`gaitwright.db.backup-20260501T101500`) and checks it. Returns the file and its
+/// Writes a backup next to the record (`gaitwright.db.backup-20260501T101500`) and verifies it. Returns the file and its
 /// size.
 ///
 /// # Errors
@@ -61,7 +61,7 @@ pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
     Ok(found.into_iter().rev().map(|(_, name, bytes)| (name, bytes)).collect())
 }
 
-/// Writes a compact backup of a record that another process may own, and checks it.
+/// Writes a compact backup of a record that another process may own, and verifies it.
 ///
 /// # Errors
 /// As [`of_store`].

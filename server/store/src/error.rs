@@ -211,7 +211,7 @@ pub enum StoreError {
     #[error("The operating system cannot provide random numbers: {0}.")]
     NoRandomNumbers(String),
     /// The subject withdrew consent.
-    #[error("The subject withdrew consent. The data is kept, but nothing can be added, shown or exported.")]
+    #[error("The subject withdrew consent. The record is kept, but nothing can be added, shown or exported.")]
     Withdrawn,
     /// The record was closed.
     #[error("The database is closed because the service is shutting down.")]
@@ -221,7 +221,7 @@ pub enum StoreError {
     NotDurable(String),
     /// The free space has shrunk to the reserve, so nothing large is started.
     #[error(
-        "The disk is nearly full: {free_mb} MB are free, and {reserve_mb} MB are kept in reserve. Free some space and try again."
+        "The disk is nearly full: {free_mb} MB is free, and {reserve_mb} MB is kept in reserve. Free some space and try again."
     )]
     NearlyFull {
         /// Free space, MB.

@@ -9,7 +9,7 @@ use sqlx::sqlite::SqliteRow;
 /// An answer of the subject.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabAnswer {
-    /// Number of the answer, from 1. It grows with each retraction.
+    /// Number of the answer, from 1. It increases by one with each retraction.
     pub number: u32,
     /// The answer. First is walk 2.
     pub said: Judgement,

@@ -38,7 +38,7 @@ impl FromStr for MeasurementKind {
         [Self::Electromyogram, Self::Motion]
             .into_iter()
             .find(|kind| kind.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "kind of a recording", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::Damaged { what: "kind of a measurement file", reason: text.to_owned() })
     }
 }
 
@@ -78,7 +78,7 @@ impl PackedFile {
     pub fn new<T: Serialize>(pool: &OnPool, kind: MeasurementKind, reading: &T, file: &str) -> StoreResult<Self> {
         Ok(Self {
             kind,
-            reading: json::to_text("reading of a recording", reading)?,
+            reading: json::to_text("reading instructions of a measurement file", reading)?,
             raw: json::compress(pool, "recording", file.as_bytes())?,
             raw_sha256: json::sha256(file.as_bytes()),
         })
@@ -182,7 +182,7 @@ pub async fn insert_result<T: Serialize>(
     sqlx::query("insert into emg_results (id, session_id, document, actor, created_at) values (?, ?, ?, ?, ?)")
         .bind(id)
         .bind(session)
-        .bind(json::to_text("electromyogram result", document)?)
+        .bind(json::to_text("EMG result", document)?)
         .bind(actor.as_str())
         .bind(now())
         .execute(db)

@@ -44,7 +44,7 @@ pub struct SafetyReview {
     pub id: SafetyReviewId,
     /// Trial of the reviewed gait.
     pub trial_id: TrialId,
-    /// The reports that the review decides about. Another report about the same gait needs another review.
+    /// The reports that the review covers. Another report about the same gait needs another review.
     pub reports: Vec<SafetyReportId>,
     /// Decision.
     pub decision: SafetyDecision,
@@ -61,7 +61,7 @@ pub struct SafetyReview {
 pub struct NewSafetyReview<'a> {
     /// Trial of the reviewed gait.
     pub trial: TrialId,
-    /// The reports that the review decides about.
+    /// The reports that the review covers.
     pub reports: &'a [SafetyReportId],
     /// Decision.
     pub decision: SafetyDecision,

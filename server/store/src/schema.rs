@@ -264,7 +264,7 @@ pub struct SolveReport {
     pub max_violation: f64,
     /// How well the conditions of a local optimum are met. Null if unknown.
     pub optimality: Option<Optimality>,
-    /// Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes too.
+    /// Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes as well.
     pub tightened_bounds: u64,
     /// Wall time, s.
     pub seconds_total: f64,
@@ -394,7 +394,7 @@ pub struct ReturnMap {
     pub largest: f64,
     /// Largest modulus of the multipliers from differences of simulated domains.
     pub largest_by_differences: f64,
-    /// Resolution of the differences.
+    /// Resolution of the finite differences.
     pub differences_resolve: f64,
     /// Fraction of a proportional change of all velocities that remains after one stride.
     pub speed_kept: f64,

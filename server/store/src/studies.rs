@@ -203,7 +203,7 @@ pub struct Study {
     pub state: StudyState,
     /// Reason for the state; may be empty.
     pub state_reason: String,
-    /// Revision, which grows with each change.
+    /// Revision, which increases with each change.
     pub revision: i64,
     /// Time of creation.
     pub created_at: Instant,

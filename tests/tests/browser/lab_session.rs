@@ -65,7 +65,7 @@ async fn browser_clicks_through_a_lab_session_from_plan_to_unblinding() {
     let main = page.text("main").await;
     assert!(
         main.contains("softer at the heel")
-            && main.contains("The study uses this answer when the session is unblinded"),
+            && main.contains("The study will use this answer once the session is unblinded"),
         "{main}"
     );
     page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;

@@ -17,7 +17,7 @@ use gaitwright_store::BackupId;
 
 /// Back up the record
 ///
-/// Writes a backup next to the database and checks it. The backup is completed even if the caller disconnects.
+/// Writes a backup next to the database and verifies it. The backup is completed even if the caller disconnects.
 #[utoipa::path(
     post,
     path = "/backups",
@@ -50,7 +50,7 @@ pub(super) async fn create(State(app): State<AppState>, request: Idempotent<Admi
     operation_id = "get_backup",
     tag = "operation",
     params(("id" = BackupId, Path, description = "The backup")),
-    responses((status = 200, description = "Complete and checked backup", body = Backup)),
+    responses((status = 200, description = "Complete, verified backup", body = Backup)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn get(

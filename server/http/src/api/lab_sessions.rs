@@ -102,8 +102,8 @@ pub(super) struct OfWalk {
 /// Download the controller file of a lab walk
 ///
 /// The file does not name the trial, but comparing it with the controller files of both gaits reveals the allocation.
-/// It is meant for the device: a token with the scope `device` only. If anybody else fetches it, the session and the
-/// audit trail record it, and later answers of that caller do not count as blind.
+/// It is meant for the device, which uses a token with the scope `device` only. If anybody else fetches it, the session
+/// and the audit trail record it, and later answers of that caller do not count as blind.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/controller.json",

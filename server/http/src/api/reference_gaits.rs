@@ -38,7 +38,7 @@ pub(super) async fn list(
 
 /// Import a reference gait from a recording
 ///
-/// Cuts the recording at right heel strikes and averages its strides. An identical recording returns the existing
+/// Segments the recording at right heel strikes and averages its strides. An identical recording returns the existing
 /// reference gait.
 #[utoipa::path(
     post,

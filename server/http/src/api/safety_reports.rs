@@ -23,8 +23,8 @@ use utoipa::ToSchema;
 /// Safety report about a gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct SafetyReport {
-    /// Identifier of the report. If it was given in a blinded pair, an assessment or a lab session, the identifier of that
-    /// one, so that reports about both of its gaits have the same.
+    /// Identifier of the report. A report from a blinded pair, an assessment or a lab session has the identifier of that
+    /// object, so reports about both of its gaits share one identifier.
     id: SafetyReportId,
     /// Trial of the gait.
     trial_id: TrialId,

@@ -51,7 +51,7 @@ pub(super) async fn ask(
 
 /// Report the outcome of a trial
 ///
-/// A missing gait is a result too. If the script fails, cancel the trial instead.
+/// An outcome without a gait is also a result. If the script fails, cancel the trial instead.
 #[utoipa::path(
     post,
     path = "/trials/{id}/tell",

@@ -127,7 +127,7 @@ pub(super) async fn consent(
 
 /// Withdraw consent
 ///
-/// Stops every study of the subject. The data is kept, but nothing can be added, shown or exported.
+/// Stops every study of the subject. The record is kept, but nothing can be added, shown or exported.
 #[utoipa::path(
     post,
     path = "/subjects/{id}/withdraw",

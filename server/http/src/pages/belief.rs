@@ -140,7 +140,7 @@ enum Believed {
 async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
     let too_many = |what: String| {
         Ok(Believed::Absent(format!(
-            "This page is not available for studies with {what} or more, because the computation takes too long."
+            "This page is not available for studies with {what} or more, because the computation would take too long."
         )))
     };
     let mut reader = app.read().await?;

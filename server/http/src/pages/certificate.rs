@@ -49,7 +49,7 @@ impl InWords {
         }
         if let Some(pushes) = certificate.pushes {
             let words = format!(
-                "{:.2} m/s forward, {:.2} m/s backward, within {RECOVERY_STRIDES} strides",
+                "{:.2} m/s forwards, {:.2} m/s backwards, within {RECOVERY_STRIDES} strides",
                 pushes.forwards_m_s, pushes.backwards_m_s
             );
             figures.push(("Pushes at the hip from which the walker recovers", words));

@@ -26,29 +26,28 @@ const LABELS: &[(&str, &str)] = &[
     ("heel_strike_threshold", "Contact threshold"),
     ("force_column", "Column of the vertical force under the right foot"),
     ("unit", "Angle unit of an OpenSim file"),
-    ("cutoff_hz", "Low-pass cutoff, Hz"),
+    ("cutoff_hz", "Low-pass cut-off, Hz"),
     ("band_low_hz", "Band-pass from, Hz"),
     ("band_high_hz", "Band-pass to, Hz"),
-    ("envelope_hz", "Low-pass cutoff, Hz"),
+    ("envelope_hz", "Low-pass cut-off, Hz"),
     ("order", "Filter order"),
 ];
+
+/// A text in quotation marks.
+pub(super) fn quoted(text: &str) -> String {
+    format!("\u{201c}{text}\u{201d}")
+}
 
 /// A refusal under the label of its field.
 pub(super) fn of_field(label: &str, fault: &FieldError) -> String {
     let Some(allowed) = fault.allowed.as_deref() else { return fault.message.clone() };
     let given = match &fault.value {
         // The form shows names in place of identifiers.
-        Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => {
-            Some(format!("\u{201c}{text}\u{201d}"))
-        }
+        Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => Some(quoted(text)),
         Some(Value::Number(number)) => Some(number.to_string()),
         _ => None,
     };
-    let allowed = allowed.trim_end_matches('.');
-    match given {
-        Some(given) => format!("{label} is {given}; it must be {allowed}."),
-        None => format!("{label} must be {allowed}."),
-    }
+    FieldError::sentence(&quoted(label), given.as_deref(), allowed)
 }
 
 /// The sentence of an error, with the label of the refused field: from `labels`, or else the common one.

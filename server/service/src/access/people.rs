@@ -110,7 +110,7 @@ pub async fn set_disabled(writer: &mut Writer, actor: &Actor, id: UserId, disabl
     Ok(users::get(writer, id).await?)
 }
 
-/// Changes the role of a user, from the next request on. Tokens that a former administrator created are revoked.
+/// Changes the role of a user, beginning with the next request. Tokens that a former administrator created are revoked.
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] if no administrator who can sign in would be left.

@@ -114,7 +114,7 @@ pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec
 /// Retracts a preference.
 ///
 /// # Errors
-/// [`Error::NotFound`], also for a preference of another study. [`Error::Conflict`] if it was already retracted, if it
+/// [`Error::NotFound`], even for a preference of another study. [`Error::Conflict`] if it was already retracted, if it
 /// is a label, or if the subject withdrew consent.
 pub async fn retract(
     writer: &mut Writer,

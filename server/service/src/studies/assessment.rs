@@ -89,7 +89,7 @@ pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) ->
 /// Retracts an assessment, and the preference that was derived from it.
 ///
 /// # Errors
-/// [`Error::NotFound`], also for an assessment of another study. [`Error::Conflict`] if it was already retracted, or if
+/// [`Error::NotFound`], even for an assessment of another study. [`Error::Conflict`] if it was already retracted, or if
 /// the subject withdrew consent.
 pub async fn retract(
     writer: &mut Writer,

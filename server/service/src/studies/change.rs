@@ -67,7 +67,7 @@ pub struct Extend {
 /// Raises the trial budget of a study. A study that has ended resumes.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the budget would not grow, [`Error::NotFound`].
+/// [`Error::Invalid`] if the budget would not increase, [`Error::NotFound`].
 pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Extend) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
     let least = i64::from(study.plan.trial_budget) + 1;

@@ -32,7 +32,7 @@ impl ChoiceError {
 /// The next trial of a study. It depends on the snapshot alone: the same log gives the same trial, bit for bit.
 ///
 /// # Errors
-/// [`ChoiceError`], also if every action was tried.
+/// [`ChoiceError`], even if every action was tried.
 pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
     let plan = &snapshot.study.plan;
     let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);

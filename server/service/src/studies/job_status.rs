@@ -143,7 +143,7 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
 pub async fn cancel(writer: &mut Writer, caller: &Caller, runners: Runners<'_>, id: JobId) -> Result<JobStatus, Error> {
     let job = find(writer, runners, id).await?;
     if !matches!(job.state, JobState::Queued | JobState::Running) {
-        return Err(Error::conflict(format!("job {id} has ended")));
+        return Err(Error::conflict(format!("Job {id} has ended, so it cannot be cancelled.")));
     }
     match id {
         JobId::Backup(_) if !caller.may(Right::Administer) => {

@@ -49,7 +49,11 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     let open = snapshot.open();
     let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
     if tried >= study.plan.trial_budget {
-        let finished = Step::Act(Act::Finish, format!("All {} trials are done.", study.plan.trial_budget));
+        let reason = match study.plan.trial_budget {
+            1 => "The only trial is done.".to_owned(),
+            all => format!("All {all} trials are done."),
+        };
+        let finished = Step::Act(Act::Finish, reason);
         return Ok(if open == 0 { finished } else { Step::Nothing });
     }
     if let Some(reason) = snapshot.is_enough() {

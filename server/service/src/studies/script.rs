@@ -72,7 +72,10 @@ pub async fn suggest(
     drop(db);
     let plan = &snapshot.study.plan;
     if snapshot.trials.len() >= plan.trial_budget as usize {
-        return Err(Error::conflict(format!("All {} trials of the study have been handed out.", plan.trial_budget)));
+        return Err(Error::conflict(match plan.trial_budget {
+            1 => "The only trial of the study has been handed out.".to_owned(),
+            all => format!("All {all} trials of the study have been handed out."),
+        }));
     }
     if snapshot.open() >= plan.parallel_trials as usize {
         return Err(Error::conflict(match snapshot.open() {

@@ -119,7 +119,10 @@ impl StudySnapshot {
         let bests: Vec<TrialId> =
             self.trials.iter().rev().filter_map(|trial| trial.best_before).take(limit + 1).collect();
         let same = bests.len() > limit && bests.iter().all(|best| *best == bests[0]);
-        same.then(|| format!("The best action did not change in {limit} results."))
+        same.then(|| match limit {
+            1 => "The best action did not change in the last result.".to_owned(),
+            _ => format!("The best action did not change in {limit} results."),
+        })
     }
 
     /// The gait of a trial, if it is walkable.

@@ -71,7 +71,7 @@ impl PackedInput {
     /// The input of a trial's solve.
     ///
     /// # Errors
-    /// [`Error::NotFound`], also if the gait of its warm start was pruned; errors of the database.
+    /// [`Error::NotFound`], even if the gait of its warm start was pruned; errors of the database.
     pub async fn of_trial(db: &mut Connection, id: TrialId) -> Result<Self, Error> {
         let trial = trials::get(db, id).await?;
         let plan = studies::get(db, trial.study_id).await?.plan;

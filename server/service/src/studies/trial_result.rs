@@ -139,7 +139,9 @@ pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
     trial_state::after(row.state, Happening::Retried).map_err(|e| Error::conflict(e.to_string()))?;
     if row.asked_by.is_some() {
-        return Err(Error::conflict("This trial is evaluated by a script, which has to ask for another trial."));
+        return Err(Error::conflict(
+            "A script evaluates this trial, so it cannot be queued again. The script must ask for another trial.",
+        ));
     }
     jobs::reopen(writer, trial).await?;
     trials::requeue(writer, trial, "").await?;

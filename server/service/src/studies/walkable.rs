@@ -140,7 +140,7 @@ pub enum NotWalkable {
         number: u32,
     },
     /// The trajectory was pruned before it was certified.
-    #[error("The gait of trial {number} was pruned before it was certified.")]
+    #[error("The trajectory of trial {number} was deleted before its gait was certified.")]
     Pruned {
         /// Number of the trial.
         number: u32,
@@ -249,7 +249,7 @@ impl Grounds {
 /// The gait of a trial, if it may reach a person.
 ///
 /// # Errors
-/// Errors of the database, also for a trial that does not exist.
+/// Errors of the database, even for a trial that does not exist.
 pub async fn admit(db: &mut Connection, trial: TrialId) -> StoreResult<Result<WalkableGait, NotWalkable>> {
     let trial = trials::get(db, trial).await?;
     Ok(Grounds::read_for(db, trial.study_id, &[trial.id]).await?.admit(&trial))
@@ -258,7 +258,7 @@ pub async fn admit(db: &mut Connection, trial: TrialId) -> StoreResult<Result<Wa
 /// Whether both gaits of an earlier pair are still walkable.
 ///
 /// # Errors
-/// Errors of the database, also for a trial that does not exist.
+/// Errors of the database, even for a trial that does not exist.
 pub async fn are_walkable(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<bool> {
     Ok(admit(db, a).await?.is_ok() && admit(db, b).await?.is_ok())
 }

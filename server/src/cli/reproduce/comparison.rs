@@ -114,7 +114,7 @@ impl Verdict {
 
     pub(super) fn sentence(&self) -> String {
         let last = self.last.map_or_else(
-            || "no final gait in both".to_owned(),
+            || "at least one of the two studies has no gait".to_owned(),
             |(without, with)| format!("at the end {with:.4} rad with, {without:.4} rad without"),
         );
         format!(
@@ -163,7 +163,7 @@ pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
     let answer = match throughout {
         _ if pairs == 0 => "cannot be tested: there is no pair of studies",
         1 if pairs == 1 => {
-            "holds in the only pair, which says little: local optima can turn it either way, so repeat with more seeds"
+            "holds in the only pair, which says little: local optima can tip the result either way, so repeat with more seeds"
         }
         all if all == pairs => "holds in every pair",
         0 => "holds in no pair",
@@ -172,8 +172,9 @@ pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
     let lower: usize = verdicts.iter().map(|v| v.lower).sum();
     let compared: usize = verdicts.iter().map(|v| v.compared).sum();
     format!(
-        "{paper} {answer} ({throughout} of {pairs}). Muscles are lower at {lower} of {compared} iterations, and at the end \
-         in {at_the_end} of {pairs} pairs{}.",
+        "{paper} {answer} ({throughout} of {pairs}). Gait RMSE is lower with muscles at {lower} of {compared} iterations, \
+         and at the end in {at_the_end} of {pairs} pair{}{}.",
+        if pairs == 1 { "" } else { "s" },
         spread(verdicts)
     )
 }
@@ -187,9 +188,9 @@ fn spread(verdicts: &[Verdict]) -> String {
             let median = f64::midpoint(gains[(gains.len() - 1) / 2], gains[gains.len() / 2]);
             if median < 0.0 {
                 let (median, least, most) = (-median, -most, -least);
-                format!("; they raise the final Gait RMSE by a median of {median:.3} rad ({least:.3} to {most:.3})")
+                format!("; muscles raise the final Gait RMSE by a median of {median:.3} rad ({least:.3} to {most:.3})")
             } else {
-                format!("; they lower the final Gait RMSE by a median of {median:.3} rad ({least:.3} to {most:.3})")
+                format!("; muscles lower the final Gait RMSE by a median of {median:.3} rad ({least:.3} to {most:.3})")
             }
         }
         _ => String::new(),
@@ -313,11 +314,11 @@ mod tests {
         assert!(found[1].throughout());
         let words = conclusion(&found);
         assert!(words.contains("only some pairs, depending on local optima (1 of 2)."), "{words}");
-        assert!(words.contains("lower at 4 of 5 iterations, and at the end in 1 of 2 pairs"), "{words}");
+        assert!(words.contains("lower with muscles at 4 of 5 iterations, and at the end in 1 of 2 pairs"), "{words}");
         assert!(words.contains("by a median of 0.050 rad (-0.100 to 0.200)"), "{words}");
         assert!(conclusion(&found[1..]).contains("holds in the only pair, which says little"));
         assert!(conclusion(&[found[1].clone(), found[1].clone()]).contains("holds in every pair (2 of 2)"));
-        assert!(conclusion(&found[..1]).contains("they raise the final Gait RMSE by a median of 0.100 rad"));
+        assert!(conclusion(&found[..1]).contains("muscles raise the final Gait RMSE by a median of 0.100 rad"));
         assert!(conclusion(&[]).contains("cannot be tested"));
     }
 

@@ -66,7 +66,7 @@ pub(super) struct Reproduce {
     /// First seed. Both studies of a subject use the same seed.
     #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Number of consecutive seeds. Several are needed, because local optima can turn the comparison either way.
+    /// Number of consecutive seeds. Several are needed, because local optima can tip the comparison either way.
     #[arg(long, default_value = "3", value_name = "NUMBER", value_parser = seeds, allow_negative_numbers = true)]
     seeds: u64,
     /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.

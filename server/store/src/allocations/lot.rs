@@ -48,7 +48,7 @@ impl Lot {
     }
 
     /// Whether gait one comes first. `lead` is how many more unblinded sessions gait one came first in than gait two.
-    /// The coin is fair up to a lead of two; from three on, the rarer order has a probability of three quarters.
+    /// The coin is fair up to a lead of two; at three or more, the rarer order has a probability of three quarters.
     pub(super) fn one_first(self, lead: i64) -> bool {
         if lead.unsigned_abs() < TOLERANCE {
             return self.coin();
@@ -97,7 +97,7 @@ mod tests {
     fn sessions_unblinded_one_by_one_stay_balanced() {
         let leads: Vec<u64> = in_order(100_000).iter().map(|(lead, _)| lead.unsigned_abs()).collect();
         let share = |least: u64| leads.iter().filter(|lead| **lead >= least).count() as f64 / leads.len() as f64;
-        // Exact: 2/7 from three on, then a third for each further one.
+        // Exact: 2/7 at three or more, then a third for each further one.
         for (least, exact) in [(3, 2.0 / 7.0), (4, 2.0 / 21.0), (5, 2.0 / 63.0), (6, 2.0 / 189.0)] {
             assert!((share(least) - exact).abs() < 0.1 * exact, "a lead of {least}: {} for {exact}", share(least));
         }

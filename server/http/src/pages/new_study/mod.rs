@@ -6,7 +6,7 @@ mod space_editor;
 use self::chosen_reference::Choice;
 use self::space_editor::SpaceEditor;
 use super::error::{Page, PageError, page};
-use super::format;
+use super::{format, refusal};
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
@@ -316,8 +316,8 @@ fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
             // A bound has one row in the table, whatever part of the study refuses it.
             let last = refused.field.rsplit('.').next().filter(|last| TunedBounds::NAMES.contains(last));
             let field = last.unwrap_or(&refused.field).to_owned();
-            let said = refused.message.strip_prefix(&refused.field).map(|said| format!("{}{said}", label(&field)));
-            Ok(FieldError { field, message: said.unwrap_or(refused.message), ..*refused })
+            let message = refusal::of_field(&label(&field), &refused);
+            Ok(FieldError { field, message, ..*refused })
         }
         Error::Conflict(message) => Ok(FieldError {
             field: "pseudonym".to_owned(),

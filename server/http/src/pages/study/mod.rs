@@ -571,9 +571,9 @@ fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
     let solves = |count: u32| if count == 1 { "1 solve".to_owned() } else { format!("{count} solves") };
     match (running, queued.saturating_sub(1)) {
         (0, _) => "The next solve is queued. No worker is running.".to_owned(),
-        (_, 0) => format!("The next solve is queued: {} of other studies running.", solves(running)),
+        (_, 0) => format!("The next solve is queued. Running: {} of other studies.", solves(running)),
         (_, others) => {
-            format!("The next solve is queued: {} of other studies running, {} more queued.", solves(running), others)
+            format!("The next solve is queued. Running: {} of other studies; queued: {} more.", solves(running), others)
         }
     }
 }

@@ -151,13 +151,13 @@ fn states(chosen: Option<TrialState>) -> Vec<StateChoice> {
 fn extent(shown: u32, offset: u32, matching: u32, total: u32) -> String {
     let count = |value: u32| format::count(value.into());
     if shown == 0 {
-        return format!("No matching trials among {}.", count(total));
+        return format!("No matching trials; {} in total.", count(total));
     }
     let (first, last) = (count(offset + 1), count(offset + shown));
     if matching < total {
-        format!("{first} to {last} of {} matching trials; {} trials in total.", count(matching), count(total))
+        format!("Matching trials: {first} to {last} of {}; {} in total.", count(matching), count(total))
     } else {
-        format!("{first} to {last} of {} trials. The downloads have all of them.", count(total))
+        format!("Trials {first} to {last} of {}. The downloads contain all of them.", count(total))
     }
 }
 

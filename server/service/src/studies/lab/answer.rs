@@ -30,7 +30,8 @@ const LONGEST_NOTE: usize = 2000;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewLabAnswer)]
 pub struct NewAnswer {
-    /// Number of the answer, as in the question. An answer that is sent twice counts once.
+    /// Number of the answer: `asks` or, for a report of an unsafe walk, `reports` of the session. An answer that is sent
+    /// twice counts once.
     #[schema(minimum = 1)]
     pub number: u32,
     /// The answer. First is walk 2, second is walk 3. `withdrawn` is reserved for the service.
@@ -41,11 +42,11 @@ pub struct NewAnswer {
     pub note: String,
 }
 
-/// Records the answer of the subject. A safety report is accepted at any time, also in a closed session.
+/// Records the answer of the subject. A safety report is accepted at any time, even in a closed session.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the subject withdrew consent; for an answer other than a
-/// safety report also if there is another answer, before all walks are recorded, and in a closed session.
+/// safety report even if there is another answer, before all walks are recorded, and in a closed session.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
     if new.answer == Judgement::Withdrawn {
         return Err(Error::invalid(

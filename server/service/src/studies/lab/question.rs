@@ -16,7 +16,7 @@ pub const WALKS: u8 = 3;
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = LabAnswer)]
 pub struct AnswerView {
-    /// Number of the answer, from 1. It grows when an answer is retracted.
+    /// Number of the answer, from 1. It increases by one when an answer is retracted.
     pub number: u32,
     /// The answer. First is walk 2, second is walk 3.
     pub answer: Judgement,

@@ -325,9 +325,9 @@ pub struct InTheLab {
     pub walks: u8,
     /// Time at which the last walk was recorded.
     pub last_recorded: Option<Instant>,
-    /// Number of the answer that is asked for. Absent before the last walk and after an answer.
+    /// Number to send with the answer. Absent before the last walk and after an answer.
     pub asks: Option<u32>,
-    /// Number of the answer that reports an unsafe walk. Absent while nobody can have walked with the device.
+    /// Number to send with a report of an unsafe walk. Absent until the subject may have walked with the device.
     pub reports: Option<u32>,
     /// Current answer of the subject.
     pub answer: Option<AnswerView>,

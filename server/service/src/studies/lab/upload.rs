@@ -93,7 +93,7 @@ impl EmgReading {
                 given.to_vec()
             }
             (_, given) => {
-                let allowed = "at least two times, or none if a heel strike column is given";
+                let allowed = "at least two heel-strike times, or none if a heel strike column is given";
                 return Err(Error::invalid("reading.heel_strikes_s", json!(given), allowed));
             }
         };
