@@ -174,7 +174,7 @@ async fn rater_answer_counts_for_the_gait_shown_on_that_side() {
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, answer).await;
         let feedback = service.feedback(study).await;
-        let heard = feedback.iter().filter(|row| row.by_rater).map(|row| row.said);
+        let heard = feedback.iter().filter(|row| row.by_rater).map(|row| row.content);
         for (said, (first, second)) in heard.zip(sides(&service.store, study).await) {
             let (winner, loser) = if answer == "first" { (first, second) } else { (second, first) };
             assert_eq!(said, gaitwright_store::feedback::FeedbackContent::Preference { winner, loser });

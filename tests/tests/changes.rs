@@ -258,7 +258,7 @@ fn essence(trials: &[Trial], heard: &[FeedbackRow]) -> Vec<String> {
     heard
         .iter()
         .map(|row| {
-            let said = serde_json::to_value(row.said).unwrap();
+            let said = serde_json::to_value(row.content).unwrap();
             let named: Vec<String> = said
                 .as_object()
                 .unwrap()

@@ -148,7 +148,7 @@ async fn nothing_is_lost_or_doubled(service: &Service, study: StudyId) {
     for trial in service.trials(study).await {
         let labels = feedback
             .iter()
-            .filter(|row| matches!(row.said, FeedbackContent::Label { trial: of, .. } if of == trial.id));
+            .filter(|row| matches!(row.content, FeedbackContent::Label { trial: of, .. } if of == trial.id));
         assert_eq!(labels.count(), 1, "labels of trial {}", trial.number);
         let brought = results::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
         assert_eq!(brought.iter().filter(|result| result.taken).count(), 1, "{brought:?}");
@@ -225,7 +225,9 @@ async fn a_job_that_is_cancelled(mut rig: Rig) {
     };
     service.wait_for(study, &[StudyState::Finished]).await;
     let feedback = service.feedback(study).await;
-    assert!(!feedback.iter().any(|row| matches!(row.said, FeedbackContent::Label { trial, .. } if trial == running)));
+    assert!(
+        !feedback.iter().any(|row| matches!(row.content, FeedbackContent::Label { trial, .. } if trial == running))
+    );
     let brought = results::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
     assert!(brought.iter().all(|result| !result.taken), "{brought:?}");
     service.stop().await;

@@ -358,7 +358,7 @@ async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_sid
             .feedback(study)
             .await
             .iter()
-            .filter_map(|row| match row.said {
+            .filter_map(|row| match row.content {
                 gaitwright_store::feedback::FeedbackContent::Label { trial, .. } => Some(trial),
                 _ => None,
             })

@@ -252,7 +252,7 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let (first, second) = row.walked().unwrap();
     assert_eq!(
-        rows.iter().map(|row| row.said).collect::<Vec<_>>(),
+        rows.iter().map(|row| row.content).collect::<Vec<_>>(),
         [FeedbackContent::Preference { winner: second, loser: first }]
     );
     let pseudonym = service.fetch(&format!("/api/v1/studies/{study}")).await.json()["subject_id"].clone();

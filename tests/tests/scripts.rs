@@ -230,7 +230,7 @@ async fn a_trial_that_did_not_converge_counts_in_its_batch_and_is_compared_with_
         .feedback(study)
         .await
         .iter()
-        .filter_map(|row| match row.said {
+        .filter_map(|row| match row.content {
             FeedbackContent::Preference { winner, loser } => Some((numbers[&winner], numbers[&loser])),
             _ => None,
         })

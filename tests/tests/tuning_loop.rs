@@ -70,7 +70,7 @@ async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
 
     // Each result has one label; each converged one is compared with the converged one recorded before it.
     let feedback = service.feedback(study).await;
-    let labels = feedback.iter().filter(|row| matches!(row.said, FeedbackContent::Label { .. })).count();
+    let labels = feedback.iter().filter(|row| matches!(row.content, FeedbackContent::Label { .. })).count();
     assert_eq!(labels, 15);
     let mut last: Option<&Trial> = None;
     let mut compared = 0;
@@ -78,7 +78,7 @@ async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
         let answers: Vec<_> = feedback
             .iter()
             .filter(|row| row.source == Source::GaitRmse)
-            .filter(|row| match row.said {
+            .filter(|row| match row.content {
                 FeedbackContent::Preference { winner, loser } => {
                     let newer = if winner > loser { winner } else { loser };
                     newer == trial.id
@@ -91,7 +91,7 @@ async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
                 assert_eq!(answers.len(), 1, "trial {}", trial.number);
                 compared += 1;
                 let better = if trial.gait_rmse_rad < before.gait_rmse_rad { trial.id } else { before.id };
-                assert!(matches!(answers[0].said, FeedbackContent::Preference { winner, .. } if winner == better));
+                assert!(matches!(answers[0].content, FeedbackContent::Preference { winner, .. } if winner == better));
             }
             _ => assert!(answers.is_empty(), "trial {}", trial.number),
         }
@@ -149,7 +149,9 @@ async fn panicking_solve_is_retried_then_fails_and_never_reaches_the_learner() {
     assert!(trials[1].message.contains("panics"), "{}", trials[1].message);
     let feedback = service.feedback(study).await;
     assert!(
-        feedback.iter().all(|row| !matches!(row.said, FeedbackContent::Label { trial, .. } if trial == trials[1].id))
+        feedback
+            .iter()
+            .all(|row| !matches!(row.content, FeedbackContent::Label { trial, .. } if trial == trials[1].id))
     );
     service.stop().await;
 }

@@ -379,8 +379,8 @@ mod tests {
     fn chart_has_position_and_range_of_its_axes() {
         let svg =
             Chart::new("", "time, s", "angle, °").with("one", 0, Stroke::Solid, vec![(2.0, 1.0), (4.0, 3.0)]).svg();
-        for said in ["data-right=\"74 ", " 2 4\"", "data-logarithmic=\"false\"", "data-across=\"time, s\""] {
-            assert!(svg.contains(said), "{said}: {svg}");
+        for part in ["data-right=\"74 ", " 2 4\"", "data-logarithmic=\"false\"", "data-across=\"time, s\""] {
+            assert!(svg.contains(part), "{part}: {svg}");
         }
     }
 

@@ -92,7 +92,7 @@ mod tests {
         let mut fields = BTreeSet::new();
         for (component, field, rule) in RULES {
             let place = format!("/components/schemas/{component}/properties/{field}/x-depends");
-            assert_eq!(document.pointer(&place).and_then(|said| said.as_str()), Some(rule), "{component}.{field}");
+            assert_eq!(document.pointer(&place).and_then(|text| text.as_str()), Some(rule), "{component}.{field}");
             assert!(fields.insert((component, field)), "{component}.{field}");
         }
     }

@@ -90,11 +90,11 @@ pub(super) fn state(document: &mut Value) {
         }
         let assessments = json!({ "enum": ["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"] });
         set(schemas, "NewAssessment", "answer", assessments);
-        let said = json!({ "enum": [
+        let answers = json!({ "enum": [
             "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both",
         ] });
         for component in ["RaterAnswer", "NewLabAnswer"] {
-            set(schemas, component, "answer", said.clone());
+            set(schemas, component, "answer", answers.clone());
         }
         for field in ["gait_rmse_rad", "cost_of_transport"] {
             add(schemas, "Tell", field, &json!({ "minimum": 0, "exclusiveMaximum": 1e6 }));
@@ -352,8 +352,8 @@ fn add(schemas: &mut Map<String, Value>, component: &str, field: &str, rule: &Va
 fn set(schemas: &mut Map<String, Value>, component: &str, field: &str, mut schema: Value) {
     let Some(present) = property(schemas, component, field) else { return };
     let nested = present.get("oneOf").and_then(|parts| parts.get(0)).and_then(|part| part.get("description"));
-    if let (Some(said), Some(new)) = (present.get("description").or(nested), schema.as_object_mut()) {
-        new.insert("description".to_owned(), said.clone());
+    if let (Some(text), Some(new)) = (present.get("description").or(nested), schema.as_object_mut()) {
+        new.insert("description".to_owned(), text.clone());
     }
     if let Value::Object(schema) = schema {
         *present = schema;

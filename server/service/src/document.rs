@@ -60,7 +60,7 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
         (_, Some(_)) => "present only once".to_owned(),
         _ => expected(message),
     };
-    let said = match (missing, twice) {
+    let message = match (missing, twice) {
         (Some(_), _) => format!("The field {field} is missing{place}."),
         (_, Some(_)) => format!("The field {field} occurs twice{place}."),
         _ if message.starts_with("unknown field") => {
@@ -68,7 +68,7 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
         }
         _ => format!("The field {field} is {}{place}; it must be {allowed}.", shortened(&value)),
     };
-    Error::Unreadable(Box::new(FieldError { message: said, field, value: Some(value), allowed: Some(allowed) }))
+    Error::Unreadable(Box::new(FieldError { message, field, value: Some(value), allowed: Some(allowed) }))
 }
 
 /// Line and column in words. The second pass, which reads values, has no position, so the position of the field is

@@ -50,7 +50,7 @@ pub struct NewAssessment<'a> {
     /// The two gaits.
     pub pair: (TrialId, TrialId),
     /// The judgement.
-    pub said: Judgement,
+    pub judgement: Judgement,
     /// Source, author and note.
     pub attribution: Attribution<'a>,
     /// The derived preference, if any.
@@ -71,7 +71,7 @@ pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult
     .bind(new.study)
     .bind(new.pair.0)
     .bind(new.pair.1)
-    .bind(new.said.as_str())
+    .bind(new.judgement.as_str())
     .bind(new.attribution.source.as_str())
     .bind(new.attribution.author)
     .bind(new.attribution.note)

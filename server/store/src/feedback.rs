@@ -93,8 +93,7 @@ pub struct FeedbackRow {
     /// The study.
     pub study_id: StudyId,
     /// Content of the entry.
-    #[serde(rename = "content")]
-    pub said: FeedbackContent,
+    pub content: FeedbackContent,
     /// Source.
     pub source: Source,
     /// Author.
@@ -151,11 +150,11 @@ pub struct Attribution<'a> {
 pub async fn append(
     db: &mut Connection,
     study: StudyId,
-    said: &FeedbackContent,
+    content: &FeedbackContent,
     attribution: Attribution<'_>,
 ) -> StoreResult<FeedbackId> {
     let id = FeedbackId::fresh();
-    let (kind, a, b, category, suggested) = match *said {
+    let (kind, a, b, category, suggested) = match *content {
         FeedbackContent::Label { trial, category } => ("label", trial, None, Some(category), None),
         FeedbackContent::Preference { winner, loser } => ("preference", winner, Some(loser), None, None),
         FeedbackContent::Tie { a, b } => ("tie", a, Some(b), None, None),
@@ -404,7 +403,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
     let category: Option<u32> = row.try_get("category")?;
     let suggested: Option<i64> = row.try_get("suggested")?;
     let kind: &str = row.try_get("kind")?;
-    let said = match (kind, b, category, suggested) {
+    let content = match (kind, b, category, suggested) {
         ("label", None, Some(category), None) => FeedbackContent::Label { trial: a, category },
         ("preference", Some(loser), None, None) => FeedbackContent::Preference { winner: a, loser },
         ("tie", Some(b), None, None) => FeedbackContent::Tie { a, b },
@@ -422,7 +421,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         seq: row.try_get("seq")?,
         id: row.try_get("id")?,
         study_id: row.try_get("study_id")?,
-        said,
+        content,
         source: row.try_get::<&str, _>("source")?.parse()?,
         author: row.try_get("author")?,
         note: row.try_get("note")?,

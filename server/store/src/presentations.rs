@@ -147,7 +147,7 @@ impl FromStr for Judgement {
     fn from_str(text: &str) -> StoreResult<Self> {
         Self::ALL
             .into_iter()
-            .find(|said| said.as_str() == text)
+            .find(|judgement| judgement.as_str() == text)
             .ok_or_else(|| StoreError::Damaged { what: "presentation answer", reason: text.to_owned() })
     }
 }
@@ -248,7 +248,7 @@ pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<P
 #[derive(Debug, Clone, Copy)]
 pub struct NewAnswer<'a> {
     /// The judgement of the pair.
-    pub said: Judgement,
+    pub judgement: Judgement,
     /// Response time by the rater's clock, ms.
     pub response_ms: Option<i64>,
     /// Free text.
@@ -269,7 +269,7 @@ pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>)
          created_at) values (?, ?, ?, ?, ?, ?, ?) on conflict (presentation_id) do nothing",
     )
     .bind(id)
-    .bind(new.said.as_str())
+    .bind(new.judgement.as_str())
     .bind(new.response_ms)
     .bind(new.note)
     .bind(new.feedback)
@@ -341,8 +341,11 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Pr
 /// # Errors
 /// Errors of the database.
 pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
-    let assessments: Vec<&str> =
-        Judgement::ALL.iter().filter(|said| said.is_assessment()).map(|said| said.as_str()).collect();
+    let assessments: Vec<&str> = Judgement::ALL
+        .iter()
+        .filter(|judgement| judgement.is_assessment())
+        .map(|judgement| judgement.as_str())
+        .collect();
     let assessments = assessments.join("', '");
     let sql = format!(
         "{SELECT} where p.study_id = ? and a.answer in ('{assessments}') and r.presentation_id is null order by p.id"

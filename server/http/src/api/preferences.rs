@@ -82,7 +82,7 @@ fn table(rows: &[FeedbackRow]) -> CsvTable {
         "retraction_reason",
     ]);
     for row in rows {
-        let (kind, a, b) = match row.said {
+        let (kind, a, b) = match row.content {
             FeedbackContent::Preference { winner, loser } => ("preference", winner, loser),
             FeedbackContent::Tie { a, b } => ("tie", a, b),
             FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => continue,

@@ -254,8 +254,8 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
             if row.study_id != snapshot.study.id {
                 return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
             }
-            let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
-            let other_answers = answer::other_answers(db, &row).await?.into_iter().filter_map(said).collect();
+            let in_words = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
+            let other_answers = answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
             answer_in_words(&row, snapshot).map(|text| Saved {
                 id: saved,
                 text,
@@ -334,7 +334,7 @@ impl Submitted {
             let (author, note) = (author.clone(), note.clone());
             Said::Assessment(NewAssessment { first: a, second: b, answer, source, author, note })
         };
-        let said = match self.answer.as_str() {
+        let judgement = match self.answer.as_str() {
             "a" => preference(PairAnswer::A),
             "b" => preference(PairAnswer::B),
             "no_difference" => preference(PairAnswer::NoDifference),
@@ -347,14 +347,14 @@ impl Submitted {
                 return Err(Error::invalid("answer", other, allowed));
             }
         };
-        Ok((said, identifier("key", &self.key)?))
+        Ok((judgement, identifier("key", &self.key)?))
     }
 
     /// A digest that distinguishes this answer from another one with the same key.
     fn fingerprint(&self, study: StudyId) -> String {
         let Self { a, b, answer, source, author, note, key } = self;
-        let said = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
-        fingerprint("form", &format!("/studies/{study}/compare"), said.as_bytes())
+        let sent = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
+        fingerprint("form", &format!("/studies/{study}/compare"), sent.as_bytes())
     }
 }
 
@@ -414,27 +414,27 @@ pub(super) async fn post(
 }
 
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
-    let (said, key) = form.read()?;
+    let (judgement, key) = form.read()?;
     let mut writer = app.write().await?;
     // The key of the form makes a repeated form (double click, reload, two tabs) count once.
     let request = form.fingerprint(id);
     // A safety report has a key of its own, because it is recorded even if the form was sent before with another answer.
-    let key = if said.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
+    let key = if judgement.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
     let before = idempotency::find(&mut writer, &caller.actor, &key).await?;
     // A report that staff have reviewed since is a new one.
-    let is_reviewed = before.is_some() && !said.still_closes(&mut writer, id).await?;
+    let is_reviewed = before.is_some() && !judgement.still_closes(&mut writer, id).await?;
     if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;
         let recorded = Recorded::try_from(before.body)?;
         return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
     }
     // A second answer is refused, and the page shows the first one. A safety report is always accepted.
-    if !said.is_about_safety()
+    if !judgement.is_about_safety()
         && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
     {
         return Ok(Given::Elsewhere(saved));
     }
-    let saved = match said {
+    let saved = match judgement {
         Said::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
         Said::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };

@@ -106,8 +106,8 @@ pub(super) fn besides_solves(mode: FeedbackMode) -> &'static str {
 }
 
 /// The answer of the subject in a lab session; first is walk 2.
-pub(super) fn walks_in_words(said: Judgement) -> &'static str {
-    match said {
+pub(super) fn walks_in_words(judgement: Judgement) -> &'static str {
+    match judgement {
         Judgement::First => "walk 2 was better, the first with the device",
         Judgement::Second => "walk 3 was better, the second with the device",
         Judgement::NoDifference => "no difference between walk 2 and walk 3",

@@ -91,8 +91,8 @@ pub(super) async fn get(
     let unsafe_elsewhere =
         elsewhere.map(|other| format!("The same gait was reported as unsafe in {other}. Do not walk with it."));
     let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = reports;
-    for said in [&mut unsafe_by, &mut lifted] {
-        said.retain(|closed| closed.trial == id);
+    for reports in [&mut unsafe_by, &mut lifted] {
+        reports.retain(|closed| closed.trial == id);
     }
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     let last_event = events::last(&mut reader, study.id).await?;

@@ -149,7 +149,7 @@ struct SessionPage {
     portraits: Vec<Drawn>,
     refused: Option<String>,
     /// The answer of the subject, in words.
-    said: &'static str,
+    answer_in_words: &'static str,
     session: SessionView,
 }
 
@@ -294,7 +294,7 @@ async fn show(
         measured: emg.as_ref().map(|emg| Measured::of(&session, emg, drawings.emg)),
         portraits: drawings.portraits,
         refused,
-        said: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),
+        answer_in_words: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),
         session,
     })
 }

@@ -33,7 +33,7 @@ struct LabPage {
 struct WalkPage {
     name: String,
     /// The answer in force.
-    said: &'static str,
+    answer_in_words: &'static str,
     seen: InTheLab,
     refused: Option<String>,
     /// The note of a refused form.
@@ -72,8 +72,8 @@ pub(super) async fn get(_: Authorized<Rate>, State(app): State<AppState>, Id(id,
 
 async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> Page {
     let seen = lab::in_the_lab(&mut *app.read().await?, id).await?;
-    let said = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
-    page(&WalkPage { name: id.short(), said, seen, refused, typed })
+    let answer_in_words = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
+    page(&WalkPage { name: id.short(), answer_in_words, seen, refused, typed })
 }
 
 /// `POST /lab/{id}`.

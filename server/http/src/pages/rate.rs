@@ -167,8 +167,8 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, E
 
 async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, Error> {
     let can_be_retracted = blind::can_be_retracted(db, &shown.presentation).await?;
-    Ok(shown.answer().zip(shown.presentation.answered_at).map(|(said, at)| Saved {
-        answer: said,
+    Ok(shown.answer().zip(shown.presentation.answered_at).map(|(judgement, at)| Saved {
+        answer: judgement,
         at: at.minute(),
         number: shown.presentation.number,
         token: shown.presentation.token,

@@ -165,8 +165,8 @@ async fn show_list(
     let next = found.last().filter(|_| more).map(|subject| subject.id);
     let mut rows = Vec::with_capacity(found.len());
     for subject in found {
-        let said = consents::of_subject(&mut reader, subject.id).await?;
-        rows.push(Row { subject, consent: said.last().map_or("not on record", |last| last.kind.as_str()) });
+        let consents = consents::of_subject(&mut reader, subject.id).await?;
+        rows.push(Row { subject, consent: consents.last().map_or("not on record", |last| last.kind.as_str()) });
     }
     page(&SubjectsPage { subjects: rows, next, may_run, fields, refused })
 }

@@ -58,13 +58,14 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     let study = studies::get(writer, study).await?;
     let attribution = attribution(caller, answer.source, answer.author.as_deref(), &answer.note)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
-    let said = match answer.answer {
+    let judgement = match answer.answer {
         PairAnswer::A => Judgement::First,
         PairAnswer::B => Judgement::Second,
         PairAnswer::NoDifference => Judgement::NoDifference,
     };
     let fields = ("trial_a", "trial_b");
-    let statement = GivenJudgement { study: study.id, pair: (a, b), fields, said, attribution, again: Again::Refused };
+    let statement =
+        GivenJudgement { study: study.id, pair: (a, b), fields, judgement, attribution, again: Again::Refused };
     let heard = preference::hear(writer, statement).await?;
     let id = heard.ok_or_else(|| Error::Internal("a preference did not reach the learner".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
@@ -105,7 +106,7 @@ const BESIDE: u32 = 20;
 /// # Errors
 /// Errors of the database.
 pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
-    let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b }) = row.said else {
+    let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b }) = row.content else {
         return Ok(Vec::new());
     };
     Ok(feedback::of_pair(db, (a, b), Some(&row.author), BESIDE).await?)
@@ -132,7 +133,7 @@ pub async fn retract(
         return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
     }
     consents::may_be_shown(writer, row.study_id).await?;
-    if matches!(row.said, FeedbackContent::Label { .. }) {
+    if matches!(row.content, FeedbackContent::Label { .. }) {
         return Err(Error::conflict("Only a preference can be retracted. This entry is the label of a solve."));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;

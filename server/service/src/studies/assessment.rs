@@ -61,7 +61,7 @@ pub async fn give(
         study: study.id,
         pair: (new.first, new.second),
         fields: ("first", "second"),
-        said: new.answer,
+        judgement: new.answer,
         attribution,
         again: Again::Refused,
     };
@@ -78,10 +78,12 @@ pub async fn give(
 /// As [`preference::hear`].
 pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<AssessmentId, Error> {
     let heard = preference::hear(writer, statement).await?;
-    let GivenJudgement { study, pair, said, attribution, .. } = statement;
-    let id =
-        assessments::insert(writer, &assessments::NewAssessment { study, pair, said, attribution, feedback: heard })
-            .await?;
+    let GivenJudgement { study, pair, judgement, attribution, .. } = statement;
+    let id = assessments::insert(
+        writer,
+        &assessments::NewAssessment { study, pair, judgement, attribution, feedback: heard },
+    )
+    .await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "assessment_id": id })).await?;
     Ok(id)
 }

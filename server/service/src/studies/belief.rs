@@ -70,7 +70,7 @@ impl Belief {
 /// Winner and loser of a preference between two trials with different actions.
 fn preferred(snapshot: &StudySnapshot, row: &FeedbackRow) -> Option<(ActionIndex, ActionIndex)> {
     let action = |id| snapshot.trial(id).map(|trial| trial.action_index);
-    match row.said {
+    match row.content {
         FeedbackContent::Preference { winner, loser } => {
             Some((action(winner)?, action(loser)?)).filter(|(winner, loser)| winner != loser)
         }

@@ -34,7 +34,7 @@ pub fn results(snapshot: &StudySnapshot) -> Vec<&Trial> {
 /// The same, with the time at which each result was recorded.
 fn labelled(snapshot: &StudySnapshot) -> Vec<(Instant, &Trial)> {
     let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
-    let label = |row: &FeedbackRow| match row.said {
+    let label = |row: &FeedbackRow| match row.content {
         FeedbackContent::Label { trial, .. } => by_id.get(&trial).map(|trial| (row.created_at, *trial)),
         _ => None,
     };

@@ -79,7 +79,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
     let question = comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
     let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
     let mut likely: Vec<NewTrial> = Vec::new();
-    for said in [
+    for content in [
         FeedbackContent::Preference { winner: a, loser: b },
         FeedbackContent::Preference { winner: b, loser: a },
         FeedbackContent::Tie { a, b },
@@ -90,7 +90,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             seq: snapshot.feedback.last().map_or(1, |row| row.seq + 1),
             id: FeedbackId::fresh(),
             study_id: snapshot.study.id,
-            said,
+            content,
             source: Source::Subject,
             author: String::new(),
             note: String::new(),

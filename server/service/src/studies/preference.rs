@@ -34,7 +34,7 @@ pub struct GivenJudgement<'a> {
     /// The names of their fields in the request.
     pub fields: (&'a str, &'a str),
     /// The judgement.
-    pub said: Judgement,
+    pub judgement: Judgement,
     /// The author.
     pub attribution: Attribution<'a>,
     /// Whether the author may have answered before.
@@ -51,7 +51,7 @@ pub struct GivenJudgement<'a> {
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a
 /// second answer.
 pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let GivenJudgement { study, pair, fields, said, attribution, again } = statement;
+    let GivenJudgement { study, pair, fields, judgement, attribution, again } = statement;
     if !matches!(attribution.source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician or script"));
     }
@@ -59,7 +59,7 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
         let allowed = "a different trial: a gait cannot be compared with itself";
         return Err(Error::invalid(fields.1, pair.1.to_string(), allowed));
     }
-    if said.is_about_safety() {
+    if judgement.is_about_safety() {
         return report_unsafe(writer, statement).await;
     }
     let pair = walkable::admit_pair(writer, study, fields, pair).await?;
@@ -67,15 +67,15 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
         let before = standing_answer(writer, study, pair.trials(), attribution.author).await?;
         before.map_or(Ok(()), |_| Err(answered_before(attribution.author)))?;
     }
-    match said.heard(pair.trials()) {
-        Some(said) => Ok(Some(feedback::append(writer, study, &said, attribution).await?)),
+    match judgement.heard(pair.trials()) {
+        Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),
     }
 }
 
 /// Handles a safety report. A gait that was already reported does not lose again in the learner's log.
 async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let GivenJudgement { study, pair, fields, said, attribution, .. } = statement;
+    let GivenJudgement { study, pair, fields, judgement, attribution, .. } = statement;
     let first = converged(writer, study, fields.0, pair.0).await?;
     let second = converged(writer, study, fields.1, pair.1).await?;
     let grounds = Grounds::read_for(writer, study, &[first.id, second.id]).await?;
@@ -83,9 +83,9 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
         return Err(NotWalkable::Withdrawn.into());
     }
     let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.closes(trial));
-    let heard = said.heard(pair).filter(|_| both_open && !is_same_gait(&first, &second));
+    let heard = judgement.heard(pair).filter(|_| both_open && !is_same_gait(&first, &second));
     match heard {
-        Some(said) => Ok(Some(feedback::append(writer, study, &said, attribution).await?)),
+        Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),
     }
 }
@@ -145,7 +145,7 @@ pub async fn standing_answer(
 
 /// Whether a rater's answer counts: staff can retract the preference derived from it.
 async fn stands(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
-    if shown.answer.is_none_or(|said| said == Judgement::Withdrawn) {
+    if shown.answer.is_none_or(|judgement| judgement == Judgement::Withdrawn) {
         return Ok(false);
     }
     Ok(match presentations::heard_of(db, shown.id).await? {
@@ -208,8 +208,8 @@ pub(super) async fn suggest(
     if standing_suggestion(writer, study, (suggested, over.action_index), attribution.author).await?.is_some() {
         return Err(answered_before(attribution.author));
     }
-    let said = FeedbackContent::Suggestion { suggested, over: over.id };
-    Ok(feedback::append(writer, study, &said, attribution).await?)
+    let content = FeedbackContent::Suggestion { suggested, over: over.id };
+    Ok(feedback::append(writer, study, &content, attribution).await?)
 }
 
 /// Tells the learner the result of a trial, and the preferences that Gait RMSE implies.

@@ -24,7 +24,7 @@ pub struct Closed {
     /// Time of the report.
     pub at: Instant,
     /// Where it was given.
-    pub said: SafetyReportSource,
+    pub source: SafetyReportSource,
     /// The newest review by staff.
     pub review: Option<SafetyReview>,
 }
@@ -46,7 +46,7 @@ impl Closed {
     /// The identifier of the report, which is that of the object that holds it. The reports about both gaits of a pair
     /// have the same one.
     pub fn id(&self) -> SafetyReportId {
-        match self.said {
+        match self.source {
             SafetyReportSource::Rater(id) => id.into(),
             SafetyReportSource::Staff(id) => id.into(),
             SafetyReportSource::Alone(id) => id,
@@ -154,45 +154,46 @@ impl SafetyReports {
     async fn given_in(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::default();
         for shown in presentations::assessments_of_study(db, study).await? {
-            if let Some((said, at)) = shown.answer.zip(shown.answered_at) {
+            if let Some((judgement, at)) = shown.answer.zip(shown.answered_at) {
                 let by = format!("rater {}", shown.rater);
                 let closed = |trial| Closed {
                     trial,
                     by: by.clone(),
                     at,
-                    said: SafetyReportSource::Rater(shown.id),
+                    source: SafetyReportSource::Rater(shown.id),
                     review: None,
                 };
-                found.hear(said, shown.pair(), closed);
+                found.hear(judgement, shown.pair(), closed);
             }
         }
         for assessment in
             assessments::of_study(db, study).await?.iter().filter(|assessment| assessment.retraction.is_none())
         {
-            let (by, at, said) = (&assessment.author, assessment.created_at, SafetyReportSource::Staff(assessment.id));
+            let (by, at, source) =
+                (&assessment.author, assessment.created_at, SafetyReportSource::Staff(assessment.id));
             found.hear(assessment.answer, assessment.pair(), |trial| Closed {
                 trial,
                 by: by.clone(),
                 at,
-                said,
+                source,
                 review: None,
             });
         }
         for report in reports::of_study(db, study).await? {
             let (trial, by, at) = (report.trial_id, report.author, report.created_at);
-            found.closed.push(Closed { trial, by, at, said: SafetyReportSource::Alone(report.id), review: None });
+            found.closed.push(Closed { trial, by, at, source: SafetyReportSource::Alone(report.id), review: None });
         }
         for session in lab_sessions::of_study(db, study).await? {
             if session.done(lab_sessions::Act::Unblinded).is_some() {
                 // After unblinding its answers are assessments or preferences.
                 continue;
             }
-            if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {
+            if let Some(answer) = session.answer().filter(|answer| answer.judgement.is_about_safety()) {
                 // Naming one of the two gaits would reveal the allocation, so both are closed until unblinding.
                 let by =
                     format!("the subject in lab session {} (blinded, so either gait may be meant)", session.number);
-                let (at, said) = (answer.at, SafetyReportSource::Subject(session.id));
-                let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };
+                let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
+                let closed = |trial| Closed { trial, by: by.clone(), at, source, review: None };
                 found.closed.extend([session.gait_one, session.gait_two].map(closed));
             }
         }
@@ -211,11 +212,11 @@ impl SafetyReports {
         }
     }
 
-    fn hear(&mut self, said: Judgement, pair: (TrialId, TrialId), closed: impl Fn(TrialId) -> Closed) {
-        if said == Judgement::CannotTell {
+    fn hear(&mut self, judgement: Judgement, pair: (TrialId, TrialId), closed: impl Fn(TrialId) -> Closed) {
+        if judgement == Judgement::CannotTell {
             self.skipped.push(pair);
         }
-        self.closed.extend(said.unsafe_of(pair).into_iter().map(closed));
+        self.closed.extend(judgement.unsafe_of(pair).into_iter().map(closed));
     }
 
     /// The open reports about the gait of this trial.

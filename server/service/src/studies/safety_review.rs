@@ -78,9 +78,9 @@ pub async fn give(
     }
     let payload = json!({ "trial_id": id, "number": number, "decision": taken });
     events::append(writer, trial.study_id, "safety_reviewed", &payload).await?;
-    let said: Vec<_> = closed.iter().map(|closed| json!({ "by": closed.by, "at": closed.at })).collect();
+    let reports: Vec<_> = closed.iter().map(|closed| json!({ "by": closed.by, "at": closed.at })).collect();
     let detail = json!({
-        "study": trial.study_id, "decision": taken, "author": author, "reason": reason, "safety_reports": said,
+        "study": trial.study_id, "decision": taken, "author": author, "reason": reason, "safety_reports": reports,
     });
     audit::append(writer, &caller.actor, "gait.review", &format!("trial {id}"), &detail).await?;
     Ok(safety_reviews::get(writer, made).await?)
@@ -93,7 +93,7 @@ async fn take_back_what_was_heard(
     (author, reason): (&str, &str),
 ) -> StoreResult<()> {
     for closed in closed {
-        if let Some(id) = heard_of(writer, closed.said).await? {
+        if let Some(id) = heard_of(writer, closed.source).await? {
             let row = feedback::get(writer, id).await?;
             feedback::retract(writer, &row, author, reason).await?;
         }
@@ -101,8 +101,8 @@ async fn take_back_what_was_heard(
     Ok(())
 }
 
-async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
-    match said {
+async fn heard_of(db: &mut Connection, source: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
+    match source {
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
         // The learner receives the answer of a subject only at unblinding, and does not receive reports about one gait.

@@ -151,13 +151,13 @@ impl StudySnapshot {
         let action = |id: TrialId| by_id.get(&id).map(|trial| trial.action_index);
         let mut log = FeedbackLog::default();
         for row in &self.feedback {
-            if let FeedbackContent::Label { trial, .. } = row.said
+            if let FeedbackContent::Label { trial, .. } = row.content
                 && let Some(trial) = by_id.get(&trial)
             {
                 log.visited.push(trial.action_index);
             }
             if row.retraction.is_none() {
-                log.feedback.extend(heard(&row.said, action));
+                log.feedback.extend(heard(&row.content, action));
             }
         }
         log
@@ -175,8 +175,8 @@ impl StudySnapshot {
 }
 
 /// Converts an answer about trials to one about actions. `None` if both trials have the same action.
-fn heard(said: &FeedbackContent, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
-    let feedback = match *said {
+fn heard(content: &FeedbackContent, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
+    let feedback = match *content {
         FeedbackContent::Label { trial, category } => {
             Feedback::Label { action: action(trial)?, category: usize::try_from(category).ok()? }
         }

@@ -182,13 +182,13 @@ impl Sided {
     }
 
     /// Converts an answer from sides to gaits of the pair, or back.
-    pub fn turned(&self, said: Judgement) -> Judgement {
-        if self.swapped { said.swapped() } else { said }
+    pub fn turned(&self, judgement: Judgement) -> Judgement {
+        if self.swapped { judgement.swapped() } else { judgement }
     }
 
     /// The answer in terms of sides.
     pub fn answer(&self) -> Option<Judgement> {
-        self.presentation.answer.map(|said| self.turned(said))
+        self.presentation.answer.map(|judgement| self.turned(judgement))
     }
 }
 

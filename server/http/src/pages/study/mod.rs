@@ -509,7 +509,7 @@ fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRo
     let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
     let why = |retraction: &Option<Retraction>| Some(format!("retracted: {}", retraction.as_ref()?.reason));
     let lifted = |id| {
-        let of_it = |closed: &&Closed| closed.said == SafetyReportSource::Staff(id);
+        let of_it = |closed: &&Closed| closed.source == SafetyReportSource::Staff(id);
         let review = snapshot.grounds.safety_reports.lifted.iter().find(of_it)?.review.as_ref()?;
         Some(format!("cleared for walking by {}: {}", review.author, review.reason))
     };
@@ -545,7 +545,7 @@ fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRo
 /// `trial 3 is better than trial 2`.
 pub(super) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Option<String> {
     let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
-    match row.said {
+    match row.content {
         FeedbackContent::Preference { winner, loser } => {
             Some(format!("{} is better than {}", name(winner)?, name(loser)?))
         }

@@ -309,8 +309,8 @@ async fn answers(
     for row in &rows {
         let what = format!("feedback {} ({})", row.seq, row.id);
         at(&what, heard(row, study, trials))?;
-        labelled += usize::from(matches!(row.said, FeedbackContent::Label { .. }));
-        let Some(compared) = pair(&row.said).filter(|_| is_of_person(row) && !of_reports.contains(&row.id)) else {
+        labelled += usize::from(matches!(row.content, FeedbackContent::Label { .. }));
+        let Some(compared) = pair(&row.content).filter(|_| is_of_person(row) && !of_reports.contains(&row.id)) else {
             continue;
         };
         let author = printable::person(&row.author);
@@ -326,7 +326,7 @@ async fn answers(
     if labelled != results {
         return Err(refuse(format!("{results} trials have a result, but {labelled} have a label")));
     }
-    let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.said)?))).collect();
+    let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.content)?))).collect();
     for assessment in &noted {
         let what = format!("assessment {}", assessment.id);
         at(&what, of_gaits(trials, [assessment.first, assessment.second]))?;
@@ -341,10 +341,12 @@ async fn answers(
     );
     for shown in at("presentations", presentations::of_study(db, id).await)? {
         at(format!("presentation {}", shown.id), of_gaits(trials, [shown.one, shown.other]))?;
-        reports.extend(shown.answer.filter(|said| said.is_about_safety()).map(|_| SafetyReportId::from(shown.id)));
+        reports.extend(
+            shown.answer.filter(|judgement| judgement.is_about_safety()).map(|_| SafetyReportId::from(shown.id)),
+        );
     }
     reports.extend(at("safety_reports", safety_reports::of_study(db, id).await)?.iter().map(|report| report.id));
-    let has_report = |session: &&LabSession| session.answers.iter().any(|answer| answer.said.is_about_safety());
+    let has_report = |session: &&LabSession| session.answers.iter().any(|answer| answer.judgement.is_about_safety());
     reports.extend(sessions.iter().filter(has_report).map(|session| SafetyReportId::from(session.id)));
     for review in at("safety_reviews", safety_reviews::of_study(db, id).await)? {
         let what = format!("safety review {}", review.id);
@@ -375,8 +377,8 @@ fn sorted(a: TrialId, b: TrialId) -> (TrialId, TrialId) {
     if a < b { (a, b) } else { (b, a) }
 }
 
-fn pair(said: &FeedbackContent) -> Option<(TrialId, TrialId)> {
-    match *said {
+fn pair(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
+    match *content {
         FeedbackContent::Preference { winner, loser } => Some(sorted(winner, loser)),
         FeedbackContent::Tie { a, b } => Some(sorted(a, b)),
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
@@ -387,7 +389,7 @@ fn pair(said: &FeedbackContent) -> Option<(TrialId, TrialId)> {
 fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
     let trial =
         |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} does not belong to this study"));
-    match row.said {
+    match row.content {
         FeedbackContent::Label { trial: id, category } => {
             let state = trial(id)?.state;
             let converged = state == TrialState::Converged;
@@ -413,9 +415,9 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
                         return Err("Gait RMSE compares a trial without a Gait RMSE".to_owned());
                     };
                     let expected = by_gait_rmse((a.id, one), (b.id, other));
-                    if pair(&expected) != pair(&row.said)
-                        || std::mem::discriminant(&expected) != std::mem::discriminant(&row.said)
-                        || matches!((expected, row.said), (FeedbackContent::Preference { winner, .. }, FeedbackContent::Preference { winner: told, .. }) if winner != told)
+                    if pair(&expected) != pair(&row.content)
+                        || std::mem::discriminant(&expected) != std::mem::discriminant(&row.content)
+                        || matches!((expected, row.content), (FeedbackContent::Preference { winner, .. }, FeedbackContent::Preference { winner: told, .. }) if winner != told)
                     {
                         return Err("the preference contradicts Gait RMSE".to_owned());
                     }

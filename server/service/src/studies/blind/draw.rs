@@ -59,8 +59,8 @@ fn repeatable<'a>(before: &'a [Presentation], closed: &[TrialId], lot: u64) -> O
 }
 
 /// Whether an answer compares the two gaits.
-pub(super) fn is_plain(said: Judgement) -> bool {
-    matches!(said, Judgement::First | Judgement::Second | Judgement::NoDifference)
+pub(super) fn is_plain(judgement: Judgement) -> bool {
+    matches!(judgement, Judgement::First | Judgement::Second | Judgement::NoDifference)
 }
 
 /// Whether two pairs have the same gaits.

@@ -75,7 +75,7 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterFigures 
     RaterFigures {
         rater: rater.to_owned(),
         shown: count(&|_| true),
-        answered: count(&|shown| shown.answer.is_some_and(|said| said != Judgement::Withdrawn)),
+        answered: count(&|shown| shown.answer.is_some_and(|judgement| judgement != Judgement::Withdrawn)),
         first_preferred: first_preferred(rater, sides),
         repeats_agree: repeats_agree(&own),
         cannot_tell: count(&|s| s.answer == Some(Judgement::CannotTell)),
@@ -89,7 +89,8 @@ fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
     own.peek()?;
     let blind = own.filter(|sided| !sided.presentation.unblinded && sided.presentation.kind != Kind::Null);
     let answers: Vec<Judgement> = blind.filter_map(Sided::answer).collect();
-    let count = |said| u32::try_from(answers.iter().filter(|answer| **answer == said).count()).unwrap_or(u32::MAX);
+    let count =
+        |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
     let (first, second) = (count(Judgement::First), count(Judgement::Second));
     Some(Share::new(first, first.saturating_add(second)))
 }

@@ -147,7 +147,7 @@ async fn is_answered(
 
 async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
     let withdrawn = NewAnswer {
-        said: Judgement::Withdrawn,
+        judgement: Judgement::Withdrawn,
         response_ms: None,
         note: "",
         feedback: None,
@@ -189,13 +189,13 @@ pub async fn answer(
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let attribution = Attribution { source, author: &caller.name, note: &given.note };
     // From here on the answer refers to gaits, not to sides.
-    let said = sided.turned(given.answer);
+    let judgement = sided.turned(given.answer);
     if shown.answer.is_some() {
-        if !said.is_about_safety() {
+        if !judgement.is_about_safety() {
             return Err(Error::conflict(answered_already(sided.answer())));
         }
-        let gaits = said.unsafe_of(shown.pair());
-        let is_repeated = shown.answer == Some(said) && shown.note == given.note;
+        let gaits = judgement.unsafe_of(shown.pair());
+        let is_repeated = shown.answer == Some(judgement) && shown.note == given.note;
         if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.close_all(&gaits)) {
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
@@ -208,11 +208,12 @@ pub async fn answer(
         let fields = ("first", "second");
         let (study, pair) = (shown.study_id, shown.pair());
         let again = if shown.kind == Kind::Repeat { Again::Meant } else { Again::Refused };
-        let statement = GivenJudgement { study, pair, fields, said, attribution, again };
+        let statement = GivenJudgement { study, pair, fields, judgement, attribution, again };
         preference::hear(writer, statement).await.map_err(without_gaits)?
     };
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
-    let row = NewAnswer { said, response_ms: given.response_ms, note: &given.note, feedback: heard, could_have_known };
+    let row =
+        NewAnswer { judgement, response_ms: given.response_ms, note: &given.note, feedback: heard, could_have_known };
     if !presentations::answer(writer, shown.id, row).await? {
         return Err(Error::conflict(answered_already(sided.answer())));
     }
@@ -236,9 +237,9 @@ fn without_gaits(error: Error) -> Error {
 fn answered_already(before: Option<Judgement>) -> String {
     match before {
         Some(Judgement::Withdrawn) => "This pair was already answered, and the answer was retracted.".to_owned(),
-        Some(said) => {
-            let said = said.as_str().replace('_', " ");
-            format!("This pair was already answered. Your first answer, \u{201c}{said}\u{201d}, counts.")
+        Some(judgement) => {
+            let judgement = judgement.as_str().replace('_', " ");
+            format!("This pair was already answered. Your first answer, \u{201c}{judgement}\u{201d}, counts.")
         }
         None => "This pair was already answered.".to_owned(),
     }

@@ -85,7 +85,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
 
 /// Whether an answer is the same form, sent twice.
 fn is_same(stands: &LabAnswer, new: &NewAnswer) -> bool {
-    (stands.number, stands.said, stands.note.as_str()) == (new.number, new.answer, new.note.as_str())
+    (stands.number, stands.judgement, stands.note.as_str()) == (new.number, new.answer, new.note.as_str())
 }
 
 /// Records a safety report: as the answer of the session, in place of another answer while the session is blinded. If
@@ -108,7 +108,7 @@ async fn report_unsafe(
         {
             in_the_lab(writer, session.id).await
         }
-        Some(stands) if walked.is_none() && !stands.said.is_about_safety() => {
+        Some(stands) if walked.is_none() && !stands.judgement.is_about_safety() => {
             retract_number(writer, caller, session.id, stands.number).await?;
             add(writer, caller, session.id, next_number(session), new).await
         }
@@ -180,12 +180,12 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
         study: study.id,
         pair: walked,
         fields: ("walk 2", "walk 3"),
-        said: given.said,
+        judgement: given.judgement,
         attribution: Attribution { source: Source::Subject, author: &author, note: &given.note },
         // Several sessions may compare the same two gaits.
         again: Again::Meant,
     };
-    let heard = if given.said.is_assessment() {
+    let heard = if given.judgement.is_assessment() {
         assessment::write(writer, statement).await.map(drop)
     } else {
         heard_as_preference(writer, statement).await

@@ -36,7 +36,7 @@ impl AnswerView {
         let unblinded = session.done(Act::Unblinded).is_some_and(|done| done.at <= row.at);
         Self {
             number: row.number,
-            answer: row.said,
+            answer: row.judgement,
             note: row.note.clone(),
             actor: row.actor.clone(),
             at: row.at,
@@ -70,7 +70,7 @@ pub(super) fn next_number(session: &LabSession) -> u32 {
 /// Whether the current answer can be retracted: the session is blinded, and it is not a safety report.
 pub(super) fn can_be_retracted(session: &LabSession) -> bool {
     let open = session.done(Act::Closed).is_none() && session.done(Act::Unblinded).is_none();
-    open && session.answer().is_some_and(|answer| !answer.said.is_about_safety())
+    open && session.answer().is_some_and(|answer| !answer.judgement.is_about_safety())
 }
 
 /// Whether an actor may have fetched a controller file of this session before an instant. Any actor counts if a token
