@@ -138,9 +138,17 @@ async fn a_lab_script_is_not_given_bounds_that_were_reported_as_unsafe() {
         (service.study(by_script).await, service.study(by_script).await, service.study(by_script).await);
     let ask = async |study: StudyId| service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await;
     let open = ask(second).await.json();
+    let with_key = || service.post_with_key(&format!("/api/v1/studies/{third}/ask"), &json!({}), "morning");
+    assert_eq!(with_key().await.json()["action"], open["action"]);
     let reported = scripted::trial(&service, first).await;
     assert_eq!(open["action"], json!(reported.action));
     report(&service, &reported).await;
+
+    let repeated = with_key().await;
+    assert!(repeated.status == StatusCode::CONFLICT && repeated.text.contains("Cancel the trial"), "{}", repeated.text);
+    for open in service.trials(third).await {
+        service.post(&format!("/api/v1/trials/{}/cancel", open.id), &json!({})).await;
+    }
 
     let again = ask(second).await;
     assert!(again.status == StatusCode::CONFLICT && again.text.contains("Cancel the trial"), "{}", again.text);

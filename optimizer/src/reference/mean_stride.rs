@@ -79,7 +79,8 @@ impl MotionRecording {
             .collect();
         let kept = format!("{} to {} s, without a gap of {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
-            let reason = format!("no stride lasts {kept}");
+            let (shortest, longest) = STRIDE_RANGE_S;
+            let reason = format!("no stride without a gap of {LONGEST_GAP_S} s lasts {shortest} to {longest} s");
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let count = strides.len() as f64;

@@ -1,6 +1,5 @@
 //! Extractors for JSON bodies, query strings and forms, whose errors are problem documents.
 
-use super::{ANONYMOUS_BODY_LIMIT_BYTES, BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::problem::Refusal;
 use axum::extract::{FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
@@ -26,12 +25,7 @@ pub(crate) fn body<T: DeserializeOwned>(method: &Method, headers: &HeaderMap, by
 
 /// The error for a body that cannot be received.
 pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
-    if status == StatusCode::PAYLOAD_TOO_LARGE {
-        Error::TooLarge(format!(
-            "The body is too large. The limit is {BODY_LIMIT_BYTES} bytes, {RECORDING_LIMIT_BYTES} for uploads of \
-             measurement files, and {ANONYMOUS_BODY_LIMIT_BYTES} without sign-in."
-        ))
-    } else if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
+    if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
         Error::UnsupportedMediaType(reason.to_owned())
     } else {
         Error::Malformed(format!("The body cannot be read: {}.", reason.trim_end_matches('.')))

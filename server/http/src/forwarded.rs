@@ -38,7 +38,7 @@ impl Network {
 }
 
 /// The accepted texts of a [`Network`].
-pub const NETWORKS: &str = "comma-separated addresses and networks such as 127.0.0.1, 10.1.0.0/16, fd00::/8";
+pub const NETWORKS: &str = "a comma-separated list of addresses and networks such as 127.0.0.1, 10.1.0.0/16, fd00::/8";
 
 impl FromStr for Network {
     type Err = &'static str;

@@ -38,6 +38,10 @@ pub(crate) struct Idempotent<P> {
 #[derive(Debug)]
 pub(crate) struct IdempotentWith<P, T>(pub(crate) Idempotent<P>, pub(crate) T);
 
+/// The body of a stored response, an extension of the repeated one.
+#[derive(Debug, Clone)]
+pub(crate) struct KeptBody(pub(crate) String);
+
 impl<P: Permission> Idempotent<P> {
     /// Begins the transaction of the effect. The inner `Err` is the stored response of an earlier request with the key.
     pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<LentWriter<'a>, Response>, Error> {
@@ -52,6 +56,7 @@ impl<P: Permission> Idempotent<P> {
                 }
                 let mut answer = response(&kept);
                 answer.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
+                answer.extensions_mut().insert(KeptBody(kept.body));
                 Ok(Err(answer))
             }
             Some(_) => {

@@ -1,11 +1,12 @@
 //! Authentication: finds the caller of a request from its token or session cookie, before any handler.
 
-use super::{ANONYMOUS_BODY_LIMIT_BYTES, AppState};
+use super::{AppState, request_body};
 use crate::problem::Refusal;
-use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::body::HttpBody;
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
-use axum::response::Response;
+use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::sign_in::{self, Recognised};
 use gaitwright_service::access::{Caller, Role};
 use gaitwright_service::error::Error;
@@ -23,23 +24,32 @@ const BROWSER_SECONDS: u32 = 365 * 24 * 3600;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AnsweredTo(pub(super) Option<Role>);
 
-/// Adds the [`Caller`] to the request, and the caller's role to the response. Refuses an invalid token; ignores an
-/// invalid session.
+/// Receives the request, adds its [`Caller`], and the caller's role to the response. Refuses an invalid token; ignores an
+/// invalid session. The caller is looked up again after a body was received, because rights can end while it arrives.
 pub(super) async fn identify(
     State(app): State<AppState>,
-    mut request: Request,
+    request: Request,
     next: Next,
 ) -> Result<Response, Refusal> {
     let (path, headers) = (request.uri().path().to_owned(), request.headers().clone());
-    let mut answered_to = None;
-    if let Some(caller) = caller(&app, &path, &headers).await? {
-        answered_to = Some(AnsweredTo(caller.role));
-        request.extensions_mut().insert(caller);
-    } else {
-        DefaultBodyLimit::max(ANONYMOUS_BODY_LIMIT_BYTES).apply(&mut request);
+    let mut found = caller(&app, &path, &headers).await?;
+    let has_body = !request.body().is_end_stream();
+    let limit = request_body::limit(&request, found.is_some());
+    let received = request_body::receive(request, limit).await;
+    if has_body {
+        found = caller(&app, &path, &headers).await?;
     }
-    let mut answer = next.run(request).await;
-    if let Some(to) = answered_to {
+    let to = found.as_ref().map(|caller| AnsweredTo(caller.role));
+    let mut answer = match received {
+        Ok(mut request) => {
+            if let Some(caller) = found {
+                request.extensions_mut().insert(caller);
+            }
+            next.run(request).await
+        }
+        Err(error) => Refusal(error).into_response(),
+    };
+    if let Some(to) = to {
         answer.extensions_mut().insert(to);
     }
     Ok(answer)

@@ -162,7 +162,8 @@ impl Kind {
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "Invalid field",
                 "The value of a field is out of range or contradicts another field. Nothing was changed.",
-                "Correct the field. The members field, value and allowed name it, its value and the accepted values.",
+                "Correct the field. In the problem document, `field` is its name, `value` is the refused value, and `allowed` describes \
+                 the accepted values.",
             ),
             Self::Learner => entry(
                 "/problems/learner",

@@ -1,53 +1,85 @@
-//! The layer that bounds the memory of request bodies. A piece of a body keeps the whole buffer into which it was
-//! received, so a body that arrives byte by byte would need thousands of times its size.
+//! Receives the whole body of a request before anything decides about the request. A decision that was made while the
+//! body was still on its way could be out of date when it takes effect.
 
-use axum::body::{Body, Bytes};
-use axum::extract::Request;
-use futures_util::{StreamExt, stream};
+use super::{ANONYMOUS_BODY_LIMIT_BYTES, BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
+use axum::body::{Body, HttpBody};
+use axum::extract::{MatchedPath, Request};
+use futures_util::StreamExt;
+use gaitwright_service::error::Error;
 
-/// Size from which a piece is passed on, bytes.
-const PIECE_BYTES: usize = 64 << 10;
+/// Routes that take measurement files and recordings.
+const UPLOADS: [&str; 6] = [
+    "/reference-gaits",
+    "/lab-sessions/{id}/measurement-files/emg",
+    "/lab-sessions/{id}/measurement-files/motion",
+    "/api/v1/reference-gaits",
+    "/api/v1/lab-sessions/{id}/measurement-files/emg",
+    "/api/v1/lab-sessions/{id}/measurement-files/motion",
+];
 
-/// Copies the body into pieces of at least [`PIECE_BYTES`], except the last one.
-pub(super) async fn gather(request: Request) -> Request {
-    request.map(|body| Body::from_stream(stream::try_unfold(body.into_data_stream().fuse(), next_piece)))
+/// The largest body, bytes.
+pub(super) fn limit(request: &Request, is_signed_in: bool) -> usize {
+    let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
+    match route {
+        _ if !is_signed_in => ANONYMOUS_BODY_LIMIT_BYTES,
+        Some(route) if UPLOADS.contains(&route) => RECORDING_LIMIT_BYTES,
+        _ => BODY_LIMIT_BYTES,
+    }
 }
 
-async fn next_piece<S, E>(mut received: S) -> Result<Option<(Bytes, S)>, E>
-where
-    S: stream::Stream<Item = Result<Bytes, E>> + Unpin,
-{
-    let mut piece = Vec::new();
-    while piece.len() < PIECE_BYTES
-        && let Some(part) = received.next().await
-    {
-        piece.extend_from_slice(&part?);
+/// The request with its whole body in memory. The body is copied, because each received piece keeps the whole buffer into
+/// which it was read: a body that arrives byte by byte would need thousands of times its size.
+///
+/// # Errors
+/// [`Error::TooLarge`], and [`Error::Malformed`] if the body breaks off.
+pub(super) async fn receive(request: Request, limit: usize) -> Result<Request, Error> {
+    let (parts, body) = request.into_parts();
+    let too_large = || {
+        Error::TooLarge(format!(
+            "The body is too large. The limit is {BODY_LIMIT_BYTES} bytes, {RECORDING_LIMIT_BYTES} for uploads of \
+             measurement files, and {ANONYMOUS_BODY_LIMIT_BYTES} without sign-in."
+        ))
+    };
+    if body.size_hint().lower() > limit as u64 {
+        return Err(too_large());
     }
-    Ok((!piece.is_empty()).then(|| (piece.into(), received)))
+    let mut received = Vec::new();
+    let mut pieces = body.into_data_stream();
+    while let Some(piece) = pieces.next().await {
+        let piece = piece.map_err(|error| Error::Malformed(format!("The body cannot be read: {error}.")))?;
+        if received.len() + piece.len() > limit {
+            return Err(too_large());
+        }
+        received.extend_from_slice(&piece);
+    }
+    Ok(Request::from_parts(parts, Body::from(received)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use axum::body::Bytes;
+    use futures_util::stream;
     use http_body_util::BodyExt;
 
-    #[tokio::test]
-    async fn single_bytes_arrive_in_few_pieces_and_in_order() {
-        let sent: Vec<u8> = (0..=255_u8).cycle().take(150_000).collect();
-        let bytes = sent.clone().into_iter().map(|byte| Ok::<_, std::io::Error>(Bytes::from(vec![byte])));
-        let mut body = gather(Request::new(Body::from_stream(stream::iter(bytes)))).await.into_body();
-        let mut received = Vec::new();
-        while let Some(piece) = body.frame().await {
-            received.push(piece.unwrap().into_data().unwrap());
-        }
-        assert_eq!(received.iter().map(Bytes::len).collect::<Vec<_>>(), [65_536, 65_536, 18_928]);
-        assert!(received.concat() == sent, "the order changed");
+    fn in_single_bytes(bytes: Vec<u8>) -> Request {
+        let pieces = bytes.into_iter().map(|byte| Ok::<_, std::io::Error>(Bytes::from(vec![byte])));
+        Request::new(Body::from_stream(stream::iter(pieces)))
     }
 
     #[tokio::test]
-    async fn broken_body_is_an_error() {
+    async fn body_up_to_the_limit_is_received_in_order() {
+        let sent: Vec<u8> = (0..=255).cycle().take(5000).collect();
+        let received = receive(in_single_bytes(sent.clone()), 5000).await.unwrap().into_body();
+        assert_eq!(received.size_hint().exact(), Some(5000));
+        assert!(received.collect().await.unwrap().to_bytes() == sent);
+        assert!(matches!(receive(in_single_bytes(sent), 4999).await, Err(Error::TooLarge(_))));
+    }
+
+    #[tokio::test]
+    async fn broken_body_is_refused() {
         let parts = [Ok(Bytes::from_static(b"a")), Err(std::io::Error::other("cut off"))];
-        let request = gather(Request::new(Body::from_stream(stream::iter(parts)))).await;
-        assert!(request.into_body().collect().await.is_err());
+        let request = Request::new(Body::from_stream(stream::iter(parts)));
+        assert!(matches!(receive(request, 100).await, Err(Error::Malformed(_))));
     }
 }

@@ -1,8 +1,8 @@
 //! The router: all routes, and the layers around them.
 
 use super::{
-    AppState, BODY_LIMIT_BYTES, access_log, answers, api, client_address, host, identify, metrics, openapi, pages,
-    request_body, same_origin, static_files,
+    AppState, access_log, answers, api, client_address, host, identify, metrics, openapi, pages,
+    same_origin, static_files,
 };
 use crate::problem::Refusal;
 use axum::Router;
@@ -51,8 +51,8 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         .layer(middleware::from_fn(same_origin::check))
         .layer(middleware::from_fn_with_state(state.hosts.clone(), host::check))
         .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, state.slowest_answer))
-        .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))
-        .layer(middleware::map_request(request_body::gather))
+        // The whole body is in memory before a handler reads it.
+        .layer(DefaultBodyLimit::disable())
         .layer(CatchPanicLayer::custom(answers::after_panic))
         .layer(TraceLayer::new_for_http().make_span_with(|_: &Request| tracing::Span::current()))
         .layer(middleware::from_fn_with_state(state.clone(), client_address::note))

@@ -49,6 +49,11 @@ impl FieldError {
         Self { field: field.to_owned(), value: None, allowed: Some(allowed.to_owned()), message }
     }
 
+    /// Refuses a field in a sentence of its own.
+    pub fn in_words(field: &str, message: &str) -> Self {
+        Self { field: field.to_owned(), value: None, allowed: None, message: message.to_owned() }
+    }
+
     /// The refusal with the path that the field has in a request: `to` in place of the prefix `from`.
     #[must_use]
     pub fn renamed(self, from: &str, to: &str) -> Self {

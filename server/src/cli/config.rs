@@ -27,8 +27,8 @@ const FILE_VARIABLE: &str = "GAITWRIGHT_CONFIG";
 const KNOWN: &[(&str, &str, &str)] = &[
     ("listen", "127.0.0.1:8080", "address and port to listen on"),
     ("database", "gaitwright.db", "SQLite file"),
-    ("anchor", "", "second anchor file, best on another disk; the first one is next to the database"),
-    ("backup_folder", "", "folder for scheduled backups, best on another disk; empty: no backups"),
+    ("anchor", "", "second anchor file, preferably on another disk; the first one is next to the database"),
+    ("backup_folder", "", "folder for scheduled backups, preferably on another disk; empty: no backups"),
     ("backup_hours", "24", "hours between scheduled backups"),
     ("backup_keep", "14", "number of scheduled backups to keep"),
     ("host_names", "", "comma-separated host names of the service, besides its address and localhost"),
@@ -70,7 +70,7 @@ pub(super) struct RecordFlags {
 pub(super) struct AnchoredFlags {
     #[command(flatten)]
     record: RecordFlags,
-    /// Second anchor file for the newest hashes of the record, best on another disk. An empty name means none.
+    /// Second anchor file for the newest hashes of the record, preferably on another disk. An empty name means none.
     #[arg(long, value_name = "FILE")]
     anchor: Option<String>,
 }
@@ -95,7 +95,7 @@ pub(super) struct Flags {
     /// Address and port to listen on (default: 127.0.0.1:8080).
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<String>,
-    /// Folder for scheduled backups, best on another disk (default: no backups).
+    /// Folder for scheduled backups, preferably on another disk (default: no backups).
     #[arg(long, value_name = "FOLDER")]
     backup_folder: Option<String>,
     /// Hours between scheduled backups (default: 24).
@@ -110,7 +110,7 @@ pub(super) struct Flags {
     /// Number of solves that run in parallel (default: number of cores).
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
-    /// NATS broker for remote workers, see `gaitwright worker` (default: solve in this process).
+    /// NATS broker for remote workers; see `gaitwright worker` (default: solve in this process).
     #[arg(long, value_name = "URL")]
     nats: Option<String>,
     /// Name of this service on the broker (default: gaitwright).
@@ -347,7 +347,7 @@ impl Settings {
 
     /// The log filter, and whether the log is JSON.
     pub(super) fn log(&self) -> Result<(EnvFilter, bool), Error> {
-        let allowed = "targets and levels such as warn,gaitwright=info";
+        let allowed = "a list of targets and levels such as warn,gaitwright=info";
         let filter = EnvFilter::try_new(self.text("log")).map_err(|_| self.refused("log", allowed))?;
         match self.text("log_format") {
             "text" => Ok((filter, false)),

@@ -30,7 +30,7 @@ pub(super) struct Emg {
     /// names of the channels).
     #[arg(long, value_name = "CHANNEL=COLUMN,...", value_delimiter = ',', value_parser = channel)]
     channels: Vec<(String, String)>,
-    /// Column of both files for right heel strikes: a switch under the heel, or the vertical force under the foot.
+    /// Column of right heel strikes in both files: a switch under the heel, or the vertical force under the foot.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["heel_strikes_s", "normal_heel_strikes_s"])]
     heel_strike_column: Option<String>,
     /// Value of that column above which the foot is on the ground.

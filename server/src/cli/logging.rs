@@ -12,7 +12,7 @@ use tracing_subscriber::EnvFilter;
 pub(super) fn start(filter: EnvFilter, json: bool) -> Result<(), Error> {
     let filter = match std::env::var(EnvFilter::DEFAULT_ENV) {
         Ok(text) => EnvFilter::try_new(&text).map_err(|_| {
-            Error::invalid(EnvFilter::DEFAULT_ENV, text, "targets and levels such as warn,gaitwright=info")
+            Error::invalid(EnvFilter::DEFAULT_ENV, text, "a list of targets and levels such as warn,gaitwright=info")
         })?,
         Err(_) => filter,
     };

@@ -130,7 +130,7 @@ fn certificate_lines(summary: &Summary) -> Vec<String> {
     match &summary.passing {
         Some(trial) => {
             let rmse = trial.gait_rmse_rad.map_or_else(String::new, |rmse| format!(": Gait RMSE {rmse:.4} rad"));
-            lines.push(format!("best gait with a passed certificate: trial {}{rmse}", trial.number));
+            lines.push(format!("best gait that passed its certificate: trial {}{rmse}", trial.number));
             lines.push(format!("  action            {}", action_line(&trial.action)));
         }
         None => lines.push("none of the certified gaits passed".to_owned()),

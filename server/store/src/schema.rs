@@ -76,7 +76,7 @@ pub struct SearchSpace {
     pub dimensions: Vec<Dimension>,
 }
 
-/// One tuned bound of a grid.
+/// One tuned bound of a search space.
 #[derive(Debug, ToSchema)]
 pub struct Dimension {
     /// Name of the bound.

@@ -41,7 +41,7 @@ pub(super) async fn of_study(
 
 /// Record an assessment of two gaits
 ///
-/// States that nobody can tell which gait is better, or that a gait is unsafe. An unsafe gait is no longer recommended,
+/// States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is no longer recommended,
 /// compared or planned for lab sessions, until staff have reviewed the report.
 #[utoipa::path(
     post,

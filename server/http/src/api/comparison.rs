@@ -78,7 +78,7 @@ pub(super) async fn get(
     }
     let mut rows = Vec::with_capacity(named.len());
     for id in named {
-        let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
+        let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "the identifier of a study"))?;
         let id = id.accessible(&mut *app.read().await?, authorized.caller.reach()).await?;
         rows.push(row(&mut app, id).await?);
     }

@@ -35,16 +35,10 @@ mod tokens;
 mod trials;
 mod users;
 
-use super::{AppState, RECORDING_LIMIT_BYTES};
-use axum::extract::DefaultBodyLimit;
+use super::AppState;
 pub(super) use jobs::Workers;
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouterExt};
 use utoipa_axum::routes;
-
-/// The body limit for uploads of measurement files.
-pub(super) fn recordings() -> DefaultBodyLimit {
-    DefaultBodyLimit::max(RECORDING_LIMIT_BYTES)
-}
 
 /// Every route below `/api/v1`.
 pub fn routes() -> OpenApiRouter<AppState> {
@@ -59,7 +53,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(reference_gaits::of_subject))
         .routes(routes!(devices::list, devices::create))
         .routes(routes!(devices::get))
-        .routes(routes!(reference_gaits::list, reference_gaits::create).layer(recordings()))
+        .routes(routes!(reference_gaits::list, reference_gaits::create))
         .routes(routes!(reference_gaits::get))
         // studies
         .routes(routes!(studies::list, studies::create))
@@ -126,8 +120,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(measurement_files::list))
         .routes(routes!(measurement_files::get))
         .routes(routes!(measurement_files::content))
-        .routes(routes!(measurement_files::emg).layer(recordings()))
-        .routes(routes!(measurement_files::motion).layer(recordings()))
+        .routes(routes!(measurement_files::emg))
+        .routes(routes!(measurement_files::motion))
         .routes(routes!(measurement_files::result, measurement_files::process))
         .routes(routes!(measurement_files::limit_cycles))
         .routes(routes!(lab_sessions::in_the_lab))

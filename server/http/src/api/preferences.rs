@@ -111,7 +111,7 @@ fn table(rows: &[FeedbackRow]) -> CsvTable {
     path = "/preferences/{id}",
     operation_id = "get_preference",
     tag = "preferences",
-    params(("id" = FeedbackId, Path, description = "The answer")),
+    params(("id" = FeedbackId, Path, description = "The preference")),
     responses((status = 200, description = "Preference", body = FeedbackRow), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -178,7 +178,7 @@ pub(super) struct Retract {
     path = "/preferences/{id}/retract",
     operation_id = "retract_preference",
     tag = "preferences",
-    params(("id" = FeedbackId, Path, description = "The answer")),
+    params(("id" = FeedbackId, Path, description = "The preference")),
     request_body = Retract,
     responses((status = 200, description = "Retracted preference", body = FeedbackRow)),
     security(("token" = ["answer"]), ("session" = ["answer"])),

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::accessible::Id;
-use crate::idempotent::IdempotentWith;
+use crate::idempotent::{IdempotentWith, KeptBody};
 use crate::problem::Refusal;
 use axum::extract::State;
 use axum::response::Response;
@@ -11,6 +11,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::script::{self, Ask, Tell};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, TrialId};
+use serde::Deserialize;
 use std::sync::Arc;
 
 /// How often a decision is repeated because the study has changed in the meantime.
@@ -40,13 +41,25 @@ pub(super) async fn ask(
         let suggestion = script::suggest(app.store_mut(), id, worker, &beliefs).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
-            Err(before) => return Ok(before),
+            Err(before) => return repeat_ask(&app, before).await,
         };
         if let Some(trial) = script::give_out(&mut writer, &request.caller, worker, &suggestion?).await? {
             return request.done(&app, writer, &trial).await;
         }
     }
     Err(Error::conflict("The study is changing too fast. Try again.").into())
+}
+
+/// Gives out a trial again, unless its bounds were reported as unsafe in the meantime.
+async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusal> {
+    #[derive(Deserialize)]
+    struct GivenOut {
+        id: TrialId,
+    }
+    let KeptBody(body) = before.extensions().get().ok_or_else(|| Error::Internal("nothing was stored".to_owned()))?;
+    let GivenOut { id } = serde_json::from_str(body).map_err(|e| Error::Internal(e.to_string()))?;
+    script::not_reported(&mut *app.read().await?, id).await?;
+    Ok(before)
 }
 
 /// Report the outcome of a trial

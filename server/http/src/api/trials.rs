@@ -155,7 +155,7 @@ pub(super) async fn cancel(
 
 /// Retry a trial
 ///
-/// Queues a trial without a result again.
+/// Requeues a trial that ended without a result.
 #[utoipa::path(
     post,
     path = "/trials/{id}/retry",

@@ -204,7 +204,7 @@ fn chosen(space: &SearchSpace, choice: &Choice) -> Result<Option<(usize, usize)>
         None => Ok(default),
         Some(name) => {
             let found = names.iter().position(|known| known == name);
-            found.ok_or_else(|| Error::invalid(field, name.as_str(), &names.join(", ")))
+            found.ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
         }
     };
     let (right, down) = (place("right", &choice.right, 0)?, place("down", &choice.down, 1)?);

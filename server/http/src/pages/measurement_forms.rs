@@ -60,7 +60,7 @@ impl EmgFields {
 /// `TA_L=EMG 3, BF_L=EMG 5`.
 fn pairs(text: &str) -> Result<std::collections::BTreeMap<String, String>, Error> {
     let pair = |part: &str| {
-        let refused = || Error::invalid("channels", part, "CHANNEL=COLUMN pairs, separated by commas");
+        let refused = || Error::invalid("channels", part, "a list of CHANNEL=COLUMN pairs, separated by commas");
         let (channel, column) = part.split_once('=').ok_or_else(refused)?;
         Ok((channel.trim().to_owned(), column.trim().to_owned()))
     };

@@ -156,7 +156,7 @@ impl Asked {
     }
 
     fn role(&self) -> Result<Role, Error> {
-        let roles = Role::ALL.map(Role::as_str).join(", ");
+        let roles = format!("one of {}", Role::ALL.map(Role::as_str).join(", "));
         self.role.parse().map_err(|_| Error::invalid("role", self.role.as_str(), &roles))
     }
 

@@ -48,8 +48,8 @@ pub fn check(password: &str, name: &str) -> Result<(), Error> {
     }
     let known: Vec<&str> = name.split_whitespace().chain([name]).chain(LIKELY.iter().copied()).collect();
     if zxcvbn(password, &known).score() < Score::Four {
-        let allowed = "hard to guess, such as three unrelated words. Your name, common words, keyboard rows, dates, sequences \
-                       such as 1234 and repetitions add little";
+        let allowed = "hard to guess, for example three unrelated words. Your name, common words, keyboard rows, dates, sequences \
+                       such as 1234 and repetitions add little strength";
         return Err(FieldError::described("password", "easy to guess", allowed).into());
     }
     Ok(())

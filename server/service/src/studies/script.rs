@@ -97,9 +97,13 @@ pub async fn suggest(
     }
 }
 
-/// Refuses an open trial whose bounds were reported as unsafe since it was handed out.
-async fn not_reported(writer: &mut Writer, trial: &Trial) -> Result<(), Error> {
-    let reports = SafetyReports::read(writer, trial.study_id).await?;
+/// Refuses a trial whose bounds were reported as unsafe since it was handed out.
+///
+/// # Errors
+/// [`Error::Conflict`]; errors of the database.
+pub async fn not_reported(db: &mut Connection, trial: TrialId) -> Result<(), Error> {
+    let trial = trials::get(db, trial).await?;
+    let reports = SafetyReports::read(db, trial.study_id).await?;
     if reports.closed_bounds().any(|bounds| bounds == trial.action) {
         let number = trial.number;
         return Err(Error::conflict(format!(
@@ -122,7 +126,7 @@ pub async fn give_out(
     let (snapshot, new) = match suggestion {
         Suggestion::Same(id) => {
             let open = trials::get(writer, *id).await?;
-            not_reported(writer, &open).await?;
+            not_reported(writer, open.id).await?;
             audit::append(writer, &caller.actor, "trial.ask", &format!("trial {id}"), &json!({ "again": true }))
                 .await?;
             return Ok(Some(open));

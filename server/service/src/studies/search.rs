@@ -47,13 +47,13 @@ impl GivenSpace {
             Err(LearnerError::InvalidDimension { dimension, reason }) => {
                 let at = at(&dimension);
                 let values = self.dimensions.get(at).map(|dimension| json!(dimension.values)).unwrap_or_default();
-                Err(Error::invalid(&format!("{FIELD}[{at}].values"), values, &format!("increasing values ({reason})")))
+                Err(Error::invalid(&format!("{FIELD}[{at}].values"), values, &format!("a list of increasing values ({reason})")))
             }
             Err(LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest }) => {
                 let field = format!("{FIELD}[{}].lengthscale", at(&dimension));
                 Err(Error::invalid(&field, lengthscale, &format!("{shortest} to {longest}")))
             }
-            Err(other) => Err(Error::invalid(FIELD, self.dimensions.len(), &format!("a smaller grid: {other}"))),
+            Err(other) => Err(FieldError::in_words(FIELD, &format!("{FIELD}: {other}.")).into()),
         }
     }
 }

@@ -120,8 +120,8 @@ impl StudySnapshot {
             self.trials.iter().rev().filter_map(|trial| trial.best_before).take(limit + 1).collect();
         let same = bests.len() > limit && bests.iter().all(|best| *best == bests[0]);
         same.then(|| match limit {
-            1 => "The best action did not change in the last result.".to_owned(),
-            _ => format!("The best action did not change in {limit} results."),
+            1 => "The last result did not change the best action.".to_owned(),
+            _ => format!("The best action has not changed over the last {limit} results."),
         })
     }
 

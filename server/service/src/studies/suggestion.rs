@@ -58,7 +58,7 @@ fn action(study: &Study, trial: &Trial, bounds: &BTreeMap<String, f64>) -> Resul
     let dimensions = space.dimensions();
     if let Some(unknown) = bounds.keys().find(|name| !dimensions.iter().any(|dimension| dimension.name == **name)) {
         let names: Vec<&str> = dimensions.iter().map(|dimension| dimension.name.as_str()).collect();
-        return Err(Error::invalid("bounds", unknown.as_str(), &names.join(", ")));
+        return Err(Error::invalid("bounds", unknown.as_str(), &format!("one of {}", names.join(", "))));
     }
     let mut levels = space.levels(trial.action_index);
     for (level, dimension) in levels.iter_mut().zip(dimensions) {
@@ -66,7 +66,7 @@ fn action(study: &Study, trial: &Trial, bounds: &BTreeMap<String, f64>) -> Resul
         let place = dimension.values.iter().position(|known| known.to_bits() == value.to_bits());
         *level = place.ok_or_else(|| {
             let known: Vec<String> = dimension.values.iter().map(f64::to_string).collect();
-            Error::invalid(&format!("bounds.{}", dimension.name), value, &known.join(", "))
+            Error::invalid(&format!("bounds.{}", dimension.name), value, &format!("one of {}", known.join(", ")))
         })?;
     }
     let suggested = space.index_of_levels(&levels).map_err(Error::Learner)?;

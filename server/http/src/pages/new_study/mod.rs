@@ -384,7 +384,7 @@ fn subject_of(fields: &Fields) -> Result<Chosen, Error> {
 
 fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result<NewStudy, Error> {
     let (search_space, base_bounds) = editor.read()?;
-    let learners = LEARNERS.map(|(name, ..)| name).join(", ");
+    let learners = format!("one of {}", LEARNERS.map(|(name, ..)| name).join(", "));
     Ok(NewStudy {
         name: Some(fields.name.trim().to_owned()).filter(|name| !name.is_empty()),
         device_id: optional("device", &fields.device, "a device from the list")?,
@@ -426,7 +426,7 @@ fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
 fn nothing_described(fields: &Fields) -> Result<(), Error> {
     for (field, text) in DESCRIPTION.into_iter().zip([&fields.pseudonym, &fields.height_m, &fields.body_mass_kg]) {
         if !text.trim().is_empty() {
-            let allowed = "empty, because a subject from the list is chosen; or choose \"A new subject\"";
+            let allowed = "empty, because a subject from the list is chosen. To add this subject, choose \u{201c}A new subject, entered below\u{201d}";
             return Err(Error::invalid(field, text.as_str(), allowed));
         }
     }

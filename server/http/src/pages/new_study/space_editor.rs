@@ -2,7 +2,7 @@
 
 use gait_learner::{Dimension, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
-use gaitwright_service::error::Error;
+use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::search::TABLE_I;
 use std::collections::BTreeMap;
 
@@ -80,11 +80,11 @@ impl SpaceEditor {
             dimensions.push(Dimension { name: row.name.to_owned(), values, lengthscale });
         }
         let space = SearchSpace::new(dimensions).map_err(|error| match error {
-            LearnerError::NoDimension => Error::invalid("tuned_a1", "no bound", "at least one tuned bound"),
+            LearnerError::NoDimension => FieldError::in_words("tuned_a1", "No bound is tuned. Tick at least one.").into(),
             LearnerError::InvalidDimension { dimension, reason } => Error::invalid(
                 &format!("values_{dimension}"),
                 self.values_of(&dimension),
-                &format!("increasing values ({reason})"),
+                &format!("a list of increasing values ({reason})"),
             ),
             LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
                 Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))

@@ -179,7 +179,7 @@ pub async fn answer(
         return Err(Error::invalid(
             "answer",
             "withdrawn",
-            "one of the other answers, because only the service withdraws answers",
+            "one of the other answers, because this value is reserved for the service",
         ));
     }
     printable::note("note", &given.note, 2000)?;

@@ -52,7 +52,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
         return Err(Error::invalid(
             "answer",
             "withdrawn",
-            "one of the other answers, because only the service withdraws answers",
+            "one of the other answers, because this value is reserved for the service",
         ));
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
