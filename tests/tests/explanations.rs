@@ -179,7 +179,10 @@ async fn requested_explanation_is_made_after_a_restart() {
     }
     until("one is begun", async || counts.begun.load(Ordering::SeqCst) == 1).await;
     let page = service.fetch(&format!("/trials/{}", trials[1].id)).await.text;
-    assert!(page.contains("is solving this trial again with relaxed bounds") && page.contains("explanation.mjs"), "{page}");
+    assert!(
+        page.contains("is solving this trial again with relaxed bounds") && page.contains("explanation.mjs"),
+        "{page}"
+    );
     service.stop().await;
     until("it is cancelled", async || counts.cancelled.load(Ordering::SeqCst) == 1).await;
 

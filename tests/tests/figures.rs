@@ -170,7 +170,10 @@ async fn a_running_solve_has_its_figure_and_keeps_it_when_it_has_ended() {
     let mut drawings = Vec::new();
     while drawings.is_empty() {
         tokio::time::sleep(std::time::Duration::from_millis(10)).await;
-        drawings = linked(&service.fetch(&page).await.text, "/solve-objective-violation-and-barrier-parameter-by-iteration.csv");
+        drawings = linked(
+            &service.fetch(&page).await.text,
+            "/solve-objective-violation-and-barrier-parameter-by-iteration.csv",
+        );
     }
     let rows = async |address: &str| String::from_utf8(file(&service, address).await.1).unwrap().lines().count();
     let running = rows(&drawings[0]).await;

@@ -101,7 +101,8 @@ async fn browser_shows_an_explanation_as_soon_as_it_is_made() {
     page.wait_for("#explanation li").await;
     let text = page.text("#explanation").await;
     assert!(
-        text.contains("Relaxing a5 (swing-foot clearance) alone, to 0.03 m") && !text.contains("is solving this trial again"),
+        text.contains("Relaxing a5 (swing-foot clearance) alone, to 0.03 m")
+            && !text.contains("is solving this trial again"),
         "{text}"
     );
     page.is_clean(&site.origin).await;
