@@ -99,7 +99,7 @@ pub async fn send_accepting(service: &Service, who: &As, path: &str, form: &str)
 }
 
 /// Adds the credential of a caller to a request.
-fn of(who: &As, request: Builder) -> Builder {
+pub fn of(who: &As, request: Builder) -> Builder {
     match who {
         As::Nobody => request,
         As::Session(secret) => request

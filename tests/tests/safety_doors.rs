@@ -3,7 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
 use gait_optimizer::Device;
 use gaitwright_service::access::{Caller, Right};
 use gaitwright_service::studies::lab;
@@ -138,7 +139,10 @@ async fn a_lab_script_is_not_given_bounds_that_were_reported_as_unsafe() {
         (service.study(by_script).await, service.study(by_script).await, service.study(by_script).await);
     let ask = async |study: StudyId| service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await;
     let open = ask(second).await.json();
-    let with_key = || service.post_with_key(&format!("/api/v1/studies/{third}/ask"), &json!({}), "morning");
+    let with_key = || {
+        let request = Request::post(format!("/api/v1/studies/{third}/ask")).header("idempotency-key", "morning");
+        service.send(request.body(Body::empty()).unwrap())
+    };
     assert_eq!(with_key().await.json()["action"], open["action"]);
     let reported = scripted::trial(&service, first).await;
     assert_eq!(open["action"], json!(reported.action));

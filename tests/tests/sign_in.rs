@@ -4,11 +4,11 @@
 
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
-use futures_util::StreamExt;
+use futures_util::{StreamExt, stream};
 use gaitwright_http::Access;
 use gaitwright_service::access::back_off::{self, Origin};
 use gaitwright_service::access::people::{self, NewUser};
-use gaitwright_service::access::sign_in::Limits;
+use gaitwright_service::access::sign_in::{self, Limits};
 use gaitwright_service::access::tokens::{self as making, NewToken};
 use gaitwright_service::access::{Caller, Clock, Right, Role};
 use gaitwright_store::audit::{self, Actor, AuditRow};
@@ -16,9 +16,9 @@ use gaitwright_store::members::MemberKind;
 use gaitwright_store::{Instant, SessionId, Store, UserId, commit, now, seals, sign_in_failures};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{
-    As, FORM, cookie_of, member, send, service, session_of, sign_in_from, signed_in, token, user, with_password,
+    self, As, FORM, cookie_of, member, send, service, session_of, sign_in_from, signed_in, token, user, with_password,
 };
-use gaitwright_tests::service::Service;
+use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use std::net::Ipv6Addr;
@@ -26,6 +26,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
+use tokio::sync::oneshot;
 use tower::ServiceExt;
 
 const RIGHT: &str = "correct horse battery";
@@ -100,6 +101,58 @@ async fn bodies_of_callers_who_are_not_signed_in_are_small() {
     let long = json!({"name": "a".repeat(70_000)});
     let (refused, problem) = post(&service, &token, "/api/v1/studies", &long).await;
     assert_eq!((refused, &problem["field"]), (StatusCode::BAD_REQUEST, &json!("subject_id")), "it was read");
+    service.stop().await;
+}
+
+/// Sends a change whose body is complete only after something else has happened.
+async fn with_late_body(
+    service: &Service,
+    (who, method, path): (&As, Method, &str),
+    body: &Value,
+    meanwhile: impl Future<Output = ()>,
+) -> Answer {
+    let (complete, completed) = oneshot::channel::<()>();
+    let text = body.to_string();
+    let (first, rest) = (text[..1].to_owned(), text[1..].to_owned());
+    let rest = async move {
+        completed.await.unwrap();
+        Ok::<_, std::io::Error>(rest)
+    };
+    let body = Body::from_stream(stream::iter([Ok(first)]).chain(stream::once(rest)));
+    let request = callers::of(who, Request::builder().method(method).uri(path)).header(header::CONTENT_TYPE, JSON);
+    let finish = async {
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        meanwhile.await;
+        complete.send(()).unwrap();
+    };
+    tokio::join!(service.send(request.body(body).unwrap()), finish).0
+}
+
+#[tokio::test]
+async fn change_is_refused_if_rights_or_consent_end_before_its_body_is_complete() {
+    let (_folder, mut service) = service().await;
+    service.access = Arc::new(Access::by_sign_in(3600.0));
+    let root = signed_in(&service, Role::Admin).await;
+    let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    let (id, link) = user(&service, "Eve", Role::Admin).await;
+    let mut writer = service.store.write().await.unwrap();
+    let (_, session) = sign_in::with_link(&mut writer, &link).await.unwrap();
+    commit(writer).await.unwrap();
+    let eve = As::Session(session);
+    let disable = async {
+        assert_eq!(post(&service, &root, &format!("/api/v1/users/{id}/disable"), &json!({})).await.0, StatusCode::OK);
+    };
+    let token = json!({"name": "mine", "scopes": ["read"]});
+    let refused = with_late_body(&service, (&eve, Method::POST, "/api/v1/tokens"), &token, disable).await;
+    assert_eq!(refused.status, StatusCode::UNAUTHORIZED, "{}", refused.text);
+
+    let withdraw = async {
+        let path = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
+        assert_eq!(post(&service, &root, &path, &json!({"reason": "asked to"})).await.0, StatusCode::OK);
+    };
+    let (path, name) = (format!("/api/v1/studies/{study}"), json!({"name": "late"}));
+    let refused = with_late_body(&service, (&root, Method::PATCH, &path), &name, withdraw).await;
+    assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
     service.stop().await;
 }
 

@@ -26,11 +26,7 @@ pub(super) struct AnsweredTo(pub(super) Option<Role>);
 
 /// Receives the request, adds its [`Caller`], and the caller's role to the response. Refuses an invalid token; ignores an
 /// invalid session. The caller is looked up again after a body was received, because rights can end while it arrives.
-pub(super) async fn identify(
-    State(app): State<AppState>,
-    request: Request,
-    next: Next,
-) -> Result<Response, Refusal> {
+pub(super) async fn identify(State(app): State<AppState>, request: Request, next: Next) -> Result<Response, Refusal> {
     let (path, headers) = (request.uri().path().to_owned(), request.headers().clone());
     let mut found = caller(&app, &path, &headers).await?;
     let has_body = !request.body().is_end_stream();

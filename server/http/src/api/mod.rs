@@ -37,7 +37,7 @@ mod users;
 
 use super::AppState;
 pub(super) use jobs::Workers;
-use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouterExt};
+use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 /// Every route below `/api/v1`.

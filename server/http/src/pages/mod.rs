@@ -39,7 +39,6 @@ mod unsent;
 mod users;
 
 use super::AppState;
-use super::api::recordings;
 use axum::Router;
 use axum::middleware::from_fn_with_state;
 use axum::routing::{get, post};

@@ -29,7 +29,8 @@ pub(super) struct Reviewed {
 impl Reviewed {
     fn read(self) -> Result<Decision, Error> {
         let identifier = |text: &str| {
-            text.parse().map_err(|_| Error::invalid("reports", text, "the identifier of a safety report from this form"))
+            text.parse()
+                .map_err(|_| Error::invalid("reports", text, "the identifier of a safety report from this form"))
         };
         let reports = self.reports.split(',').map(identifier).collect::<Result<Vec<SafetyReportId>, _>>()?;
         let Self { decision, reason, author, .. } = self;

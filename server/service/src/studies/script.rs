@@ -17,7 +17,7 @@ use gaitwright_store::audit;
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use gaitwright_store::trials::{NewTrial, ScriptOutcome, Trial, TrialState};
-use gaitwright_store::{Store, StudyId, TrialId, Writer, events, studies, trials};
+use gaitwright_store::{Connection, Store, StudyId, TrialId, Writer, events, studies, trials};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::sync::Arc;

@@ -47,7 +47,11 @@ impl GivenSpace {
             Err(LearnerError::InvalidDimension { dimension, reason }) => {
                 let at = at(&dimension);
                 let values = self.dimensions.get(at).map(|dimension| json!(dimension.values)).unwrap_or_default();
-                Err(Error::invalid(&format!("{FIELD}[{at}].values"), values, &format!("a list of increasing values ({reason})")))
+                Err(Error::invalid(
+                    &format!("{FIELD}[{at}].values"),
+                    values,
+                    &format!("a list of increasing values ({reason})"),
+                ))
             }
             Err(LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest }) => {
                 let field = format!("{FIELD}[{}].lengthscale", at(&dimension));

@@ -80,7 +80,9 @@ impl SpaceEditor {
             dimensions.push(Dimension { name: row.name.to_owned(), values, lengthscale });
         }
         let space = SearchSpace::new(dimensions).map_err(|error| match error {
-            LearnerError::NoDimension => FieldError::in_words("tuned_a1", "No bound is tuned. Tick at least one.").into(),
+            LearnerError::NoDimension => {
+                FieldError::in_words("tuned_a1", "No bound is tuned. Tick at least one.").into()
+            }
             LearnerError::InvalidDimension { dimension, reason } => Error::invalid(
                 &format!("values_{dimension}"),
                 self.values_of(&dimension),

@@ -50,7 +50,8 @@ impl Choice {
             return Err(Error::invalid("order", self.order.as_str(), "ascending or descending"));
         }
         Ok(Listing {
-            sort: sort.ok_or_else(|| Error::invalid("sort", self.sort.as_str(), &format!("one of {}", SORTS.join(", "))))?,
+            sort: sort
+                .ok_or_else(|| Error::invalid("sort", self.sort.as_str(), &format!("one of {}", SORTS.join(", "))))?,
             descending: self.order == DESCENDING,
             state,
             contains: self.contains.trim().to_owned(),

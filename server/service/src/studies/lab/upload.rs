@@ -70,7 +70,11 @@ impl EmgReading {
     /// [`Error::Invalid`] with line and column, or the field.
     pub fn read(&self, what: &str, text: &str) -> Result<(EmgRecording, Vec<f64>), Error> {
         if let Some(unknown) = self.channels.keys().find(|name| !CHANNELS.contains(&name.as_str())) {
-            return Err(Error::invalid("reading.channels", unknown.as_str(), &format!("one of {}", CHANNELS.join(", "))));
+            return Err(Error::invalid(
+                "reading.channels",
+                unknown.as_str(),
+                &format!("one of {}", CHANNELS.join(", ")),
+            ));
         }
         let whole = match (self.form, self.rate_hz) {
             (FileForm::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
