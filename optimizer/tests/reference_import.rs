@@ -169,7 +169,7 @@ fn strides_with_gaps_are_dropped() {
     }
     let only_that = HeelStrikes::Given(vec![2.2, 3.3]);
     let refused = read(&text).unwrap().reference("x", &only_that, Walker::default()).unwrap_err().to_string();
-    assert!(refused.contains("no stride lasts 0.8 to 1.6 s, without a gap of 0.1 s"), "{refused}");
+    assert!(refused.contains("no stride without a gap of 0.1 s lasts 0.8 to 1.6 s"), "{refused}");
 }
 
 type Change = fn(&mut ReferenceGait);
@@ -359,7 +359,7 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
         recording.reference("x", &HeelStrikes::Given(strikes), Walker::default()).unwrap_err().to_string()
     };
     assert!(refused(vec![0.5]).contains("right heel strikes found: 1; a stride needs two"));
-    assert!(refused(vec![0.5, 0.9]).contains("no stride lasts 0.8 to 1.6 s"));
+    assert!(refused(vec![0.5, 0.9]).contains("lasts 0.8 to 1.6 s"));
     assert!(refused(vec![1.5, 0.5]).contains("must increase"));
     assert!(refused(vec![0.5, 9.0]).contains("heel_strikes_s is 9; it must be"));
     // Forces that end before the first stride.

@@ -4,13 +4,16 @@
 
 use axum::http::StatusCode;
 use gaitwright_store::presentations::{self, Judgement};
+use gaitwright_store::safety_reviews::{self, SafetyDecision};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
-use gaitwright_store::{StudyId, TrialId, audit, lab_sessions};
+use gaitwright_store::{Store, StudyId, TrialId, audit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::FORM;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
+use sqlx::SqlitePool;
+use sqlx::sqlite::SqliteConnectOptions;
 
 async fn started(mode: FeedbackMode, budget: u32) -> (tempfile::TempDir, Service, StudyId) {
     let folder = tempfile::tempdir().unwrap();
@@ -169,4 +172,29 @@ async fn lifted_safety_report_of_a_walk_opens_anew_at_unblinding() {
     snapshot.retain(|report| report["stands"] == json!(true));
     assert_eq!(snapshot.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
     service.stop().await;
+}
+
+#[tokio::test]
+async fn order_of_reviews_survives_a_renumbering_of_their_rows() {
+    let (_folder, service, study) = started(FeedbackMode::Automatic, 4).await;
+    let gait = converged(&service, study).await[0];
+    service.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "stumbled"})).await;
+    for decision in ["unsafe", "walkable"] {
+        let reviewed = decide(&service, gait, &json!({"decision": decision, "reason": "seen"})).await;
+        assert_eq!(reviewed.status, StatusCode::OK, "{}", reviewed.text);
+    }
+    let path = service.store.path().to_owned();
+    service.stop().await;
+    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(&path)).await.unwrap();
+    let trigger = "select sql from sqlite_master where name = 'safety_reviews_no_update'";
+    let trigger: String = sqlx::query_scalar(trigger).fetch_one(&pool).await.unwrap();
+    for sql in ["drop trigger safety_reviews_no_update", "update safety_reviews set rowid = -rowid", &trigger] {
+        sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&pool).await.unwrap();
+    }
+    pool.close().await;
+    let store = Store::open(&path).await.unwrap();
+    let reviews = safety_reviews::of_study(&mut *store.read().await.unwrap(), study).await.unwrap();
+    let decisions: Vec<_> = reviews.iter().map(|review| review.decision).collect();
+    assert_eq!(decisions, [SafetyDecision::Unsafe, SafetyDecision::Walkable]);
+    store.close().await;
 }

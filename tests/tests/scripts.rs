@@ -170,7 +170,7 @@ async fn time_and_a_settled_best_end_a_study() {
     let timed = service.study(|new| (new.trial_budget, new.solve_seconds_budget) = (400, Some(1.0))).await;
     let settled = service.study(|new| (new.trial_budget, new.unchanged_limit) = (400, Some(6))).await;
     let settled = service.wait_for(settled, &[StudyState::Finished]).await;
-    assert!(settled.state_reason.contains("did not change in 6 results"), "{}", settled.state_reason);
+    assert!(settled.state_reason.contains("has not changed over the last 6 results"), "{}", settled.state_reason);
     let timed = service.wait_for(timed, &[StudyState::Finished]).await;
     assert!(timed.state_reason.contains("of the 1 s"), "{}", timed.state_reason);
     let trials = service.trials(timed.id).await.len();

@@ -24,10 +24,18 @@ impl Cell {
         let leaves_no_mark = |c: char| {
             c.is_whitespace() || c.is_control() || CodePointSetData::new::<DefaultIgnorableCodePoint>().contains(c)
         };
-        let begins_formula =
-            text.trim_start_matches(leaves_no_mark).starts_with(FORMULA) || text.starts_with(['\t', '\r', '\n']);
-        let safe = if begins_formula { format!("'{text}") } else { text.to_owned() };
-        // Semicolons separate cells in locales with a decimal comma.
+        let begins_formula = |part: &str| part.trim_start_matches(leaves_no_mark).starts_with(FORMULA);
+        let mut safe = String::with_capacity(text.len() + 1);
+        if text.starts_with(['\t', '\r', '\n']) {
+            safe.push('\'');
+        }
+        // Semicolons separate cells in locales with a decimal comma, and some programs split at tabs and lines, too.
+        for part in text.split_inclusive([';', '\t', '\r', '\n']) {
+            if begins_formula(part) && !safe.ends_with('\'') {
+                safe.push('\'');
+            }
+            safe.push_str(part);
+        }
         if safe.contains([',', ';', '"', '\t', '\r', '\n']) {
             return Self(format!("\"{}\"", safe.replace('"', "\"\"")));
         }
@@ -136,6 +144,15 @@ mod tests {
                 assert!(cell.0.starts_with('\'') || cell.0.starts_with("\"'"), "{hidden:?}{start:?}: {cell:?}");
             }
             assert_eq!(Cell::text(&format!("{hidden}a=1")).0, format!("{hidden}a=1"));
+        }
+    }
+
+    #[test]
+    fn formulas_after_a_separator_within_a_text_are_neutralised() {
+        for (text, expected) in
+            [("a;=1+1;b", "\"a;'=1+1;b\""), ("x\n=1", "\"x\n'=1\""), ("x\t @A1", "\"x\t' @A1\""), ("a; b", "\"a; b\"")]
+        {
+            assert_eq!(Cell::text(text).0, expected);
         }
     }
 

@@ -12,7 +12,6 @@ use std::sync::Arc;
 const FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 const PROTO: HeaderName = HeaderName::from_static("x-forwarded-proto");
 const HOST: HeaderName = HeaderName::from_static("x-forwarded-host");
-const REAL_IP: HeaderName = HeaderName::from_static("x-real-ip");
 
 /// An address, or a network in CIDR notation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,7 +147,17 @@ impl Proxies {
 
 /// Whether a proxy of any kind says that it forwarded the request.
 pub(super) fn is_forwarded(headers: &HeaderMap) -> bool {
-    [FOR, PROTO, HOST, REAL_IP, header::FORWARDED, header::VIA].iter().any(|name| headers.contains_key(name))
+    const OTHERS: [&str; 8] = [
+        "forwarded",
+        "via",
+        "x-real-ip",
+        "x-client-ip",
+        "true-client-ip",
+        "cf-connecting-ip",
+        "x-original-url",
+        "x-envoy-external-address",
+    ];
+    headers.keys().any(|name| name.as_str().starts_with("x-forwarded-") || OTHERS.contains(&name.as_str()))
 }
 
 /// Removes the headers of proxies, so that no later code reads them.

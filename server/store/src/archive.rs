@@ -31,7 +31,11 @@ const TABLES: [(&str, &str); 31] = [
     ("assessments", "study_id = ? order by id"),
     ("assessment_retractions", "assessment_id in (select id from assessments where study_id = ?)"),
     ("safety_reports", "trial_id in (select id from trials where study_id = ?) order by rowid"),
-    ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by rowid"),
+    (
+        "safety_reviews",
+        "trial_id in (select id from trials where study_id = ?) \
+         order by (select min(s.seq) from seals s where s.evidence = 'safety_reviews' and s.key = safety_reviews.id)",
+    ),
     (
         "safety_review_reports",
         "review_id in (select r.id from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ?) \

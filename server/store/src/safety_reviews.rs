@@ -121,7 +121,10 @@ pub async fn get(db: &mut Connection, id: SafetyReviewId) -> StoreResult<SafetyR
 /// # Errors
 /// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<SafetyReview>> {
-    let of_study = "cross join trials t on t.id = r.trial_id where t.study_id = ? order by r.rowid";
+    // In the order of their seals, which nobody can change unnoticed. A review of the present change has none yet.
+    let of_study = "cross join trials t on t.id = r.trial_id where t.study_id = ? order by \
+                    ifnull((select min(s.seq) from seals s where s.evidence = 'safety_reviews' and s.key = r.id), 1e18), \
+                    r.rowid";
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} {of_study}"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()

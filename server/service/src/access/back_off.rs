@@ -86,7 +86,10 @@ pub async fn begin(
     }
     let attempts = failures::count(writer, &origin.network, now, is_new_name).await?;
     let mut counts = vec![own];
-    if origin.known.is_none() {
+    if let Some(user) = origin.known {
+        // A cookie that was planted or read on a shared device allows no more guesses than many networks do.
+        counts.push(Count { name: name.clone(), source: format!("{ALL_NETWORKS} {user}"), limit: EVERYWHERE });
+    } else {
         counts.extend(origin.site.clone().map(|site| Count { name: name.clone(), source: site, limit: SITE }));
         counts.push(Count { name: name.clone(), source: ALL_NETWORKS.to_owned(), limit: EVERYWHERE });
     }
