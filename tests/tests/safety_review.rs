@@ -193,7 +193,7 @@ async fn order_of_reviews_survives_a_renumbering_of_their_rows() {
     }
     pool.close().await;
     let store = Store::open(&path).await.unwrap();
-    let reviews = safety_reviews::of_study(&mut *store.read().await.unwrap(), study).await.unwrap();
+    let reviews = safety_reviews::of_study(&mut store.read().await.unwrap(), study).await.unwrap();
     let decisions: Vec<_> = reviews.iter().map(|review| review.decision).collect();
     assert_eq!(decisions, [SafetyDecision::Unsafe, SafetyDecision::Walkable]);
     store.close().await;
