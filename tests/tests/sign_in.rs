@@ -257,6 +257,21 @@ async fn guesses_from_many_networks_wait_a_few_seconds_and_known_browsers_do_not
 }
 
 #[tokio::test]
+async fn cookie_of_a_known_browser_allows_no_more_guesses_than_many_networks() {
+    let (_folder, service) = service().await;
+    let user = with_password(&service, "Ada", Role::Clinician, RIGHT).await;
+    let mut writer = service.store.write().await.unwrap();
+    let (at, mut checked) = (now(), 0);
+    for number in 1..=60 {
+        let origin = Origin { network: format!("198.51.100.{number}"), site: None, known: Some(user) };
+        checked += u32::from(back_off::begin(&mut writer, at, "Ada", origin).await.unwrap().is_ok());
+    }
+    commit(writer).await.unwrap();
+    assert!((50..=51).contains(&checked), "{checked}");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn ten_thousand_aborted_sign_ins_with_fresh_names_do_not_erase_the_failures_of_an_account() {
     let (folder, service) = service().await;
     with_password(&service, "Ada", Role::Admin, RIGHT).await;

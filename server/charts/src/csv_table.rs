@@ -26,7 +26,7 @@ impl Cell {
         };
         let begins_formula = |part: &str| part.trim_start_matches(leaves_no_mark).starts_with(FORMULA);
         let mut safe = String::with_capacity(text.len() + 1);
-        if text.starts_with(['\t', '\r', '\n']) {
+        if begins_formula(text) || text.starts_with(['\t', '\r', '\n']) {
             safe.push('\'');
         }
         // Semicolons separate cells in locales with a decimal comma, and some programs split at tabs and lines, too.
