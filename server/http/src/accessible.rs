@@ -5,7 +5,6 @@
 
 use super::AppState;
 use super::authorization::{Refused, permitted};
-use super::visible::visible;
 use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
 use gaitwright_service::access::{Permission, Reach};
@@ -14,7 +13,7 @@ use gaitwright_service::studies::job::JobId;
 use gaitwright_store::{
     AssessmentId, BackupId, Connection, DeviceId, FeedbackId, LabSessionId, MeasurementFileId, MemberId,
     ReferenceGaitId, SessionId, StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, assessments,
-    feedback, lab_sessions, measurement_files, members, trials,
+    consents, feedback, lab_sessions, measurement_files, members, trials,
 };
 use serde::Deserialize;
 use std::fmt::Display;
@@ -159,6 +158,15 @@ pub(super) async fn in_path<T: Located, P: Permission>(
     let study = located(&mut *app.read().await?, reach, id).await?;
     parts.extensions.insert(OfStudy(study));
     Ok((id, study))
+}
+
+/// Reads the identifier in the path, and refuses it if the subject of its study withdrew consent.
+pub(super) async fn visible<T: Located, P: Permission>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
+    let (id, study) = in_path::<T, P>(parts, app).await?;
+    if let Some(study) = study {
+        consents::may_be_shown(&mut *app.read().await?, study).await?;
+    }
+    Ok(id)
 }
 
 /// An identifier in a query or form, usable only through [`Named::accessible`].
