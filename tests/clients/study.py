@@ -125,7 +125,7 @@ def by_script(client: Client, subject: UUID) -> None:
     trials = trials_of(client, study.id)
     assert [trial.number for trial in trials] == list(range(1, BUDGET + 1)), trials
     best = given(MilestonePage, get_study_history.sync(study.id, client=client)).items[-1]
-    assert given(StudyView, get_study.sync(study.id, client=client)).state == StudyState.FINISHED
+    wait_until(client, study.id, StudyState.FINISHED)
     print(f"python: {len(trials)} trials, best: trial {best.number}, {best.gait_rmse_rad:.4f} rad")
 
 
