@@ -76,6 +76,14 @@ mod tests {
         assert!(matches!(receive(in_single_bytes(sent), 4999).await, Err(Error::TooLarge(_))));
     }
 
+    #[test]
+    fn uploads_over_rest_are_described_operations() {
+        let description = crate::openapi::text().unwrap();
+        for route in UPLOADS.iter().filter(|route| route.starts_with("/api/")) {
+            assert!(description.contains(&format!("\"{route}\"")), "{route}");
+        }
+    }
+
     #[tokio::test]
     async fn broken_body_is_refused() {
         let parts = [Ok(Bytes::from_static(b"a")), Err(std::io::Error::other("cut off"))];

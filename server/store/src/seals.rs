@@ -80,7 +80,7 @@ pub const TABLES: &[Sealed] = &[
 ];
 
 /// Tables of earlier schema versions, which a migration copied to tables of other names. Their seals stay in the chain.
-pub const RETIRED: &[Sealed] =
+const RETIRED: &[Sealed] =
     &[sealed("remarks", &["id"]), sealed("remark_retractions", &["remark_id"]), sealed("lab_recordings", &["id"])];
 
 /// Tables with checksums: their rows change often, or only repeat other data.

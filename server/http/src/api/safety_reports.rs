@@ -49,8 +49,8 @@ impl From<Closed> for SafetyReport {
 
 /// List safety reports of a study
 ///
-/// Includes safety reports from raters, assessments and lab sessions, and reports about a single gait, also those about
-/// gaits that were cleared for walking, but not retracted reports. A report from a blinded lab session is listed for both of its gaits.
+/// Includes safety reports from raters, assessments and lab sessions, and reports about a single gait, even if the gait was
+/// cleared for walking. Omits retracted reports. A report from a blinded lab session is listed for both of its gaits.
 #[utoipa::path(
     get,
     path = "/studies/{id}/safety-reports",

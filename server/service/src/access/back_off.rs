@@ -1,7 +1,7 @@
 //! Sign-in back-off: each failed attempt doubles the wait before another password for the same name is checked. Failures
 //! count separately for the network of the client, for the site that a network belongs to, and for all networks together.
-//! The wait of all networks is short, so that an attacker cannot lock a user out, and a browser in which the user signed
-//! in earlier counts only its own failures. Counts are in the record, so they survive a restart.
+//! The wait of all networks is short, so that an attacker cannot lock a user out. Browsers in which the user signed in
+//! earlier have counts of their own. Counts are in the record, so they survive a restart.
 
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
@@ -87,7 +87,7 @@ pub async fn begin(
     let attempts = failures::count(writer, &origin.network, now, is_new_name).await?;
     let mut counts = vec![own];
     if let Some(user) = origin.known {
-        // A cookie that was planted or read on a shared device allows no more guesses than many networks do.
+        // Somebody who has the cookie of such a browser gets no more guesses than somebody with many networks.
         counts.push(Count { name: name.clone(), source: format!("{ALL_NETWORKS} {user}"), limit: EVERYWHERE });
     } else {
         counts.extend(origin.site.clone().map(|site| Count { name: name.clone(), source: site, limit: SITE }));
