@@ -171,13 +171,14 @@ fn unreadable(what: &str, value: &str) -> Error {
     Error::Malformed(format!("A header of the reverse proxy is malformed: {what} is {value:?}."))
 }
 
-/// The comma-separated parts of all lines of a header.
+/// The comma-separated parts of all lines of a header. An empty part is a hop of its own: without it, the last hop could
+/// be the client's own text.
 fn parts(headers: &HeaderMap, name: &HeaderName) -> Result<Vec<String>, Error> {
     let mut parts = Vec::new();
     for line in headers.get_all(name) {
         let text = line.to_str().map_err(|_| unreadable(name.as_str(), "not text"))?;
         let split = split(text, ',').ok_or_else(|| unreadable(name.as_str(), text))?;
-        parts.extend(split.into_iter().map(|part| part.trim().to_owned()).filter(|part| !part.is_empty()));
+        parts.extend(split.into_iter().map(|part| part.trim().to_owned()));
     }
     Ok(parts)
 }
@@ -190,9 +191,9 @@ fn x_forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
     let at = |values: &[String], hop: usize| {
         let place =
             if values.len() == hops { Some(hop) } else { values.len().checked_sub(1).filter(|_| hop + 1 == hops) };
-        place.and_then(|place| values.get(place).cloned())
+        place.and_then(|place| values.get(place)).filter(|value| !value.is_empty()).cloned()
     };
-    let hop = |hop| Hop { from: from.get(hop).cloned(), proto: at(&protos, hop), host: at(&hosts, hop) };
+    let hop = |hop| Hop { from: at(&from, hop), proto: at(&protos, hop), host: at(&hosts, hop) };
     Ok((0..hops).map(hop).collect())
 }
 
@@ -201,18 +202,25 @@ fn forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
     let mut hops = Vec::new();
     for part in parts(headers, &header::FORWARDED)? {
         let mut hop = Hop::default();
+        let mut names = Vec::new();
         let pairs = split(&part, ';').ok_or_else(|| unreadable("Forwarded", &part))?;
         for pair in pairs.into_iter().filter(|pair| !pair.trim().is_empty()) {
             let (name, value) = pair.split_once('=').ok_or_else(|| unreadable("Forwarded", &part))?;
             let value = value.trim();
             let bare = value.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
             let value = bare.map_or_else(|| value.to_owned(), |quoted| quoted.replace('\\', ""));
-            match name.trim().to_ascii_lowercase().as_str() {
+            let name = name.trim().to_ascii_lowercase();
+            match name.as_str() {
                 "for" => hop.from = Some(value),
                 "proto" => hop.proto = Some(value),
                 "host" => hop.host = Some(value),
                 _ => {}
             }
+            // RFC 7239, section 4: a parameter occurs once.
+            if names.contains(&name) {
+                return Err(unreadable("Forwarded", &part));
+            }
+            names.push(name);
         }
         hops.push(hop);
     }
@@ -359,6 +367,37 @@ mod tests {
         }
         let lines = [("forwarded", "for=192.0.2.1;x=\"a\\\", b\", for=203.0.113.9")];
         assert_eq!(believed("127.0.0.1", ProxyHeaders::Forwarded, &lines).0, "203.0.113.9");
+    }
+
+    #[test]
+    fn empty_hop_counts_as_the_proxy() {
+        let proxy = ("127.0.0.1".to_owned(), None, String::new());
+        for line in ["6.6.6.6,", "6.6.6.6, ", "6.6.6.6,,", "6.6.6.6, \t", ""] {
+            let lines = [("x-forwarded-for", line)];
+            assert_eq!(believed("127.0.0.1", ProxyHeaders::XForwarded, &lines), proxy, "{line:?}");
+            let line = line.replace("6.6.6.6", "for=6.6.6.6;proto=https;host=evil");
+            assert_eq!(believed("127.0.0.1", ProxyHeaders::Forwarded, &[("forwarded", &line)]), proxy, "{line:?}");
+        }
+        let lines = [("x-forwarded-for", "6.6.6.6"), ("x-forwarded-for", ""), ("x-forwarded-proto", "https,")];
+        assert_eq!(believed("127.0.0.1", ProxyHeaders::XForwarded, &lines), proxy);
+        let lines = [("x-forwarded-for", "6.6.6.6,, 192.0.2.9"), ("x-forwarded-proto", "http, https")];
+        let client = ("192.0.2.9".to_owned(), Some(true), String::new());
+        assert_eq!(believed("127.0.0.1", ProxyHeaders::XForwarded, &lines), client);
+    }
+
+    #[test]
+    fn repeated_parameter_of_a_hop_is_refused() {
+        for line in [
+            "for=6.6.6.6;for=192.0.2.9",
+            "for=192.0.2.9;FOR=192.0.2.9",
+            "for=192.0.2.9;proto=http;proto=https",
+            "for=192.0.2.9;host=a;Host=b",
+            "for=192.0.2.9;by=a; by=b",
+        ] {
+            let lines = [("forwarded", line)];
+            let found = proxies(ProxyHeaders::Forwarded).believe("127.0.0.1".parse().unwrap(), &headers(&lines));
+            assert!(found.is_err(), "{line}: {found:?}");
+        }
     }
 
     #[test]
