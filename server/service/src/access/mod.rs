@@ -6,6 +6,7 @@
 pub mod back_off;
 mod caller;
 pub mod clock;
+mod likely_words;
 pub mod password;
 pub mod people;
 mod permission;
