@@ -5,6 +5,7 @@
 use gaitwright_store::seals::{self, SealCheck};
 use gaitwright_store::{Store, StoreError, audit, commit, read_only, verify as store_verify};
 use gaitwright_tests::every_table::filled;
+use sha2::{Digest, Sha256};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection, Row};
 use std::path::{Path, PathBuf};
@@ -275,6 +276,40 @@ async fn a_row_that_another_program_wrote_is_not_sealed_by_a_later_change() {
         // Other changes are still possible.
         commit(store.write().await.unwrap()).await.unwrap();
         store.close().await;
+    }
+}
+
+/// Appends a seal with a valid hash.
+async fn append_seal(database: &Path, table: &str, key: &str) {
+    let mut connection = open(database).await;
+    let last = "select hash from seals order by seq desc limit 1";
+    let previous: String = sqlx::query_scalar(last).fetch_one(&mut connection).await.unwrap();
+    let sha256 = "0".repeat(64);
+    let hash = hex::encode(Sha256::digest(format!("{previous}\n{sha256}\n{table}\n{key}")));
+    let append = "insert into seals (evidence, key, sha256, previous, hash) values (?, ?, ?, ?, ?)";
+    let append = sqlx::query(append).bind(table).bind(key).bind(sha256).bind(previous).bind(hash);
+    append.execute(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn a_seal_of_a_retired_table_that_no_migration_left_is_found() {
+    let (_folder, database) = filled().await;
+    for (retired, copy, column) in [
+        ("remarks", "assessments", "id"),
+        ("remark_retractions", "assessment_retractions", "assessment_id"),
+        ("lab_recordings", "measurement_files", "id"),
+    ] {
+        let of_copy = AssertSqlSafe(format!("select {column} from {copy} limit 1"));
+        let of_copy: String = sqlx::query_scalar(of_copy).fetch_one(&mut open(&database).await).await.unwrap();
+        for key in [of_copy, "01890000-0000-7000-8000-000000000000".to_owned()] {
+            let forged = database.with_file_name("forged.db");
+            std::fs::copy(&database, &forged).unwrap();
+            append_seal(&forged, retired, &key).await;
+            let expected = SealCheck::Touched { table: retired.to_owned(), key };
+            assert_eq!(verify(&forged).await, expected);
+            assert!(matches!(Store::open(&forged).await, Err(StoreError::Damaged { .. })), "{expected:?}");
+        }
     }
 }
 

@@ -79,9 +79,13 @@ pub const TABLES: &[Sealed] = &[
     sealed("imports", &["seq"]),
 ];
 
-/// Tables of earlier schema versions, which a migration copied to tables of other names. Their seals stay in the chain.
-const RETIRED: &[Sealed] =
-    &[sealed("remarks", &["id"]), sealed("remark_retractions", &["remark_id"]), sealed("lab_recordings", &["id"])];
+/// Tables of earlier schema versions, each with the table to which a migration copied its rows under the same keys. Their
+/// seals stay in the chain, before those of the copies.
+const RETIRED: &[(Sealed, &str)] = &[
+    (sealed("remarks", &["id"]), "assessments"),
+    (sealed("remark_retractions", &["remark_id"]), "assessment_retractions"),
+    (sealed("lab_recordings", &["id"]), "measurement_files"),
+];
 
 /// Tables with checksums: their rows change often, or only repeat other data.
 pub const CHECKED: &[Sealed] = &[
@@ -268,7 +272,7 @@ pub(super) async fn present(db: &mut Connection) -> StoreResult<Vec<Sealed>> {
     let names: Vec<String> =
         sqlx::query_scalar("select name from sqlite_master where type = 'table'").fetch_all(db).await?;
     let is_there = |table: &str| names.iter().any(|name| name == table);
-    let sealed = TABLES.iter().chain(RETIRED).filter(|_| is_there("seals"));
+    let sealed = TABLES.iter().chain(RETIRED.iter().map(|(retired, _)| retired)).filter(|_| is_there("seals"));
     let all = sealed.chain(CHECKED.iter().filter(|_| is_there("checksums")));
     Ok(all.filter(|sealed| is_there(sealed.table)).copied().collect())
 }
@@ -441,22 +445,40 @@ pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
             });
         }
     }
-    Ok(match of_no_table(db, &known).await? {
-        Some((table, key)) => SealCheck::Touched { table, key },
-        None => chain,
-    })
+    let stray = match of_no_table(db, &known).await? {
+        None => of_no_copy(db, &known).await?,
+        found => found,
+    };
+    Ok(stray.map_or(chain, |(table, key)| SealCheck::Touched { table, key }))
 }
 
 /// A seal or checksum of an unknown table.
 async fn of_no_table(db: &mut Connection, known: &[Sealed]) -> StoreResult<Option<(String, String)>> {
     let checksums =
         if known.iter().any(Sealed::is_checked) { "union all select evidence, key from checksums" } else { "" };
-    let names: Vec<String> = known.iter().chain(RETIRED).map(|sealed| format!("'{}'", sealed.table)).collect();
+    let names = known.iter().chain(RETIRED.iter().map(|(retired, _)| retired));
+    let names: Vec<String> = names.map(|sealed| format!("'{}'", sealed.table)).collect();
     let sql = format!(
         "select evidence, key from (select evidence, key from seals {checksums}) where evidence not in ({}) limit 1",
         names.join(", ")
     );
     Ok(sqlx::query_as(AssertSqlSafe(sql)).fetch_optional(db).await?)
+}
+
+/// A seal of a retired table that does not precede the seal of the copied row. The migration left no such seal.
+async fn of_no_copy(db: &mut Connection, known: &[Sealed]) -> StoreResult<Option<(String, String)>> {
+    for (retired, copy) in RETIRED {
+        if known.iter().any(|sealed| sealed.table == retired.table) {
+            continue;
+        }
+        let sql = "select evidence, key from seals s where evidence = ?1 and seq > coalesce(\
+                   (select min(seq) from seals c where c.evidence = ?2 and c.key = s.key), 0) limit 1";
+        let found = sqlx::query_as(sql).bind(retired.table).bind(copy).fetch_optional(&mut *db).await?;
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    Ok(None)
 }
 
 async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
