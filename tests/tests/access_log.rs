@@ -6,7 +6,7 @@ use axum::Router;
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use axum::middleware::map_request;
-use axum::routing::get;
+use axum::routing::{any, get};
 use gaitwright_http::access_log::NO_SUBJECT_DATA;
 use gaitwright_http::{openapi, with_layers};
 use gaitwright_service::access::{Right, Role};
@@ -31,10 +31,26 @@ fn read_routes() -> BTreeSet<String> {
     let pages = include_str!("../../server/http/src/pages/mod.rs");
     let pages = pages.lines().filter(|line| line.contains(".route(\"") && line.contains("get("));
     let mut routes: BTreeSet<String> = pages.map(|line| line.split('"').nth(1).unwrap().to_owned()).collect();
-    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
-    let operations = document["paths"].as_object().unwrap().iter();
-    routes.extend(operations.filter(|(_, item)| item["get"].is_object()).map(|(path, _)| path.clone()));
+    routes.extend(operations().into_iter().filter(|(method, _)| *method == Method::GET).map(|(_, path)| path));
     routes
+}
+
+/// Every operation of the description, as method and path.
+fn operations() -> Vec<(Method, String)> {
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let paths = document["paths"].as_object().unwrap().iter();
+    let of_path = |(path, item): (&String, &Value)| {
+        let methods = item.as_object().unwrap().keys().filter_map(|name| name.to_uppercase().parse::<Method>().ok());
+        let known = |method: &Method| [Method::GET, Method::POST, Method::PUT, Method::PATCH].contains(method);
+        methods.filter(known).map(|method| (method, path.clone())).collect::<Vec<_>>()
+    };
+    paths.flat_map(of_path).collect()
+}
+
+/// A path of a route.
+fn path_of(route: &str) -> String {
+    let path = route.replace("{id}", ANY_ID).replace("{token}", "secret").replace("{side}", "first");
+    path.replace("{link}", "secret").replace("{file}", "a.svg").replace("{name}", "conflict")
 }
 
 async fn rows(service: &Service) -> Vec<AccessRow> {
@@ -72,12 +88,7 @@ async fn every_route_that_shows_subject_data_leaves_a_row() {
     }
     let router = with_layers(all, service.state()).layer(map_request(for_localhost));
     for route in &routes {
-        let path = route
-            .replace("{id}", ANY_ID)
-            .replace("{token}", "secret")
-            .replace("{side}", "first")
-            .replace("{link}", "secret");
-        let path = path.replace("{file}", "a.svg").replace("{name}", "conflict");
+        let path = path_of(route);
         let answer = router.clone().oneshot(Request::get(&path).body(Body::empty()).unwrap()).await.unwrap();
         assert_eq!(answer.status(), StatusCode::OK, "{path}");
     }
@@ -87,6 +98,57 @@ async fn every_route_that_shows_subject_data_leaves_a_row() {
         assert_eq!(noted.contains(&route), expected, "{route}");
     }
     assert!(rows(&service).await.iter().all(|row| !row.object.contains("secret")), "a secret is in the log");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn every_change_that_answers_with_subject_data_leaves_a_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let changes: Vec<_> = operations().into_iter().filter(|(method, _)| *method != Method::GET).collect();
+    assert!(changes.len() > 45, "{changes:?}");
+    let mut all = Router::new();
+    for route in changes.iter().map(|(_, route)| route).collect::<BTreeSet<_>>() {
+        all = all.route(route, any(async || "shown"));
+    }
+    let router = with_layers(all, service.state()).layer(map_request(for_localhost));
+    for (method, route) in &changes {
+        let request = Request::builder().method(method).uri(path_of(route)).body(Body::empty()).unwrap();
+        assert_eq!(router.clone().oneshot(request).await.unwrap().status(), StatusCode::OK, "{method} {route}");
+    }
+    let noted: BTreeSet<(String, String)> =
+        rows(&service).await.into_iter().map(|row| (row.method, row.route)).collect();
+    for (method, route) in changes {
+        let expected = !NO_SUBJECT_DATA.contains(&route.as_str());
+        assert_eq!(noted.contains(&(method.to_string(), route.clone())), expected, "{method} {route}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn token_that_may_not_read_is_logged_when_a_change_shows_it_a_study() {
+    let (_folder, service, study) = with_study().await;
+    let runs = token(&service, &[Right::Run]).await;
+    let subject = service.subject().await;
+    let path = format!("/api/v1/studies/{study}");
+    assert_eq!(send(&service, &runs, &Method::GET, &path, FORM, "").await.status, StatusCode::FORBIDDEN);
+    let json = "application/json";
+    let changed = send(&service, &runs, &Method::PATCH, &path, json, r#"{"priority": 3}"#).await;
+    assert!(changed.status == StatusCode::OK && changed.json()["subject_id"] == subject.to_string());
+    let forked = send(&service, &runs, &Method::POST, &format!("{path}/fork"), json, "{}").await;
+    assert_eq!(forked.status, StatusCode::CREATED, "{}", forked.text);
+    let body = r#"{"pseudonym": "P2", "height_m": 1.8, "body_mass_kg": 70}"#;
+    let added = send(&service, &runs, &Method::POST, "/api/v1/subjects", json, body).await;
+    let added = Some(added.json()["id"].as_str().unwrap().parse().unwrap());
+    let views = rows(&service).await.into_iter().filter(|row| row.kind == Kind::View);
+    let views: Vec<_> = views.map(|row| (row.method, row.actor, row.study_id, row.subject_id)).collect();
+    let seen = |method: &str, study, subject| (method.to_owned(), "token [Run]".to_owned(), study, subject);
+    for view in
+        [seen("PATCH", Some(study), Some(subject)), seen("POST", Some(study), Some(subject)), seen("POST", None, added)]
+    {
+        assert!(views.contains(&view), "{view:?} of {views:?}");
+    }
+    assert_eq!(views.len(), 3, "{views:?}");
     service.stop().await;
 }
 

@@ -1,8 +1,8 @@
 //! The layer that writes the access log: views and exports of subjects' data, and refusals.
 //!
-//! It logs every route except those listed as free of subject data, so a new route is logged by default. Views are
-//! collected and written within a second, and repeated views once a minute with their number. An export is written
-//! before the response is sent.
+//! It logs every route except those listed as free of subject data, so a new route is logged by default. A change is
+//! also a view, because its response shows the changed object. Views are collected and written within a second, and
+//! repeated views once a minute with their number. An export is written before the response is sent.
 
 use super::AppState;
 use super::client_address::ClientAddress;
@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 use uuid::Uuid;
 
 /// Routes that show no subject data.
-pub const NO_SUBJECT_DATA: [&str; 30] = [
+pub const NO_SUBJECT_DATA: [&str; 36] = [
     "/static/{*path}",
     "/health",
     "/ready",
@@ -47,10 +47,16 @@ pub const NO_SUBJECT_DATA: [&str; 30] = [
     "/api/v1/health",
     "/api/v1/me",
     "/api/v1/sessions",
+    "/api/v1/sessions/{id}/end",
     "/api/v1/users",
     "/api/v1/users/{id}",
+    "/api/v1/users/{id}/disable",
+    "/api/v1/users/{id}/enable",
+    "/api/v1/users/{id}/link",
+    "/api/v1/users/{id}/role",
     "/api/v1/tokens",
     "/api/v1/tokens/{id}",
+    "/api/v1/tokens/{id}/revoke",
     "/api/v1/jobs",
     "/api/v1/workers",
     "/api/v1/devices",
@@ -263,6 +269,10 @@ pub(super) async fn note(
         .collect();
     named.extend(uuids(&object));
     let answer = next.run(request).await;
+    // The identifier of a new object.
+    if let Some(location) = answer.headers().get(header::LOCATION).and_then(|location| location.to_str().ok()) {
+        named.extend(uuids(location));
+    }
     let caller = answer.extensions().get::<Caller>();
     let Some(kind) = kind_of(&route, &method, &answer, has_token || caller.is_some()) else { return Ok(answer) };
     let actor =
@@ -277,7 +287,7 @@ pub(super) async fn note(
     Ok(answer)
 }
 
-/// The kind of access; `None` if the response has no subject data, or the audit trail has the entry.
+/// The kind of access; `None` if the response shows no subject data and refuses nobody known.
 fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Option<Kind> {
     let status = answer.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;
@@ -291,8 +301,7 @@ fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Opti
     if EXPORTS_BY_POST.contains(&route) && *method == Method::POST {
         return Some(Kind::Export);
     }
-    let reads = matches!(*method, Method::GET | Method::HEAD);
-    if !reads || NO_SUBJECT_DATA.contains(&route) {
+    if status == StatusCode::NO_CONTENT || NO_SUBJECT_DATA.contains(&route) {
         return None;
     }
     let starts = |name, start: &[u8]| {
