@@ -10,7 +10,7 @@ use gaitwright_service::workers::{Assignment, Dispatch, DispatchError, InProcess
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
-use gaitwright_store::{StudyId, TrialId, results};
+use gaitwright_store::{StudyId, TrialId, jobs, results};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::broker::Broker;
 use gaitwright_tests::service::Service;
@@ -281,6 +281,25 @@ async fn service_is_not_ready_and_keeps_its_jobs_until_the_broker_is_connected()
     rig.add_worker(Worker::Steady);
     nothing_is_lost_or_doubled(&service, study).await;
     assert_eq!(service.fetch("/ready").await.text, "ready");
+    service.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn queued_job_of_a_wiped_broker_is_dispatched_again_before_its_lease_expires() {
+    let Some(broker) = Broker::start() else { return };
+    let mut rig = Rig { broker: Some(broker), workers: Vec::new(), folder: tempfile::tempdir().unwrap() };
+    let url = rig.broker.as_ref().unwrap().url();
+    let engine = JetStream::connect(&url, QUEUE, 1, LONG).await.unwrap();
+    let service = Service::start_with(&rig.database(), Arc::new(engine)).await;
+    let study = started(&service).await;
+    while jobs::depth(&mut service.store.read().await.unwrap()).await.unwrap() != (0, 1) {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    // The broker has received the job.
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    rig.broker.as_mut().unwrap().wipe();
+    rig.add_worker(Worker::Steady);
+    nothing_is_lost_or_doubled(&service, study).await;
     service.stop().await;
 }
 

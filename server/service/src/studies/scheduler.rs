@@ -276,8 +276,10 @@ impl Scheduler {
         let mut plans = Plans::default();
         // Since when jobs may be ready to dispatch.
         let mut since = None;
+        let mut storages = 0;
         loop {
             self.look_after_leases().await?;
+            self.replace_lost_jobs(&mut storages).await?;
             self.begin_plans(&mut plans).await?;
             since.get_or_insert_with(Instant::now);
             task.works();
@@ -343,6 +345,22 @@ impl Scheduler {
         Ok(())
     }
 
+    /// Dispatches the jobs again that no worker has started, if the engine has another storage than the known one. A
+    /// worker that has started a job does not need the storage.
+    async fn replace_lost_jobs(&self, known: &mut u64) -> Result<(), Error> {
+        let storages = self.0.engine.storages();
+        if storages == *known || self.0.engine.trouble().is_some() {
+            return Ok(());
+        }
+        *known = storages;
+        self.withdraw(self.0.prefetches.forget_running()).await;
+        let leased = jobs::leased(&mut *self.0.store.read().await?, Some(self.0.engine.name())).await?;
+        for lease in leased {
+            self.replace_unstarted(&lease).await?;
+        }
+        Ok(())
+    }
+
     /// Starts planning for each active study, in parallel, so that a large study does not delay the others.
     async fn begin_plans(&self, plans: &mut Plans) -> Result<(), Error> {
         let active = studies::active(&mut *self.0.store.read().await?).await?;
@@ -371,17 +389,24 @@ impl Scheduler {
     /// Handles an expired lease. A job that no worker has started is dispatched again, in case the engine lost it. A
     /// job of a silent worker is taken from it.
     async fn look_after(&self, lease: &Lease) -> Result<(), Error> {
-        let state = trials::get(&mut *self.0.store.read().await?, lease.trial).await?.state;
-        if state == TrialState::Queued {
-            if self.0.engine.trouble().is_none() {
-                self.live_on(lease).await?;
-                self.submit(lease).await?;
-            }
-            return Ok(());
+        if !self.replace_unstarted(lease).await? {
+            self.cancel_solve(lease.trial).await;
+            trial_result::silent(&self.0.store, lease).await?;
         }
-        self.cancel_solve(lease.trial).await;
-        trial_result::silent(&self.0.store, lease).await?;
         Ok(())
+    }
+
+    /// Dispatches a job again if no worker has started it. Returns whether that is so.
+    async fn replace_unstarted(&self, lease: &Lease) -> Result<bool, Error> {
+        let state = trials::get(&mut *self.0.store.read().await?, lease.trial).await?.state;
+        if state != TrialState::Queued {
+            return Ok(false);
+        }
+        if self.0.engine.trouble().is_none() {
+            self.live_on(lease).await?;
+            self.submit(lease).await?;
+        }
+        Ok(true)
     }
 
     /// Proposes trials up to the parallel limit of the study, or changes its state. Returns the snapshot if the study

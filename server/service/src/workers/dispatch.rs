@@ -134,6 +134,12 @@ pub trait Dispatch: Send + Sync + 'static {
         None
     }
 
+    /// Number of storages that the engine has had since this process started. Jobs that were submitted before the newest
+    /// one may be lost.
+    fn storages(&self) -> u64 {
+        0
+    }
+
     /// Submits a job. Submitting the same attempt twice has no further effect.
     fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>>;
 

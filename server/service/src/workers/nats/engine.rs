@@ -4,13 +4,15 @@ use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
 use super::{AGAIN, BROKER_HEARTBEAT, EXPIRES, Link, unreachable};
 use crate::workers::Assignment;
 use crate::workers::dispatch::{Dispatch, DispatchError, News, Receipt};
-use async_nats::jetstream::stream::LastRawMessageErrorKind;
+use async_nats::jetstream::stream::{LastRawMessageErrorKind, Stream};
 use async_nats::jetstream::{self, AckKind};
 use futures_util::StreamExt;
 use futures_util::future::BoxFuture;
 use gaitwright_compute::Pool;
 use gaitwright_store::TrialId;
 use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio::sync::{Mutex, watch};
@@ -31,6 +33,8 @@ pub struct JetStream {
     pool: Pool,
     /// Why the engine does not receive messages, if it does not.
     listening: watch::Receiver<Option<String>>,
+    /// Number of storages of the broker since this process started.
+    storages: Arc<AtomicU64>,
     _ends: DropGuard,
 }
 
@@ -44,13 +48,15 @@ impl JetStream {
         let (news, heard) = mpsc::channel(WAITING);
         let ends = CancellationToken::new();
         let (trouble, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
+        let storages = Arc::<AtomicU64>::default();
         for task in [0, 1] {
             let (link, news, ends, trouble) = (link.clone(), news.clone(), ends.clone(), trouble.clone());
+            let mut storage = Storage { created: None, count: Arc::clone(&storages) };
             tokio::spawn(ends.run_until_cancelled_owned(async move {
                 loop {
                     let ended = match task {
                         0 => signs(&link, &news).await,
-                        _ => results(&link, &news, &trouble).await,
+                        _ => results(&link, &news, &trouble, &mut storage).await,
                     };
                     if let Err(error) = ended {
                         tracing::warn!(%error, "cannot receive messages of workers; retrying");
@@ -68,6 +74,7 @@ impl JetStream {
             heard: Mutex::new(heard),
             pool: Pool::default(),
             listening,
+            storages,
             _ends: ends.drop_guard(),
         })
     }
@@ -116,6 +123,10 @@ impl Dispatch for JetStream {
         true
     }
 
+    fn storages(&self) -> u64 {
+        self.storages.load(Ordering::Relaxed)
+    }
+
     fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>> {
         Box::pin(self.publish(assignment))
     }
@@ -143,6 +154,23 @@ impl Dispatch for JetStream {
 impl fmt::Debug for JetStream {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("JetStream").field("link", &self.link).field("size", &self.size).finish_non_exhaustive()
+    }
+}
+
+/// The storage of the broker, known by the time at which its stream of jobs was created.
+struct Storage {
+    created: Option<i128>,
+    /// Number of storages so far.
+    count: Arc<AtomicU64>,
+}
+
+impl Storage {
+    /// Counts the storage of this stream of jobs, unless it is the known one.
+    fn note(&mut self, jobs: &Stream) {
+        let created = jobs.cached_info().created.unix_timestamp_nanos();
+        if self.created.replace(created) != Some(created) {
+            self.count.fetch_add(1, Ordering::Relaxed);
+        }
     }
 }
 
@@ -175,12 +203,13 @@ async fn results(
     link: &Link,
     news: &Sender<News>,
     trouble: &watch::Sender<Option<String>>,
+    storage: &mut Storage,
 ) -> Result<(), DispatchError> {
     let pool = Pool::default();
     let recorder = link.recorder().await?;
     let messages = recorder.stream().max_messages_per_batch(16).expires(EXPIRES).heartbeat(BROKER_HEARTBEAT);
     let mut messages = messages.messages().await.map_err(unreachable)?;
-    link.jobs().await?;
+    storage.note(&link.jobs().await?);
     trouble.send_replace(None);
     while let Some(message) = messages.next().await {
         let message = message.map_err(unreachable)?;
