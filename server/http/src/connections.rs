@@ -1,6 +1,7 @@
 //! Limits open connections, in total and per address, so that file descriptors remain for the record and for other
 //! clients. Above a limit, a new connection replaces the one that has been idle longest. Where none is idle, it replaces
-//! one of the network that holds most, so that no number of busy clients of a few networks keeps the others out.
+//! one of the network that holds most, so that no number of busy clients of a few networks keeps the others out. A
+//! network that already has its share is refused at once, because connections are accepted one after another.
 
 use super::client_address::ClientAddress;
 use super::forwarded::Proxies;
@@ -170,7 +171,7 @@ impl Connections {
         u64::try_from(self.begun.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// Accepts a connection; `None` if its address is at its limit and all its connections are busy.
+    /// Accepts a connection; `None` if all connections that it could replace are busy.
     async fn hold(self: &Arc<Self>, stream: TcpStream, network: Option<String>) -> Option<Held> {
         if !self.make_room_for(network.as_deref()) {
             return None;
@@ -192,7 +193,7 @@ impl Connections {
     fn make_room_for(&self, network: Option<&str>) -> bool {
         let Some(network) = network else { return true };
         let mut table = self.table();
-        if table.by_network.get(network).copied().unwrap_or(0) < self.limits.per_address {
+        if table.count(Some(network)) < self.limits.per_address {
             return true;
         }
         let made = self.close_quietest(&mut table, QUIET, |connection| connection.network.as_deref() == Some(network));
@@ -201,13 +202,15 @@ impl Connections {
         made
     }
 
-    /// Waits for a permit for a connection of a network.
+    /// Waits for a permit for a connection of a network; `None` if the network has its share.
     async fn permit(&self, network: Option<&str>) -> Option<OwnedSemaphorePermit> {
         loop {
             if let Ok(permit) = Arc::clone(&self.room).try_acquire_owned() {
                 return Some(permit);
             }
-            self.close_one_for(network);
+            if !self.close_one_for(network) {
+                return None;
+            }
             if let Ok(permit) = tokio::time::timeout(LOOK, Arc::clone(&self.room).acquire_owned()).await {
                 return permit.ok();
             }
@@ -215,15 +218,18 @@ impl Connections {
     }
 
     /// Closes an idle connection, or else one of the network that holds most, if it holds more than the network of the
-    /// new connection will.
-    fn close_one_for(&self, network: Option<&str>) {
+    /// new connection will. Returns whether the new connection can wait for room.
+    fn close_one_for(&self, network: Option<&str>) -> bool {
         let mut table = self.table();
-        if !self.close_quietest(&mut table, QUIET, |_| true)
-            && let Some(largest) = table.largest_beyond(network)
-        {
-            self.close_quietest(&mut table, Duration::ZERO, |connection| connection.network.as_ref() == Some(&largest));
+        let mut closed = self.close_quietest(&mut table, QUIET, |_| true);
+        if !closed && let Some(largest) = table.largest_beyond(network) {
+            let of_largest = |connection: &Connection| connection.network.as_ref() == Some(&largest);
+            closed = self.close_quietest(&mut table, Duration::ZERO, of_largest);
         }
+        let waits = closed || table.count(network) == 0 || table.is_closing();
+        table.untold.1 += u64::from(!waits);
         self.tell(&mut table);
+        waits
     }
 
     /// Closes the longest idle connection among some that have been idle for a time. Connections that never sent a byte
@@ -268,9 +274,19 @@ impl Table {
         number
     }
 
+    /// Number of connections of a network, without those that were told to close.
+    fn count(&self, network: Option<&str>) -> usize {
+        network.and_then(|network| self.by_network.get(network)).copied().unwrap_or(0)
+    }
+
+    /// Whether a connection was told to close and is still open.
+    fn is_closing(&self) -> bool {
+        self.by_number.values().any(|connection| connection.closing.is_cancelled())
+    }
+
     /// The network with the most connections, if it has more than the given network will have with one more.
     fn largest_beyond(&self, network: Option<&str>) -> Option<String> {
-        let present = network.and_then(|network| self.by_network.get(network)).copied().unwrap_or(0);
+        let present = self.count(network);
         let (largest, count) = self.by_network.iter().max_by_key(|(network, count)| (**count, Reverse(*network)))?;
         (*count > present + 1).then(|| largest.clone())
     }
