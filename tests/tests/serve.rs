@@ -253,7 +253,8 @@ async fn drip(from: std::net::SocketAddr, to: std::net::SocketAddr) {
     }
 }
 
-/// `/health` answers within two seconds while 20 clients of each of these addresses keep at most 90 connections busy.
+/// Each of these addresses has 20 busy clients, and the service accepts 90 connections. `/health` still responds within
+/// two seconds.
 #[cfg(target_os = "linux")]
 async fn busy_connections_leave_health_answering(addresses: std::ops::RangeInclusive<u8>) {
     let folder = tempfile::tempdir().unwrap();

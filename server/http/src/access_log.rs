@@ -287,7 +287,7 @@ pub(super) async fn note(
     Ok(answer)
 }
 
-/// The kind of access; `None` if the response shows no subject data and refuses nobody known.
+/// The kind of access. `None` if the response shows no subject data, or refuses a request without a known caller.
 fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Option<Kind> {
     let status = answer.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;

@@ -18,7 +18,6 @@ pub mod audit;
 pub mod backup;
 pub mod backup_folder;
 pub mod certificates;
-mod checkpoint;
 pub mod clock;
 pub mod consents;
 pub mod devices;
@@ -217,10 +216,9 @@ impl Store {
         seals::watch(&mut connection).await?;
         // The log is merged into the file only after it was verified, not in the middle of a commit.
         sqlx::query("pragma wal_autocheckpoint = 0").execute(&mut connection).await?;
-        let aside = only.acquire().await?.detach();
         let files = Arc::new(Files::of(path)?);
         let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
-        let writing = Arc::new(Writing::new(connection, aside, Some(version), space::Space::of(path), outside));
+        let writing = Arc::new(Writing::new(connection, Some(version), space::Space::of(path), outside));
         let readers = SqlitePoolOptions::new()
             .max_connections(4)
             .idle_timeout(None)

@@ -202,23 +202,6 @@ pub async fn get(db: &mut Connection, id: TrialId) -> StoreResult<Trial> {
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "trial", id: id.to_string() })
 }
 
-/// The actions of two trials.
-///
-/// # Errors
-/// [`StoreError::Missing`]; errors of the database.
-pub async fn actions_of(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<(ActionIndex, ActionIndex)> {
-    let sql = "select (select action_index from trials where id = ?), (select action_index from trials where id = ?)";
-    let row = sqlx::query(sql).bind(a).bind(b).fetch_one(db).await?;
-    let action = |column: usize, id: TrialId| {
-        let found: Option<i64> = row.try_get(column)?;
-        let found = found.ok_or_else(|| StoreError::Missing { what: "trial", id: id.to_string() })?;
-        u64::try_from(found)
-            .map(ActionIndex)
-            .map_err(|_| StoreError::Damaged { what: "trial", reason: format!("action {found}") })
-    };
-    Ok((action(0, a)?, action(1, b)?))
-}
-
 /// Every trial of a study, by number.
 ///
 /// # Errors

@@ -5,11 +5,10 @@
 //! transaction is on the disk.
 
 use super::anchor::{self, Anchors};
-use super::checkpoint::{self, Aside, LONGEST_LOG, log_frames};
 use super::files::Files;
 use super::space::Space;
 use super::{StoreError, StoreResult};
-use sqlx::{Connection as _, SqliteConnection};
+use sqlx::{Connection as _, Row as _, SqliteConnection};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -20,7 +19,10 @@ use tokio_util::task::AbortOnDropHandle;
 /// The connection, which is lent in the order of requests; `None` after closing.
 type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
 
-/// Pause before a restart of a task.
+/// A log with this number of frames is checkpointed into the database file.
+const LONGEST_LOG: u32 = 1000;
+
+/// Pause before a restart of the flushing task.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// The result of a group commit; `None` until it is known.
@@ -31,8 +33,7 @@ type Outcome = Option<Result<(), Arc<StoreError>>>;
 pub(super) struct Writing {
     line: Line,
     shared: Arc<Shared>,
-    aside: Arc<Aside>,
-    tasks: [JoinHandle<()>; 2],
+    flusher: JoinHandle<()>,
 }
 
 /// An atomic change. Dropping it without [`super::commit`] rolls it back.
@@ -47,8 +48,6 @@ struct Shared {
     state: Mutex<State>,
     /// Signals that a change has ended and must be committed.
     ended: Notify,
-    /// Number of frames in the log after the last commit, or 0 after a checkpoint.
-    log: watch::Sender<u32>,
     space: Space,
     /// Checks and anchors outside the database.
     outside: Outside,
@@ -98,22 +97,14 @@ struct State {
 }
 
 impl Writing {
-    /// Takes over a connection that nothing else writes with, and one for checkpoints. `version` is the data version of
-    /// the first when the record was verified.
-    pub(super) fn new(
-        connection: SqliteConnection,
-        aside: SqliteConnection,
-        version: Option<i64>,
-        space: Space,
-        outside: Outside,
-    ) -> Self {
+    /// Takes over a connection that nothing else writes with. `version` is its data version when the record was
+    /// verified.
+    pub(super) fn new(connection: SqliteConnection, version: Option<i64>, space: Space, outside: Outside) -> Self {
         let line = Line::new(Some(connection).into());
-        let aside = Arc::new(Aside::new(aside));
-        let state = Mutex::new(State { version, ..State::default() });
-        let shared = Arc::new(Shared { state, ended: Notify::new(), log: watch::Sender::new(0), space, outside });
-        let flusher = supervise_flushing(Arc::clone(&line), Arc::clone(&shared));
-        let merger = keep_merging(Arc::clone(&line), Arc::clone(&shared), Arc::clone(&aside));
-        Self { line, shared, aside, tasks: [tokio::spawn(flusher), tokio::spawn(merger)] }
+        let state = State { version, ..State::default() };
+        let shared = Arc::new(Shared { state: Mutex::new(state), ended: Notify::new(), space, outside });
+        let flusher = tokio::spawn(supervise_flushing(Arc::clone(&line), Arc::clone(&shared)));
+        Self { line, shared, flusher }
     }
 
     /// The disk of the record.
@@ -130,7 +121,6 @@ impl Writing {
 
     /// Commits all changes and closes the connection.
     pub(super) async fn close(&self) {
-        self.aside.close().await;
         let mut line = self.line.lock().await;
         if let Some(mut connection) = line.take() {
             self.shared.flush(&mut connection).await;
@@ -151,7 +141,7 @@ impl Writing {
 
 impl Drop for Writing {
     fn drop(&mut self) {
-        self.tasks.iter().for_each(JoinHandle::abort);
+        self.flusher.abort();
     }
 }
 
@@ -231,7 +221,9 @@ impl Shared {
         match self.make_durable(connection).await {
             Ok(frames) => {
                 self.tell(Ok(()));
-                self.log.send_replace(frames);
+                if frames >= LONGEST_LOG {
+                    fold(connection).await;
+                }
             }
             Err(error) => self.give_up(connection, &error).await,
         }
@@ -266,7 +258,7 @@ impl Shared {
         let vanished = matches!(error, StoreError::RecordVanished { .. });
         let Ok(frames) = log_frames(connection).await else { return };
         if vanished && self.outside.files.as_ref().is_some_and(|files| files.log_is_to_be_saved(frames)) {
-            checkpoint::merge(connection).await;
+            fold(connection).await;
             tracing::warn!("the content of the write-ahead log was saved to the database file");
         }
     }
@@ -332,28 +324,22 @@ async fn keep_flushing(line: Line, shared: Arc<Shared>) {
     }
 }
 
-/// Merges the log whenever it is long, first beside the changes and then, which is quick, between two of them.
-async fn keep_merging(line: Line, shared: Arc<Shared>, aside: Arc<Aside>) {
-    let mut log = shared.log.subscribe();
-    while log.wait_for(|frames| *frames >= LONGEST_LOG).await.is_ok() {
-        // A damaged log must not be merged.
-        if shared.outside.check().is_err() || !aside.merge().await {
-            return;
-        }
-        let mut line = line.lock().await;
-        let Some(connection) = line.as_mut() else { return };
-        shared.flush(connection).await;
-        if shared.outside.check_log(connection).await.is_err() {
-            return;
-        }
-        checkpoint::merge(connection).await;
-        shared.log.send_replace(0);
-    }
-}
-
 /// A number that differs from the last one if another connection has committed in between.
 pub(super) async fn data_version(connection: &mut SqliteConnection) -> StoreResult<i64> {
     Ok(sqlx::query_scalar("pragma data_version").fetch_one(connection).await?)
+}
+
+/// Number of frames in the write-ahead log.
+async fn log_frames(connection: &mut SqliteConnection) -> StoreResult<u32> {
+    let row = sqlx::query("pragma wal_checkpoint(noop)").fetch_one(connection).await?;
+    Ok(row.try_get("log")?)
+}
+
+/// Merges the log into the database file.
+async fn fold(connection: &mut SqliteConnection) {
+    if let Err(error) = run(connection, "pragma wal_checkpoint(passive)").await {
+        tracing::error!(%error, "cannot save the write-ahead log to the database file");
+    }
 }
 
 async fn run(connection: &mut SqliteConnection, statement: &'static str) -> StoreResult<()> {
@@ -364,7 +350,6 @@ async fn run(connection: &mut SqliteConnection, statement: &'static str) -> Stor
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sqlx::Row as _;
     use sqlx::sqlite::SqliteConnectOptions;
 
     async fn open(file: &std::path::Path) -> SqliteConnection {
@@ -375,7 +360,7 @@ mod tests {
     async fn table(file: &std::path::Path) -> Writing {
         let mut connection = open(file).await;
         run(&mut connection, "create table t (x integer primary key) strict").await.unwrap();
-        Writing::new(connection, open(file).await, None, Space::of(file), Outside::default())
+        Writing::new(connection, None, Space::of(file), Outside::default())
     }
 
     async fn insert(writer: &mut Writer, x: i64) -> Result<(), sqlx::Error> {

@@ -139,8 +139,8 @@ pub async fn standing_answer(
             return Ok(Some(StandingAnswer::Blind(shown.id)));
         }
     }
-    let actions = trials::actions_of(db, (a, b)).await?;
-    standing_suggestion(db, study, actions, author).await
+    let (one, other) = (trials::get(db, a).await?.action_index, trials::get(db, b).await?.action_index);
+    standing_suggestion(db, study, (one, other), author).await
 }
 
 /// Whether a rater's answer counts: staff can retract the preference derived from it.
