@@ -198,28 +198,39 @@ class Scene {
 const PACES = `<label>Synchronise <select data-pace><option value="share" selected>by gait cycle</option>
   <option value="time">by time</option></select></label>`;
 
+/**
+ * The controls of a player, before there is anything to play: they have their place from the start, so that nothing below
+ * them moves under a finger when the gaits arrive.
+ * @param {HTMLElement} box
+ * @param {boolean} isPair
+ */
+function addControls(box, isPair) {
+  const controls = document.createElement("fieldset");
+  controls.className = "controls";
+  controls.disabled = true;
+  controls.innerHTML = `
+    <button type="button" class="button quiet" data-play>Play</button>
+    <label>Speed <select data-speed><option value="0.25">¼</option><option value="0.5">½</option><option value="1" selected>1</option></select></label>
+    ${isPair ? PACES : ""}
+    <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
+    <output data-phase>0 %</output>`;
+  box.append(controls);
+  return controls;
+}
+
 /** Plays scenes on one clock: gaits of different length at the same share of their cycles, or each in its own time. */
 class Player {
   /**
-   * @param {HTMLElement} box
+   * @param {HTMLFieldSetElement} controls
    * @param {Scene[]} scenes
    */
-  constructor(box, scenes) {
+  constructor(controls, scenes) {
     this.scenes = scenes;
     const seconds = scenes.map((scene) => scene.motion.stride_time_s);
     this.clocks = new Clocks(seconds, seconds.reduce((sum, stride) => sum + stride, 0) / seconds.length);
     this.last = 0;
     this.playing = mayMove();
-    if (!this.playing) showStrips(box);
-    const controls = document.createElement("div");
-    controls.className = "controls";
-    controls.innerHTML = `
-      <button type="button" class="button quiet" data-play></button>
-      <label>Speed <select data-speed><option value="0.25">¼</option><option value="0.5">½</option><option value="1" selected>1</option></select></label>
-      ${scenes.length > 1 ? PACES : ""}
-      <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
-      <output data-phase></output>`;
-    box.append(controls);
+    controls.disabled = false;
     this.button = /** @type {HTMLButtonElement} */ (controls.querySelector("[data-play]"));
     this.speed = /** @type {HTMLSelectElement} */ (controls.querySelector("[data-speed]"));
     this.scrub = /** @type {HTMLInputElement} */ (controls.querySelector("[data-scrub]"));
@@ -287,10 +298,12 @@ const load = async (trial) => {
 
 for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker"))) {
   const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
-  for (const moving of /** @type {NodeListOf<HTMLElement>} */ (box.querySelectorAll(".motions"))) moving.hidden = false;
+  const controls = addControls(box, canvases.length > 1);
+  if (!mayMove()) showStrips(box);
   Promise.all(canvases.map(async (canvas) => new Scene(canvas, await load(canvas.dataset.trial))))
-    .then((scenes) => new Player(box, scenes))
+    .then((scenes) => new Player(controls, scenes))
     .catch((error) => {
+      box.style.minHeight = `${box.offsetHeight}px`;
       box.textContent = `The animation cannot be loaded (${error.message}). Reload the page to try again.`;
     });
 }

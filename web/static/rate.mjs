@@ -22,8 +22,6 @@ if (box) {
   const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
   const speed = /** @type {HTMLSelectElement} */ (document.querySelector("[data-speed]"));
   const clocks = new Clocks(canvases.map((canvas) => Number(canvas.dataset.seconds) || STRIDE_S), STRIDE_S);
-  box.hidden = false;
-  /** @type {HTMLElement} */ (document.querySelector("[data-controls]")).hidden = false;
   save.disabled = true;
   let playing = mayMove();
   if (!playing) showStrips(document);

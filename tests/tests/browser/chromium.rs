@@ -25,6 +25,8 @@ use tokio::task::JoinHandle;
 
 /// Number of attempts to click an element that is replaced meanwhile.
 const CLICKS: u32 = 20;
+/// An element that has not moved for this long stays where it is.
+const STILL: Duration = Duration::from_millis(50);
 /// Where a Chromium may be.
 const PLACES: [&str; 4] =
     ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome", "/snap/bin/chromium"];
@@ -219,11 +221,18 @@ impl Tab {
         self.page.url().await.unwrap().unwrap_or_default()
     }
 
-    /// Clicks an element with the mouse.
+    /// Clicks an element with the mouse, once the page is loaded and the element keeps its place.
     pub(crate) async fn click(&self, selector: &str) {
         // Finds the element again if a live update replaces it before the click.
         for _ in 0..CLICKS {
             self.wait_for(selector).await;
+            self.wait_until(&format!("document.readyState === 'complete' && !!document.querySelector(`{selector}`)")).await;
+            let place = format!("JSON.stringify(document.querySelector(`{selector}`)?.getBoundingClientRect())");
+            let before = self.value(&place).await;
+            tokio::time::sleep(STILL).await;
+            if self.value(&place).await != before {
+                continue;
+            }
             if let Ok(element) = self.page.find_element(selector).await
                 && element.click().await.is_ok()
             {

@@ -27,7 +27,7 @@ async fn at_the_pair(browser: &Chromium, site: &Site) -> Tab {
     page.click("main form button").await;
     // Its scripts have run, and both motions are there.
     page.wait_until(
-        "document.querySelector('[data-controls]')?.hidden === false && \
+        "document.readyState === 'complete' && \
          document.querySelector('[data-answer] [type=submit]')?.disabled === false",
     )
     .await;
