@@ -241,7 +241,7 @@ async fn access_log_is_append_only_and_pruned_by_age_alone() {
     for days in [400, 399, 10] {
         let at = now().plus_seconds(-86_400 * days);
         let tally = Tally { first_at: at, last_at: at, times: 1 };
-        access_log::append(&mut writer, &view(study, &format!("{days} days")), tally).await.unwrap();
+        access_log::append(&mut writer, &[(view(study, &format!("{days} days")), tally)]).await.unwrap();
     }
     commit(writer).await.unwrap();
     for sql in ["delete from access_log", "update access_log set actor = 'nobody'"] {

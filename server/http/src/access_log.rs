@@ -166,9 +166,7 @@ impl Drop for Unwritten<'_> {
 
 async fn append(store: &Store, rows: &[(Access, Tally)]) -> StoreResult<()> {
     let mut writer = store.write().await?;
-    for (access, tally) in rows {
-        access_log::append(&mut writer, access, *tally).await?;
-    }
+    access_log::append(&mut writer, rows).await?;
     commit(writer).await
 }
 
@@ -185,7 +183,8 @@ async fn append_export(store: &Store, access: &Access, of: Option<&OnlyWhileWalk
         walkable::admit(&mut writer, trial).await??;
     }
     let at = now();
-    access_log::append(&mut writer, access, Tally { first_at: at, last_at: at, times: 1 }).await?;
+    let tally = Tally { first_at: at, last_at: at, times: 1 };
+    access_log::append(&mut writer, &[(access.clone(), tally)]).await?;
     Ok(commit(writer).await?)
 }
 

@@ -1,10 +1,12 @@
 //! Rows of the access log: views and exports of subjects' data, and refusals.
 
 use super::audit::Actor;
-use super::{Connection, Instant, StoreResult, StudyId, SubjectId, now};
+use super::{Connection, Instant, StoreResult, StudyId, SubjectId, json, now};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use std::collections::HashMap;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
@@ -105,34 +107,47 @@ pub struct AccessRow {
     pub subject_id: Option<SubjectId>,
 }
 
-/// Appends a row.
+/// Appends rows.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn append(db: &mut Connection, access: &Access, tally: Tally) -> StoreResult<()> {
-    let mut whose = (None, None);
-    for id in &access.named {
-        whose = whose_is(db, id).await?;
-        if whose.1.is_some() {
-            break;
+pub async fn append(db: &mut Connection, rows: &[(Access, Tally)]) -> StoreResult<()> {
+    let mut known = HashMap::new();
+    let mut values = Vec::new();
+    for (access, tally) in rows {
+        let mut whose = (None, None);
+        for id in &access.named {
+            whose = match known.get(id.as_str()) {
+                Some(whose) => *whose,
+                None => whose_is(db, id).await?,
+            };
+            known.insert(id.as_str(), whose);
+            if whose.1.is_some() {
+                break;
+            }
         }
+        values.push(json!([
+            tally.first_at,
+            tally.last_at,
+            tally.times,
+            access.kind,
+            access.actor,
+            access.address,
+            access.method,
+            access.route,
+            access.object,
+            access.status,
+            whose.0,
+            whose.1,
+        ]));
     }
     sqlx::query(
         "insert into access_log (created_at, last_at, times, kind, actor, address, method, route, object, status, \
-         study_id, subject_id) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         study_id, subject_id) \
+         select value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4, value ->> 5, value ->> 6, value ->> 7, \
+         value ->> 8, value ->> 9, value ->> 10, value ->> 11 from json_each(?) order by key",
     )
-    .bind(tally.first_at)
-    .bind(tally.last_at)
-    .bind(tally.times)
-    .bind(access.kind.as_str())
-    .bind(&access.actor)
-    .bind(&access.address)
-    .bind(&access.method)
-    .bind(&access.route)
-    .bind(&access.object)
-    .bind(access.status)
-    .bind(whose.0)
-    .bind(whose.1)
+    .bind(json::to_text("access log", &values)?)
     .execute(db)
     .await?;
     Ok(())

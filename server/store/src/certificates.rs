@@ -92,14 +92,16 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<HashMa
     rows.iter().map(from_row).collect()
 }
 
-/// The same for one trial; `None` if it has not converged.
+/// The same for a few trials, without those that have not converged.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Option<CertificateOnRecord>> {
-    let sql = AssertSqlSafe(format!("{SELECT} where t.id = ?2 and t.state = 'converged'"));
-    let row = sqlx::query(sql).bind(certificate::FORMAT_VERSION).bind(trial).fetch_optional(db).await?;
-    Ok(row.as_ref().map(from_row).transpose()?.map(|(_, found)| found))
+pub async fn of_trials(db: &mut Connection, trials: &[TrialId]) -> StoreResult<HashMap<TrialId, CertificateOnRecord>> {
+    let sql =
+        AssertSqlSafe(format!("{SELECT} where t.id in (select value from json_each(?2)) and t.state = 'converged'"));
+    let trials = json::to_text("trials", &trials)?;
+    let rows = sqlx::query(sql).bind(certificate::FORMAT_VERSION).bind(trials).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
 }
 
 /// Selects trials with the results of their certificates.

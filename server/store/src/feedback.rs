@@ -296,8 +296,12 @@ pub async fn of_pair(
     limit: u32,
 ) -> StoreResult<Vec<FeedbackRow>> {
     let rows = sqlx::query(select(
-        "where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and (?3 is null or f.author <> ?3) \
-         and f.source in ('subject', 'clinician', 'script') and r.feedback_seq is null order by f.seq desc limit ?4",
+        // Chosen from the index alone, because many people can have answered the same comparison.
+        "where f.seq in (select o.seq from feedback o \
+         where ((o.trial_a = ?1 and o.trial_b = ?2) or (o.trial_a = ?2 and o.trial_b = ?1)) \
+         and (?3 is null or o.author <> ?3) and o.source in ('subject', 'clinician', 'script') \
+         and not exists (select 1 from retractions where feedback_seq = o.seq) order by o.seq desc limit ?4) \
+         order by f.seq desc",
     ))
     .bind(a)
     .bind(b)

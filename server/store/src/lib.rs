@@ -15,6 +15,7 @@ pub mod archive;
 pub mod archived_allocations;
 pub mod assessments;
 pub mod audit;
+pub mod authors;
 pub mod backup;
 pub mod backup_folder;
 pub mod certificates;

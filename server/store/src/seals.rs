@@ -202,17 +202,44 @@ impl Sealed {
         Ok(None)
     }
 
-    /// The hash of the current row; empty if it was deleted.
-    async fn hash_of(&self, db: &mut Connection, key: &str) -> StoreResult<String> {
+    /// The hashes of the current rows with these keys. Deleted rows have none.
+    async fn hashes_of(&self, db: &mut Connection, keys: &[&str]) -> StoreResult<HashMap<String, String>> {
+        let mut found = HashMap::new();
+        let &[column] = self.key else {
+            for key in keys {
+                found.extend(self.hash_of(db, key).await?.map(|sha256| ((*key).to_owned(), sha256)));
+            }
+            return Ok(found);
+        };
+        // A single statement, so that a change of many rows does not hold the writer for long.
+        let key = self.key_of("t.");
+        let sql = format!(
+            "select cast({key} as text) as \"{JOINT}key\", t.* from {} t where {column} in (select value from json_each(?))",
+            self.table
+        );
+        let keys: Vec<String> = keys.iter().map(|key| self.part(key)).collect();
+        // One at a time, because a row may hold a whole gait.
+        let mut rows = sqlx::query(AssertSqlSafe(sql)).bind(json::to_text("keys", &keys)?).fetch(db);
+        while let Some(row) = rows.try_next().await? {
+            found.insert(row.try_get(0)?, hash_of_row(&row)?);
+        }
+        drop(rows);
+        Ok(found)
+    }
+
+    /// The hash of the current row; `None` if it was deleted.
+    async fn hash_of(&self, db: &mut Connection, key: &str) -> StoreResult<Option<String>> {
         let columns: Vec<String> = self.key.iter().map(|column| format!("{column} = ?")).collect();
         let sql = format!("select * from {} where {}", self.table, columns.join(" and "));
-        let part = |part: &str| {
-            let text = hex::decode(part).ok().and_then(|bytes| String::from_utf8(bytes).ok());
-            text.filter(|_| self.hex).unwrap_or_else(|| part.to_owned())
-        };
-        let parts = key.splitn(self.key.len(), JOINT).map(part);
+        let parts = key.splitn(self.key.len(), JOINT).map(|part| self.part(part));
         let query = parts.fold(sqlx::query(AssertSqlSafe(sql)), sqlx::query::Query::bind);
-        query.fetch_optional(db).await?.map_or(Ok(String::new()), |row| hash_of_row(&row))
+        query.fetch_optional(db).await?.as_ref().map(hash_of_row).transpose()
+    }
+
+    /// A column of a key.
+    fn part(&self, part: &str) -> String {
+        let text = hex::decode(part).ok().and_then(|bytes| String::from_utf8(bytes).ok());
+        text.filter(|_| self.hex).unwrap_or_else(|| part.to_owned())
     }
 }
 
@@ -342,27 +369,39 @@ pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
         };
     }
     refuse_touched(db, &rows, &old_rows).await?;
+    let mut keys = BTreeMap::<&str, Vec<&str>>::new();
     for (at, Noted { table, key, .. }) in rows.iter().enumerate() {
-        if let Some(checked) = CHECKED.iter().find(|checked| checked.table == table) {
-            let sha256 = if deleted.contains(&at) { String::new() } else { checked.hash_of(db, key).await? };
-            if !sha256.is_empty() {
-                let keep = sqlx::query("insert or replace into checksums (evidence, key, sha256) values (?, ?, ?)");
-                keep.bind(table).bind(key).bind(sha256).execute(&mut *db).await?;
-            }
-            continue;
+        if !deleted.contains(&at) {
+            keys.entry(table).or_default().push(key);
         }
-        let Some(sealed) = TABLES.iter().find(|sealed| sealed.table == table) else { continue };
-        let sha256 = sealed.hash_of(db, key).await?;
-        let hash = chained(&previous, table, key, &sha256);
-        sqlx::query("insert into seals (evidence, key, sha256, previous, hash) values (?, ?, ?, ?, ?)")
-            .bind(table)
-            .bind(key)
-            .bind(sha256)
-            .bind(previous)
-            .bind(&hash)
-            .execute(&mut *db)
-            .await?;
-        previous = hash;
+    }
+    let mut hashes = HashMap::new();
+    for (table, keys) in keys {
+        if let Some(sealed) = TABLES.iter().chain(CHECKED).find(|sealed| sealed.table == table) {
+            hashes.insert(table, sealed.hashes_of(db, &keys).await?);
+        }
+    }
+    let (mut seals, mut checksums) = (Vec::new(), Vec::new());
+    for Noted { table, key, .. } in &rows {
+        let sha256 = hashes.get(table.as_str()).and_then(|of_table| of_table.get(key));
+        if TABLES.iter().any(|sealed| sealed.table == table) {
+            let sha256 = sha256.map_or("", String::as_str);
+            let hash = chained(&previous, table, key, sha256);
+            seals.push([table.clone(), key.clone(), sha256.to_owned(), previous, hash.clone()]);
+            previous = hash;
+        } else if let Some(sha256) = sha256 {
+            checksums.push([table, key, sha256]);
+        }
+    }
+    if !seals.is_empty() {
+        let sql = "insert into seals (evidence, key, sha256, previous, hash) \
+                   select value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 from json_each(?) order by key";
+        sqlx::query(sql).bind(json::to_text("seals", &seals)?).execute(&mut *db).await?;
+    }
+    if !checksums.is_empty() {
+        let sql = "insert or replace into checksums (evidence, key, sha256) \
+                   select value ->> 0, value ->> 1, value ->> 2 from json_each(?)";
+        sqlx::query(sql).bind(json::to_text("checksums", &checksums)?).execute(&mut *db).await?;
     }
     sqlx::query("delete from unsealed").execute(db).await?;
     Ok(())

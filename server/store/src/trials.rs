@@ -202,6 +202,17 @@ pub async fn get(db: &mut Connection, id: TrialId) -> StoreResult<Trial> {
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "trial", id: id.to_string() })
 }
 
+/// Two trials, each of them if it exists.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn pair(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<(Option<Trial>, Option<Trial>)> {
+    let rows = sqlx::query("select * from trials where id in (?, ?)").bind(a).bind(b).fetch_all(db).await?;
+    let found: Vec<Trial> = rows.iter().map(from_row).collect::<StoreResult<_>>()?;
+    let of = |id| found.iter().find(|trial| trial.id == id).cloned();
+    Ok((of(a), of(b)))
+}
+
 /// Every trial of a study, by number.
 ///
 /// # Errors

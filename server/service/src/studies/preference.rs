@@ -9,7 +9,9 @@ use gait_learner::ActionIndex;
 use gaitwright_store::feedback::{self, Attribution, FeedbackContent, Source};
 use gaitwright_store::presentations::{self, Judgement, Presentation};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, FeedbackId, PresentationId, StudyId, TrialId, Writer, assessments, trials};
+use gaitwright_store::{
+    Connection, FeedbackId, PresentationId, StudyId, TrialId, Writer, assessments, authors, trials,
+};
 use serde_json::Value;
 
 /// The author of computed answers.
@@ -124,6 +126,10 @@ pub async fn standing_answer(
     author: &str,
 ) -> Result<Option<StandingAnswer>, Error> {
     let is_own = |other: &str| printable::is_same_name(other, author);
+    // Most people answer a comparison once, and each further statement delays every other change.
+    if !authors::of_pair(db, study, (a, b)).await?.iter().any(|name| is_own(name)) {
+        return Ok(None);
+    }
     let of_pair = |pair: (TrialId, TrialId)| pair == (a, b) || pair == (b, a);
     let noted = assessments::of_study(db, study).await?;
     let noted = noted.iter().rfind(|r| r.retraction.is_none() && is_own(&r.author) && of_pair(r.pair()));

@@ -194,13 +194,9 @@ impl Grounds {
     /// # Errors
     /// Errors of the database.
     pub async fn read_for(db: &mut Connection, study: StudyId, trials: &[TrialId]) -> StoreResult<Self> {
-        let mut found = HashMap::new();
-        for &trial in trials {
-            found.extend(certificates::of_trial(db, trial).await?.map(|certificate| (trial, certificate)));
-        }
         Ok(Self {
             safety_reports: SafetyReports::read(db, study).await?,
-            certificates: found,
+            certificates: certificates::of_trials(db, trials).await?,
             withdrawn: consents::is_withdrawn(db, study).await?,
             untrusted: imports::is_untrusted(db, study).await?,
         })
@@ -293,8 +289,9 @@ pub async fn admit_pair(
     fields: (&str, &str),
     pair: (TrialId, TrialId),
 ) -> Result<WalkablePair, Error> {
-    let first = trial_of_study(db, study, fields.0, pair.0).await?;
-    let second = trial_of_study(db, study, fields.1, pair.1).await?;
+    let (first, second) = trials::pair(db, pair).await?;
+    let first = first.filter(|trial| trial.study_id == study).ok_or_else(|| not_of_study(fields.0, pair.0))?;
+    let second = second.filter(|trial| trial.study_id == study).ok_or_else(|| not_of_study(fields.1, pair.1))?;
     let grounds = Grounds::read_for(db, study, &[first.id, second.id]).await?;
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
@@ -312,7 +309,11 @@ pub async fn admit_pair(
 pub async fn trial_of_study(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
     match trials::get(db, id).await {
         Ok(trial) if trial.study_id == study => Ok(trial),
-        Ok(_) | Err(StoreError::Missing { .. }) => Err(Error::invalid(field, id.to_string(), "a trial of this study")),
+        Ok(_) | Err(StoreError::Missing { .. }) => Err(not_of_study(field, id)),
         Err(other) => Err(other.into()),
     }
+}
+
+fn not_of_study(field: &str, id: TrialId) -> Error {
+    Error::invalid(field, id.to_string(), "a trial of this study")
 }
