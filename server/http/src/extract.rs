@@ -1,7 +1,8 @@
 //! Extractors for JSON bodies, query strings and forms, whose errors are problem documents.
 
 use crate::problem::Refusal;
-use axum::extract::{FromRequest, FromRequestParts, Query, Request};
+use crate::query;
+use axum::extract::{FromRequest, FromRequestParts, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Method, StatusCode, header};
 use gaitwright_service::document;
@@ -39,10 +40,8 @@ pub(crate) struct Params<T>(pub(crate) T);
 impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
     type Rejection = Refusal;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Refusal> {
-        let Query(value) =
-            Query::<T>::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
-        Ok(Self(value))
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refusal> {
+        Ok(Self(query::read(&query::pairs(parts.uri.query().unwrap_or_default())?)?))
     }
 }
 

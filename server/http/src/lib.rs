@@ -27,6 +27,7 @@ pub mod pages;
 mod paging;
 mod problem;
 mod problem_kinds;
+mod query;
 mod request_body;
 mod revision;
 mod router;

@@ -2,6 +2,7 @@
 
 use super::AppState;
 use crate::problem::Refusal;
+use crate::query;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use gaitwright_service::error::Error;
@@ -123,10 +124,8 @@ fn cursor<K: Serialize>(key: &K) -> Result<String, Error> {
 
 impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
     fn read(query: &str) -> Result<Self, Error> {
-        let malformed = |e: serde_urlencoded::de::Error| Error::Malformed(format!("The query cannot be read: {e}."));
-        let pairs: Vec<(String, String)> = serde_urlencoded::from_str(query).map_err(malformed)?;
         let (mut after, mut limit, mut filter) = (None, None, Vec::new());
-        for (name, value) in pairs {
+        for (name, value) in query::pairs(query)? {
             let given = match name.as_str() {
                 "cursor" => after.replace(read_cursor(&value)?).is_some(),
                 "limit" => limit.replace(read_limit(&value)?).is_some(),
@@ -139,8 +138,7 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
                 return Err(Error::Malformed(format!("The query has the parameter {name} twice.")));
             }
         }
-        let filter = serde_urlencoded::to_string(filter).map_err(|e| Error::Internal(e.to_string()))?;
-        let filter = serde_urlencoded::from_str(&filter).map_err(malformed)?;
+        let filter = query::read(&filter)?;
         Ok(Self { after, filter, limit: limit.unwrap_or(DEFAULT_LIMIT) })
     }
 }

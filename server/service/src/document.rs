@@ -122,7 +122,7 @@ impl<'de> Visitor<'de> for Place<'_> {
 }
 
 /// A value, shortened for an error.
-fn shortened(value: &Value) -> String {
+pub fn shortened(value: &Value) -> String {
     let whole = value.to_string();
     match whole.char_indices().nth(SHOWN_VALUE) {
         Some((end, _)) => format!("{}...", &whole[..end]),
@@ -140,8 +140,8 @@ fn value_at(bytes: &[u8], path: &Path) -> Value {
     inside.cloned().unwrap_or_default()
 }
 
-/// The expected type in plain words.
-fn expected(message: &str) -> String {
+/// The expected type in plain words, from the message of a deserialiser.
+pub fn expected(message: &str) -> String {
     let Some((_, expected)) = message.split_once("expected ") else { return message.to_owned() };
     match expected {
         "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number of at least 0".to_owned(),
