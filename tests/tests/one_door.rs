@@ -298,7 +298,7 @@ async fn knock(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session
         "post /api/v1/lab-sessions/{id}/walks" => {
             service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 2})).await
         }
-        "post /lab/{id}" => service.post_text(&format!("/lab/{session}"), FORM, "walk=2&note=").await,
+        "post /lab/{id}" => service.post_text(&format!("/lab/{session}"), FORM, "walk=2&note=&complete=yes").await,
         "get /api/v1/trials/{id}/controller.json" => {
             service.fetch(&format!("/api/v1/trials/{a}/controller.json")).await
         }

@@ -15,6 +15,7 @@ use gaitwright_service::access::Rate;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, InTheLab, NewAnswer, RecordedWalk};
 use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members};
+use serde::Deserialize;
 
 /// How many of the newest open sessions are listed.
 const LISTED: u32 = 100;
@@ -45,6 +46,17 @@ impl WalkPage {
     fn second_may_have_begun(&self) -> bool {
         self.seen.walk.is_none_or(|walk| walk == 3)
     }
+}
+
+/// The form of a walk.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Walked {
+    walk: u8,
+    #[serde(default)]
+    note: String,
+    /// Present if the box is ticked.
+    complete: Option<String>,
 }
 
 /// `GET /lab`.
@@ -81,9 +93,15 @@ pub(super) async fn record(
     authorized: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
-    Form(walked): Form<RecordedWalk>,
+    Form(Walked { walk, note, complete }): Form<Walked>,
 ) -> Result<Response, PageError> {
+    let walked = RecordedWalk { walk, note };
     let recorded = async {
+        if complete.is_none() {
+            return Err(Error::conflict(format!(
+                "Walk {walk} was not recorded. First tick that it is complete and measured: a recorded walk cannot be undone."
+            )));
+        }
         let mut writer = app.write().await?;
         if !lab::was_recorded(&mut writer, id, &walked).await? {
             lab::record_walk(&mut writer, &authorized.caller.actor, id, &walked).await?;
