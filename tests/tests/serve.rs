@@ -117,6 +117,18 @@ fn connections_without_a_complete_request_are_closed() {
 }
 
 #[test]
+fn system_page_lists_scheduled_backups() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("copies")).unwrap();
+    let process = Process::start(folder.path(), &["--no-sign-in", "--backup-folder", "copies"], "listening on ");
+    let listed = || get(process.address(), "/system").unwrap().body.contains(".scheduled-");
+    assert!((0..200).any(|_| {
+        std::thread::sleep(Duration::from_millis(50));
+        listed()
+    }));
+}
+
+#[test]
 fn logs_are_json_where_that_is_set() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("gaitwright.toml"), "log_format = \"json\"\n").unwrap();

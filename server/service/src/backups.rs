@@ -6,6 +6,7 @@
 use crate::error::Error;
 use crate::studies::job::JobState;
 use gaitwright_store::audit::{self, Actor, AuditRow};
+use gaitwright_store::backup_folder::BackupFolder;
 use gaitwright_store::{BackupId, Connection, Instant, Store, Writer, backup, commit};
 use serde::Serialize;
 use serde_json::json;
@@ -35,7 +36,11 @@ pub struct Backup {
 
 /// The backups that this process makes, and those that it could not make.
 #[derive(Debug, Default)]
-pub struct Backups(Mutex<BTreeMap<BackupId, Progress>>);
+pub struct Backups {
+    progress: Mutex<BTreeMap<BackupId, Progress>>,
+    /// The folder of scheduled backups, if there is one.
+    scheduled: Option<Arc<BackupFolder>>,
+}
 
 #[derive(Debug, Clone)]
 enum Progress {
@@ -71,9 +76,19 @@ fn object(id: BackupId) -> String {
 }
 
 impl Backups {
+    /// With the folder of scheduled backups, if there is one.
+    pub fn new(scheduled: Option<Arc<BackupFolder>>) -> Self {
+        Self { scheduled, ..Self::default() }
+    }
+
+    /// The folder of scheduled backups, if there is one.
+    pub fn scheduled(&self) -> Option<&BackupFolder> {
+        self.scheduled.as_deref()
+    }
+
     fn table(&self) -> MutexGuard<'_, BTreeMap<BackupId, Progress>> {
         // The table is consistent between statements, so a poisoned lock is usable.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Requests a backup next to the record.

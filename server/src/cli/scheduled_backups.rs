@@ -38,6 +38,11 @@ impl BackupPlan {
 }
 
 impl ClaimedPlan {
+    /// The claimed folder.
+    pub(super) fn folder(&self) -> Arc<BackupFolder> {
+        Arc::clone(&self.folder)
+    }
+
     /// Makes backups as long as the task runs. Failures are logged and retried.
     pub(super) async fn follow(self, store: Store, task: Task) -> Result<(), Error> {
         loop {

@@ -10,6 +10,7 @@ use gaitwright_http::access_log::keep_pruning;
 use gaitwright_http::connections::{LimitedListener, Peer};
 use gaitwright_http::{Access, AppState, Hosts, is_loopback_name, router};
 use gaitwright_service::access::people;
+use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::catalogue;
 use gaitwright_service::studies::retention;
@@ -98,7 +99,8 @@ impl Serve {
         let access = Arc::new(access);
         // Exports by commands while the service was not running.
         access.log.write(&store, true).await?;
-        let mut state = AppState::new(scheduler.clone(), Arc::clone(&access), Arc::default(), hosts);
+        let on_request = Arc::new(Backups::new(backups.as_ref().map(ClaimedPlan::folder)));
+        let mut state = AppState::new(scheduler.clone(), Arc::clone(&access), on_request, hosts);
         state.proxies = proxies.clone();
         let app = router(state);
         let work = tokio::spawn({

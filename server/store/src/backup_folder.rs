@@ -74,6 +74,18 @@ impl BackupFolder {
         Ok((to, size))
     }
 
+    /// The backups in the folder, newest first: name and bytes.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn sizes(&self) -> std::io::Result<Vec<(String, i64)>> {
+        let size_of = |(path, _): (PathBuf, SystemTime)| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            Ok((name, i64::try_from(std::fs::metadata(&path)?.len()).unwrap_or(i64::MAX)))
+        };
+        self.backups()?.into_iter().map(size_of).collect()
+    }
+
     /// The backups in the folder, newest first, with their times.
     ///
     /// # Errors

@@ -27,6 +27,8 @@ struct SystemPage {
     backup: Option<BackupNotice>,
     /// Backups in the folder of the record, newest first: name and bytes.
     copies: Vec<(String, i64)>,
+    /// The folder of scheduled backups with those in it, newest first, or why it cannot be read.
+    scheduled: Option<(String, Result<Vec<(String, i64)>, String>)>,
     queued: u32,
     running: u32,
     oldest_queued: String,
@@ -100,7 +102,9 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
     let record = app.store().path();
     let copies = if may_administer { those_beside(record) } else { Ok(Vec::new()) };
     let measured = [trials::measured(&mut reader, true).await?, trials::measured(&mut reader, false).await?];
+    let scheduled = app.backups.scheduled().filter(|_| may_administer);
     page(&SystemPage {
+        scheduled: scheduled.map(|f| (f.path().display().to_string(), f.sizes().map_err(|e| e.to_string()))),
         version: env!("CARGO_PKG_VERSION"),
         form: FORM,
         copies: copies.map_err(|e| Error::Internal(format!("cannot list the backups: {e}")))?,
