@@ -587,8 +587,8 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
     let database = folder.path().join("b.db");
     let store = Store::open(&database).await.unwrap();
     for (what, forged, why) in [
-        ("unsigned", file.clone(), "signed by nobody"),
-        ("turned, signature dropped", turned(&signed), "signed by nobody"),
+        ("unsigned", file.clone(), "it is not signed"),
+        ("turned, signature dropped", turned(&signed), "it is not signed"),
         ("turned, old signature", with_end_of(&turned(&signed), &signed), "do not match the hash at its end"),
     ] {
         let refusal = import_trusting(&store, &forged, std::slice::from_ref(&own)).await.unwrap_err().to_string();
@@ -954,7 +954,7 @@ async fn the_command_line_signs_and_trusts() {
     assert_eq!(run(&export).0, Some(0));
     assert_eq!(run(&["export", &study, "plain.gait", "--database", "a.db"]).0, Some(0));
     let (code, _, text) = run(&["import", "plain.gait", "--database", "b.db", "--trust", &key]);
-    assert!(code == Some(2) && text.contains("signed by nobody"), "{text}");
+    assert!(code == Some(2) && text.contains("it is not signed"), "{text}");
     assert!(!folder.path().join("b.db").exists(), "what is refused makes no record");
     assert_eq!(run(&["import", "signed.gait", "--database", "b.db", "--trust", &key]).1, study);
     #[cfg(unix)]

@@ -298,7 +298,7 @@ async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
         assert!(refused.text.contains(kept), "{kept}");
     }
     let none = format!("a={a}&b={b}&source=clinician&author=K&note=&key={UNKNOWN}");
-    is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "one of a, b");
+    is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "one of the answers of the form");
     let itself = format!("a={a}&b={a}&answer=b&source=clinician&author=K&note=&key={UNKNOWN}");
     is_page(&service.post_text(&path, FORM, &itself).await, unprocessable, "compared with itself");
     is_page(&service.fetch(&format!("{path}?a={a}&b={a}")).await, StatusCode::OK, "are the same. Choose two different");

@@ -343,8 +343,7 @@ impl Submitted {
             "unsafe_b" => assessment(presentations::Judgement::UnsafeSecond),
             "unsafe_both" => assessment(presentations::Judgement::UnsafeBoth),
             other => {
-                let allowed = "one of a, b, no_difference, cannot_tell, unsafe_a, unsafe_b, unsafe_both";
-                return Err(Error::invalid("answer", other, allowed));
+                return Err(Error::invalid("answer", other, "one of the answers of the form"));
             }
         };
         Ok((judgement, identifier("key", &self.key)?))

@@ -63,11 +63,11 @@ pub async fn give(
     }
     let unseen = |closed: &&Closed| decision.reports.as_ref().is_some_and(|seen| !seen.contains(&closed.id()));
     if let Some(unseen) = closed.iter().rfind(unseen) {
-        let again = format!(
-            "The gait of trial {number} was reported as unsafe again, by {}. Read that report first.",
+        let other = format!(
+            "The gait of trial {number} has a safety report by {} that is not among the reports of this review. Read it first.",
             unseen.by
         );
-        return Err(Error::conflict(again));
+        return Err(Error::conflict(other));
     }
     let taken = decision.decision;
     let decided: Vec<SafetyReportId> = closed.iter().map(Closed::id).collect();

@@ -339,7 +339,9 @@ async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error>
     Ok(match trials::measured(db, plan.muscles).await?.map(took) {
         Some(seconds) => format!("{size} and takes about {}{people}.", format::duration(seconds)),
         None => format!(
-            "{size}. No solve times measured yet: the first trial takes up to a minute, later ones a few seconds{people}."
+            "{size}. No solve times with{} muscles measured yet: the first trial takes up to a minute, later ones a few \
+             seconds{people}.",
+            if plan.muscles { "" } else { "out" }
         ),
     })
 }

@@ -67,8 +67,11 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
     let whole = whole?.ok_or_else(|| refuse("it is truncated"))?;
     let trusted_key = whole.signed_by.as_ref().is_some_and(|key| trusted.contains(key));
     if !trusted.is_empty() && !trusted_key {
-        let by = whole.signed_by.as_ref().map_or("nobody", PublicKey::as_str);
-        return Err(refuse(format!("it is signed by {by}, which is not a trusted key")));
+        let how = whole.signed_by.as_ref().map_or_else(
+            || "it is not signed, and only archives that are signed with a trusted key are accepted here".to_owned(),
+            |key| format!("it is signed by {key}, which is not a trusted key"),
+        );
+        return Err(refuse(how));
     }
     quarantine.settle().await.map_err(refuse)?;
     let checked = check::study(&mut quarantine, &Pool::default()).await?;
