@@ -2,6 +2,8 @@
 //! durable preferences at a steady total rate, and others read. Then, without other load, the pages of such a study.
 //!
 //! `cargo run --release -p gaitwright-tests --example load -- [SECONDS] [WRITES_PER_SECOND]`
+//!
+//! `RUST_LOG=sqlx::query=debug` writes each statement with its time to standard error.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -89,6 +91,9 @@ fn report(what: &str, mut times: Vec<Duration>, seconds: f64) {
 
 #[tokio::main]
 async fn main() {
+    if let Ok(filter) = std::env::var("RUST_LOG") {
+        tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(std::io::stderr).init();
+    }
     let mut arguments = std::env::args().skip(1);
     let seconds: f64 = arguments.next().map_or(20.0, |text| text.parse().expect("seconds"));
     let rate: f64 = arguments.next().map_or(200.0, |text| text.parse().expect("writes per second"));

@@ -226,7 +226,8 @@ impl Tab {
         // Finds the element again if a live update replaces it before the click.
         for _ in 0..CLICKS {
             self.wait_for(selector).await;
-            self.wait_until(&format!("document.readyState === 'complete' && !!document.querySelector(`{selector}`)")).await;
+            self.wait_until(&format!("document.readyState === 'complete' && !!document.querySelector(`{selector}`)"))
+                .await;
             let place = format!("JSON.stringify(document.querySelector(`{selector}`)?.getBoundingClientRect())");
             let before = self.value(&place).await;
             tokio::time::sleep(STILL).await;
