@@ -112,7 +112,8 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     let if_match = parameters.iter().any(|parameter| parameter["name"] == "If-Match");
     if is_page {
         parameters.push(json!({
-            "name": "cursor", "in": "query", "required": false, "schema": { "type": "string" },
+            "name": "cursor", "in": "query", "required": false,
+            "schema": { "type": "string", "minLength": 2, "pattern": "^([0-9a-f]{2})+$" },
             "description": "`next` of the previous page; omit it for the first page"
         }));
         parameters.push(json!({

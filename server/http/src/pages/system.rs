@@ -12,6 +12,7 @@ use gaitwright_service::backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::job::JobState;
 use gaitwright_store::backup::those_beside;
+use gaitwright_store::backup_folder::BackupFolder;
 use gaitwright_store::totals::{self, Totals};
 use gaitwright_store::{FORM, commit, jobs, trials};
 use std::time::Duration;
@@ -27,8 +28,7 @@ struct SystemPage {
     backup: Option<BackupNotice>,
     /// Backups in the folder of the record, newest first: name and bytes.
     copies: Vec<(String, i64)>,
-    /// The folder of scheduled backups with those in it, newest first, or why it cannot be read.
-    scheduled: Option<(String, Result<Vec<(String, i64)>, String>)>,
+    scheduled: Option<Scheduled>,
     queued: u32,
     running: u32,
     oldest_queued: String,
@@ -37,6 +37,19 @@ struct SystemPage {
     record: String,
     measured: [Option<trials::Measured>; 2],
     may_administer: bool,
+}
+
+/// The folder of scheduled backups.
+struct Scheduled {
+    folder: String,
+    /// The backups in it, newest first: name and bytes, or why it cannot be read.
+    found: Result<Vec<(String, i64)>, String>,
+}
+
+impl Scheduled {
+    fn of(folder: &BackupFolder) -> Self {
+        Self { folder: folder.path().display().to_string(), found: folder.sizes().map_err(|e| e.to_string()) }
+    }
 }
 
 impl SystemPage {
@@ -102,9 +115,9 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
     let record = app.store().path();
     let copies = if may_administer { those_beside(record) } else { Ok(Vec::new()) };
     let measured = [trials::measured(&mut reader, true).await?, trials::measured(&mut reader, false).await?];
-    let scheduled = app.backups.scheduled().filter(|_| may_administer);
+    let scheduled = app.backups.scheduled().filter(|_| may_administer).map(Scheduled::of);
     page(&SystemPage {
-        scheduled: scheduled.map(|f| (f.path().display().to_string(), f.sizes().map_err(|e| e.to_string()))),
+        scheduled,
         version: env!("CARGO_PKG_VERSION"),
         form: FORM,
         copies: copies.map_err(|e| Error::Internal(format!("cannot list the backups: {e}")))?,
