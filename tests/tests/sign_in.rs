@@ -243,13 +243,14 @@ async fn guesses_from_many_networks_wait_a_few_seconds_and_known_browsers_do_not
     // The clock goes on while the test runs.
     let wait: u64 = refused.headers["retry-after"].to_str().unwrap().parse().unwrap();
     assert!((5..=10).contains(&wait), "{wait}");
+    // Another browser waits as well. Asked before passwords are hashed, which can take longer than the wait.
+    assert_eq!(sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status, StatusCode::TOO_MANY_REQUESTS);
     // Other users, and browsers in which the user signed in earlier, do not wait.
     with_password(&service, "Bob", Role::Clinician, RIGHT).await;
     assert_eq!(sign_in_from(&service, OWNER, None, "Bob", RIGHT).await.status, StatusCode::SEE_OTHER);
     let known = sign_in_from(&service, OWNER, Some(&browser), "Ada", RIGHT).await;
     assert_eq!(known.status, StatusCode::SEE_OTHER);
     // Another browser gets in as soon as the wait is over, and ends the waits.
-    assert_eq!(sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status, StatusCode::TOO_MANY_REQUESTS);
     service.access = standing_at(at.plus_seconds(10));
     assert_eq!(sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status, StatusCode::SEE_OTHER);
     assert_eq!(sign_in_from(&service, ATTACKER, None, "Ada", "guess").await.status, StatusCode::UNAUTHORIZED);
