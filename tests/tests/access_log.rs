@@ -19,7 +19,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{self, As, FORM, send, signed_in, token};
 use gaitwright_tests::cli;
 use gaitwright_tests::service::{Service, for_localhost};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use tempfile::TempDir;
 use tower::ServiceExt;
@@ -212,6 +212,50 @@ async fn views_exports_and_refusals_name_who_what_and_whose() {
     let page = fetch(&admin, &format!("/access-log?subject={subject}&contains=trials.csv")).await;
     assert!(page.status == StatusCode::OK && page.text.contains("trials.csv") && page.text.contains("paper-1"));
     assert_eq!(fetch(&clinician, "/api/v1/access-log").await.status, StatusCode::FORBIDDEN);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn every_spelling_refused_forms_and_second_subjects_are_logged() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let first = service.study(|new| new.trial_budget = 2).await;
+    let described = json!({"pseudonym": "S09", "height_m": 1.7, "body_mass_kg": 66});
+    let other = service.post("/api/v1/subjects", &described).await.json()["id"].as_str().unwrap().to_owned();
+    let second = service.study(|new| (new.trial_budget, new.subject_id) = (2, other.parse().unwrap())).await;
+    for study in [first, second] {
+        service.wait_for(study, &[StudyState::Finished]).await;
+    }
+    let own = service.get(first).await.plan.subject_id.to_string();
+    let [upper, simple] = [first.to_string().to_uppercase(), first.to_string().replace('-', "")];
+    let padding = "p".repeat(400);
+    let encoded = format!("{first}%2C{}", second.to_string().replace('-', "%2d"));
+    let pages = [
+        (format!("/api/v1/studies/{upper}"), 1),
+        (format!("/api/v1/studies/{simple}"), 1),
+        (format!("/api/v1/studies/%7B{first}%7D/trials.csv"), 1),
+        (format!("/studies/compare?pad={padding}&a={first}&b={second}"), 2),
+        (format!("/api/v1/study-comparison?ids={encoded}"), 2),
+    ];
+    for (path, subjects) in &pages {
+        let before = rows(&service).await.len();
+        let answer = service.fetch(path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
+        let all = rows(&service).await;
+        let found: BTreeSet<_> =
+            all[..all.len() - before].iter().map(|row| row.subject_id.map(|id| id.to_string())).collect();
+        let expected = [&own, &other].into_iter().take(*subjects).map(|id| Some(id.clone())).collect();
+        assert_eq!(found, expected, "{path}");
+    }
+    let before = rows(&service).await.len();
+    let refused = service.post_text(&format!("/studies/{second}/lab"), FORM, "gait_one=x&gait_two=y").await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let all = rows(&service).await;
+    assert_eq!(all.len(), before + 1);
+    assert_eq!(
+        (all[0].kind, all[0].subject_id.map(|id| id.to_string()), all[0].status),
+        (Kind::View, Some(other), 422)
+    );
     service.stop().await;
 }
 

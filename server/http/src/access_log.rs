@@ -118,7 +118,8 @@ impl AccessLog {
         let mut waiting = self.waiting();
         let Waiting { rows, written, .. } = &mut *waiting;
         written.retain(|_, at| at.elapsed() < REPEATED_WITHIN);
-        let due: Vec<_> = rows.extract_if(|access, _| all || !written.contains_key(access)).collect();
+        let mut due: Vec<_> = rows.extract_if(|access, _| all || !written.contains_key(access)).collect();
+        due.sort_by_key(|(_, tally)| tally.first_at);
         written.extend(due.iter().map(|(access, _)| (access.clone(), Instant::now())));
         due
     }
@@ -140,12 +141,15 @@ impl AccessLog {
     pub async fn write(&self, store: &Store, all: bool) -> Result<(), Error> {
         let mut unwritten = Unwritten { log: self, rows: self.due(all) };
         while !unwritten.rows.is_empty() {
-            let first = unwritten.rows.len().saturating_sub(AT_ONCE);
-            append(store, &unwritten.rows[first..]).await?;
-            unwritten.rows.truncate(first);
+            let count = unwritten.rows.len().min(AT_ONCE);
+            append(store, &unwritten.rows[..count]).await?;
+            unwritten.rows.drain(..count);
         }
-        if let Some(spool) = access_spool::take(store.path())? {
-            append(store, &spool.noted).await?;
+        if let Some(mut spool) = access_spool::take(store.path())? {
+            // If this ends early, rows are written twice rather than lost.
+            while let Some(noted) = spool.more()? {
+                append(store, &noted).await?;
+            }
             spool.clear()?;
         }
         Ok(())
@@ -261,16 +265,17 @@ pub(super) async fn note(
     let has_token = request.headers().contains_key(header::AUTHORIZATION);
     let (method, uri) = (request.method().clone(), request.uri().clone());
     let object = object(&route, uri.path(), uri.query());
-    let mut named: Vec<String> = parameters
-        .iter()
-        .flat_map(|parameters| parameters.iter().map(|(_, value)| value.to_owned()))
-        .filter(|_| !route.contains("{link}"))
-        .collect();
-    named.extend(uuids(&object));
+    let parameters = parameters.iter().flat_map(|parameters| parameters.iter().map(|(_, value)| value));
+    let mut named: Vec<String> =
+        parameters.filter(|_| !route.contains("{link}")).flat_map(|value| named_in(value)).collect();
+    // Of the whole query, because `object` is truncated.
+    let query: Vec<(String, String)> =
+        uri.query().and_then(|query| serde_urlencoded::from_str(query).ok()).unwrap_or_default();
+    named.extend(query.iter().flat_map(|(_, value)| identifiers(value)));
     let answer = next.run(request).await;
     // The identifier of a new object.
     if let Some(location) = answer.headers().get(header::LOCATION).and_then(|location| location.to_str().ok()) {
-        named.extend(uuids(location));
+        named.extend(identifiers(location));
     }
     let caller = answer.extensions().get::<Caller>();
     let Some(kind) = kind_of(&route, &method, &answer, has_token || caller.is_some()) else { return Ok(answer) };
@@ -293,8 +298,13 @@ fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Opti
     if matches!(status, StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN) && (known || signing_in) {
         return Some(Kind::Refused);
     }
-    let shown = status.is_success() || status == StatusCode::NOT_MODIFIED;
-    if !shown {
+    let starts = |name, start: &[u8]| {
+        answer.headers().get(name).map(HeaderValue::as_bytes).is_some_and(|v| v.starts_with(start))
+    };
+    // A refused form is shown again, with the page around it.
+    let again = matches!(status, StatusCode::CONFLICT | StatusCode::UNPROCESSABLE_ENTITY)
+        && starts(header::CONTENT_TYPE, b"text/html");
+    if !status.is_success() && status != StatusCode::NOT_MODIFIED && !again {
         return None;
     }
     if EXPORTS_BY_POST.contains(&route) && *method == Method::POST {
@@ -303,9 +313,6 @@ fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Opti
     if status == StatusCode::NO_CONTENT || NO_SUBJECT_DATA.contains(&route) {
         return None;
     }
-    let starts = |name, start: &[u8]| {
-        answer.headers().get(name).map(HeaderValue::as_bytes).is_some_and(|v| v.starts_with(start))
-    };
     let file = starts(header::CONTENT_DISPOSITION, b"attachment") || starts(header::CONTENT_TYPE, b"text/csv");
     Some(if file { Kind::Export } else { Kind::View })
 }
@@ -319,8 +326,42 @@ fn object(route: &str, path: &str, query: Option<&str>) -> String {
     whole.chars().filter(|c| !c.is_control()).take(LONGEST_OBJECT).collect()
 }
 
-/// Identifiers in an address.
-fn uuids(object: &str) -> Vec<String> {
-    let parts = object.split(|c: char| !c.is_ascii_alphanumeric() && c != '-');
-    parts.filter(|part| Uuid::parse_str(part).is_ok()).map(str::to_owned).collect()
+/// What a path parameter names: the identifiers in it as they stand in the record, or else the text itself, such as a token.
+fn named_in(parameter: &str) -> Vec<String> {
+    let found: Vec<String> = identifiers(parameter).collect();
+    if found.is_empty() { vec![parameter.to_owned()] } else { found }
+}
+
+/// The identifiers in a text, in whatever spelling requests may use, as they stand in the record.
+fn identifiers(text: &str) -> impl Iterator<Item = String> {
+    let parts = text.split(|c: char| !c.is_ascii_alphanumeric() && !matches!(c, '-' | '{' | '}' | ':'));
+    parts.filter_map(|part| {
+        // `certificate-` and the identifier of a trial is that of a job.
+        let end = part.len().checked_sub(36).and_then(|at| part.get(at..)).unwrap_or(part);
+        Uuid::try_parse(part).or_else(|_| Uuid::try_parse(end)).ok().map(|id| id.hyphenated().to_string())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::identifiers;
+
+    #[test]
+    fn identifiers_are_found_in_every_spelling() {
+        let id = "01a21581-2b1b-7470-8a46-cd8569799078";
+        let (upper, simple) = (id.to_uppercase(), id.replace('-', ""));
+        for text in [
+            id.to_owned(),
+            upper,
+            simple,
+            format!("{{{id}}}"),
+            format!("urn:uuid:{id}"),
+            format!("certificate-{id}"),
+            format!("/api/v1/trials/{id}"),
+        ] {
+            assert_eq!(identifiers(&text).collect::<Vec<_>>(), [id], "{text}");
+        }
+        assert_eq!(identifiers(&format!("{id},{id}")).count(), 2);
+        assert_eq!(identifiers("trials, 12 of them").count(), 0);
+    }
 }

@@ -115,31 +115,37 @@ pub async fn append(db: &mut Connection, rows: &[(Access, Tally)]) -> StoreResul
     let mut known = HashMap::new();
     let mut values = Vec::new();
     for (access, tally) in rows {
-        let mut whose = (None, None);
+        // One row for each subject; one without, if there is none.
+        let mut subjects: Vec<(Option<StudyId>, Option<SubjectId>)> = Vec::new();
         for id in &access.named {
-            whose = match known.get(id.as_str()) {
+            let whose = match known.get(id.as_str()) {
                 Some(whose) => *whose,
                 None => whose_is(db, id).await?,
             };
             known.insert(id.as_str(), whose);
-            if whose.1.is_some() {
-                break;
+            if whose.1.is_some() && !subjects.iter().any(|(_, subject)| *subject == whose.1) {
+                subjects.push(whose);
             }
         }
-        values.push(json!([
-            tally.first_at,
-            tally.last_at,
-            tally.times,
-            access.kind,
-            access.actor,
-            access.address,
-            access.method,
-            access.route,
-            access.object,
-            access.status,
-            whose.0,
-            whose.1,
-        ]));
+        if subjects.is_empty() {
+            subjects.push((None, None));
+        }
+        values.extend(subjects.into_iter().map(|whose| {
+            json!([
+                tally.first_at,
+                tally.last_at,
+                tally.times,
+                access.kind,
+                access.actor,
+                access.address,
+                access.method,
+                access.route,
+                access.object,
+                access.status,
+                whose.0,
+                whose.1,
+            ])
+        }));
     }
     sqlx::query(
         "insert into access_log (created_at, last_at, times, kind, actor, address, method, route, object, status, \
