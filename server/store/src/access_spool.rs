@@ -5,11 +5,13 @@ use super::access_log::{Access, Tally};
 use super::{Instant, StoreError, StoreResult, beside};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Number of bytes of the spool that are read at a time.
-const LONGEST_BYTES: u64 = 1 << 20;
+/// Number of lines that are read at a time.
+const AT_ONCE: usize = 200;
+/// A longer line is no access.
+const LONGEST_LINE_BYTES: u64 = 1 << 16;
 
 #[derive(Serialize, Deserialize)]
 struct Line {
@@ -39,13 +41,11 @@ pub fn note(record: &Path, access: &Access) -> StoreResult<()> {
     file.lock().and_then(|()| file.write_all(text.as_bytes())).and_then(|()| file.sync_all()).map_err(failed)
 }
 
-/// The noted accesses. While this is held, no command can add any.
+/// The noted accesses, oldest first. While this is held, no command can add any.
 #[derive(Debug)]
 pub struct Spool {
-    file: File,
+    file: BufReader<File>,
     path: PathBuf,
-    /// The accesses, oldest first.
-    pub noted: Vec<(Access, Tally)>,
 }
 
 /// Takes the accesses that were noted next to a record, if any.
@@ -65,25 +65,80 @@ pub fn take(record: &Path) -> StoreResult<Option<Spool>> {
         Err(TryLockError::WouldBlock) => return Ok(None),
         Err(TryLockError::Error(source)) => return Err(failed(source)),
     }
-    let mut text = String::new();
-    (&file).take(LONGEST_BYTES).read_to_string(&mut text).map_err(failed)?;
-    let noted = text.lines().filter_map(|line| {
-        let Ok(Line { at, access }) = serde_json::from_str(line) else {
-            tracing::warn!(file = %path.display(), "ignoring a malformed line of the access spool");
-            return None;
-        };
-        Some((access, Tally { first_at: at, last_at: at, times: 1 }))
-    });
-    let noted = noted.collect();
-    Ok(Some(Spool { file, path, noted }))
+    Ok(Some(Spool { file: BufReader::new(file), path }))
 }
 
 impl Spool {
+    /// The next accesses, at most [`AT_ONCE`]; `None` at the end. Lines that no command wrote are ignored, with a warning.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn more(&mut self) -> StoreResult<Option<Vec<(Access, Tally)>>> {
+        let (mut noted, mut lines) = (Vec::new(), 0);
+        while lines < AT_ONCE {
+            let mut line = Vec::new();
+            let read = (&mut self.file).take(LONGEST_LINE_BYTES).read_until(b'\n', &mut line);
+            if read.map_err(|source| StoreError::Open { path: self.path.clone(), source })? == 0 {
+                break;
+            }
+            lines += 1;
+            match serde_json::from_slice(&line) {
+                Ok(Line { at, access }) => noted.push((access, Tally { first_at: at, last_at: at, times: 1 })),
+                Err(_) => tracing::warn!(file = %self.path.display(), "ignoring a malformed line of the access spool"),
+            }
+        }
+        Ok((lines > 0).then_some(noted))
+    }
+
     /// Clears the spool after its accesses were written to the log.
     ///
     /// # Errors
     /// If the file cannot be cleared.
     pub fn clear(self) -> StoreResult<()> {
-        self.file.set_len(0).map_err(|source| StoreError::Open { path: self.path, source })
+        self.file.get_ref().set_len(0).map_err(|source| StoreError::Open { path: self.path, source })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::access_log::Kind;
+    use super::*;
+
+    fn access(object: String) -> Access {
+        let text = |text: &str| text.to_owned();
+        Access {
+            kind: Kind::Export,
+            actor: text("command line"),
+            address: String::new(),
+            method: String::new(),
+            route: text("export"),
+            object,
+            status: 0,
+            named: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn every_noted_access_is_read_whatever_lies_between() {
+        let folder = tempfile::tempdir().unwrap();
+        let record = folder.path().join("a.db");
+        let garbage = || {
+            let mut file = OpenOptions::new().append(true).create(true).open(path_of(&record)).unwrap();
+            file.write_all(b"\xff\xfe\n{}\n").unwrap();
+        };
+        garbage();
+        for number in 0..AT_ONCE + 5 {
+            note(&record, &access(format!("study {number}, {}", "x".repeat(6000)))).unwrap();
+        }
+        garbage();
+        let mut spool = take(&record).unwrap().unwrap();
+        let mut found = Vec::new();
+        while let Some(noted) = spool.more().unwrap() {
+            found.extend(noted.into_iter().map(|(access, _)| access.object));
+        }
+        assert_eq!(found.len(), AT_ONCE + 5);
+        assert!(found.iter().enumerate().all(|(at, object)| object.starts_with(&format!("study {at},"))));
+        spool.clear().unwrap();
+        assert!(take(&record).unwrap().is_none());
     }
 }
