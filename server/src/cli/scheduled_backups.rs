@@ -59,11 +59,12 @@ impl ClaimedPlan {
         }
     }
 
-    /// Time until the next backup, counted from the newest one, so that a restart neither adds nor skips a backup.
+    /// Time until the next backup, counted from the newest one, so that a restart neither adds nor skips a backup. A file
+    /// with a time in the future does not count: it could keep backups from being made.
     fn due_in(&self) -> std::io::Result<Duration> {
         let copies = self.folder.backups()?;
-        let age = |made: SystemTime| SystemTime::now().duration_since(made).unwrap_or_default();
-        Ok(copies.first().map_or(Duration::ZERO, |(_, made)| self.every.saturating_sub(age(*made))))
+        let age = copies.iter().find_map(|(_, made)| SystemTime::now().duration_since(*made).ok());
+        Ok(age.map_or(Duration::ZERO, |age| self.every.saturating_sub(age)))
     }
 
     async fn copy(&self, store: &Store) -> Result<(), Error> {

@@ -47,7 +47,8 @@ impl BackupFolder {
         if owner.is_empty() {
             file.write_all(format!("{own}\n").as_bytes()).and_then(|()| file.sync_all()).map_err(cannot)?;
         }
-        Ok(Self { folder: folder.to_owned(), stem, _claim: file })
+        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        Ok(Self { folder: whole, stem, _claim: file })
     }
 
     /// The path of the folder.
@@ -95,7 +96,8 @@ impl BackupFolder {
         let mut found = Vec::new();
         for entry in std::fs::read_dir(&self.folder)? {
             let entry = entry?;
-            if entry.file_name().to_string_lossy().starts_with(&start) {
+            // Not a folder or a link, which no backup made.
+            if entry.file_name().to_string_lossy().starts_with(&start) && entry.file_type()?.is_file() {
                 found.push((entry.metadata()?.modified()?, entry.path()));
             }
         }
