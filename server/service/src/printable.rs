@@ -62,7 +62,7 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
 pub(crate) fn person(name: &str) -> String {
     let invisible = CodePointSetData::new::<DefaultIgnorableCodePoint>();
     let visible: String = name.nfkc().filter(|c| !invisible.contains(*c)).collect();
-    visible.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
+    visible.split_whitespace().collect::<Vec<_>>().join(" ").to_uppercase().to_lowercase()
 }
 
 /// Whether two names are of one person.
@@ -103,6 +103,7 @@ mod tests {
         {
             assert!(is_same_name("Dr. Ünal", other), "{other:?}");
         }
+        assert!(is_same_name("Anna Straße", "ANNA STRASSE"));
         assert!(!is_same_name("Dr. Ünal", "Dr. Unal"));
     }
 }
