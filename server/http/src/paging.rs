@@ -61,10 +61,7 @@ impl TryFrom<String> for SearchText {
 
     fn try_from(text: String) -> Result<Self, String> {
         match text.chars().count() {
-            length if length > Self::LONGEST => Err(format!(
-                "the search text (`contains`) has {length} characters; it must have at most {}",
-                Self::LONGEST
-            )),
+            length if length > Self::LONGEST => Err(format!("at most {} characters long", Self::LONGEST)),
             _ => Ok(Self(text)),
         }
     }
@@ -138,7 +135,7 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
                 return Err(Error::Malformed(format!("The query has the parameter {name} twice.")));
             }
         }
-        let filter = query::read(&filter)?;
+        let filter = query::read(&filter, &["cursor", "limit"])?;
         Ok(Self { after, filter, limit: limit.unwrap_or(DEFAULT_LIMIT) })
     }
 }

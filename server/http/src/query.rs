@@ -17,39 +17,48 @@ pub(crate) fn pairs(query: &str) -> Result<Pairs, Error> {
     serde_urlencoded::from_str(query).map_err(|e| Error::Malformed(format!("The query cannot be read: {e}.")))
 }
 
-/// Reads the parameters.
+/// Reads the parameters. The caller has taken out those that are known `beside` the fields.
 ///
 /// # Errors
 /// [`Error::Unreadable`] naming the parameter.
-pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs) -> Result<T, Error> {
+pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs, beside: &[&str]) -> Result<T, Error> {
     let values = pairs.iter().map(|(name, value)| (name.as_str(), Text(value)));
     let reader = MapDeserializer::<_, Refused>::new(values);
     serde_path_to_error::deserialize(reader).map_err(|error| {
         let path = error.path().to_string();
-        unreadable(&path, &error.into_inner().to_string(), pairs)
+        unreadable(&path, &error.into_inner().to_string(), pairs, beside)
     })
 }
 
-fn unreadable(path: &str, message: &str, pairs: &Pairs) -> Error {
+fn unreadable(path: &str, message: &str, pairs: &Pairs, beside: &[&str]) -> Error {
     let named = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').next());
     let (missing, twice) = (named("missing field `"), named("duplicate field `"));
     let field = missing.or(twice).or(named("unknown field `")).unwrap_or(path);
     let value = pairs.iter().find(|(name, _)| name == field).map(|(_, value)| value.as_str());
+    let unknown = message.starts_with("unknown field");
+    let of_type = ["invalid type", "invalid value", "unknown variant"].iter().any(|start| message.starts_with(start));
     let allowed = match (missing, twice) {
         (Some(_), _) => "present".to_owned(),
         (_, Some(_)) => "present only once".to_owned(),
-        _ => document::expected(message),
+        _ if unknown && message.ends_with("there are no fields") => String::new(),
+        // The value comes before it, and may hold any words.
+        _ if unknown || of_type => {
+            document::expected(message.rfind(", expected ").map_or(message, |at| &message[at..]))
+        }
+        _ if message.starts_with("UUID parsing failed") => "an identifier".to_owned(),
+        _ => message.to_owned(),
     };
+    let shown = || document::shortened(&value.into());
     let message = match (missing, twice) {
         (Some(_), _) => format!("The query parameter {field} is missing."),
         (_, Some(_)) => format!("The query has the parameter {field} twice."),
-        _ if message.starts_with("unknown field") => {
-            let known = allowed.trim_start_matches("one of ");
+        _ if unknown => {
+            let known = allowed.trim_start_matches("one of ").replace(" or ", ", ");
+            let known: Vec<&str> = known.split(", ").chain(beside.iter().copied()).filter(|k| !k.is_empty()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
             format!("The query parameter {field} is unknown. Known parameters: {known}.")
         }
-        _ => {
-            format!("The query parameter {field} is {}; it must be {allowed}.", document::shortened(&value.into()))
-        }
+        _ => format!("The query parameter {field} is {}; it must be {allowed}.", shown()),
     };
     Error::Unreadable(Box::new(FieldError {
         message,
@@ -151,7 +160,7 @@ mod tests {
     }
 
     fn refusal(query: &str) -> (String, String) {
-        match read::<Asked>(&pairs(query).unwrap()) {
+        match read::<Asked>(&pairs(query).unwrap(), &["limit"]) {
             Err(Error::Unreadable(found)) => (found.field, found.message),
             other => panic!("{query}: {other:?}"),
         }
@@ -159,7 +168,7 @@ mod tests {
 
     #[test]
     fn text_becomes_what_is_asked_for() {
-        let asked: Asked = read(&pairs("number=7&share=0.5&order=descending&contains=12").unwrap()).unwrap();
+        let asked: Asked = read(&pairs("number=7&share=0.5&order=descending&contains=12").unwrap(), &[]).unwrap();
         let expected = Asked { number: 7, share: Some(0.5), order: Some(Order::Descending), contains: "12".to_owned() };
         assert_eq!(asked, expected);
     }
@@ -170,12 +179,17 @@ mod tests {
             ("number=x", "number", "The query parameter number is \"x\"; it must be a whole number of at least 0."),
             ("number=1&share=half", "share", "The query parameter share is \"half\"; it must be a number."),
             ("number=1&order=up", "order", "The query parameter order is \"up\"; it must be ascending or descending."),
+            (
+                "number=1&order=expected+up",
+                "order",
+                "The query parameter order is \"expected up\"; it must be ascending or descending.",
+            ),
             ("share=1", "number", "The query parameter number is missing."),
             ("number=1&number=2", "number", "The query has the parameter number twice."),
             (
                 "number=1&nmber=2",
                 "nmber",
-                "The query parameter nmber is unknown. Known parameters: number, share, order, contains.",
+                "The query parameter nmber is unknown. Known parameters: number, share, order, contains, limit.",
             ),
         ] {
             assert_eq!(refusal(query), (field.to_owned(), message.to_owned()));
