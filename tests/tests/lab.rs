@@ -331,9 +331,11 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     let shown = service.fetch(&page).await.text;
     assert!(shown.contains("one of the two gaits (blinded)") && shown.contains("without the device"), "{shown}");
     let lab = page.replace("lab-sessions", "lab");
-    let unticked = service.post_text(&lab, FORM, "walk=1&note=left+foot").await;
-    assert_eq!(unticked.status, StatusCode::CONFLICT);
-    assert!(unticked.text.contains("Walk 1 was not recorded") && unticked.text.contains("left foot</textarea>"));
+    for tick in ["", "&complete=", "&complete=no"] {
+        let unticked = service.post_text(&lab, FORM, &format!("walk=1&note=left+foot{tick}")).await;
+        assert_eq!(unticked.status, StatusCode::CONFLICT);
+        assert!(unticked.text.contains("Walk 1 was not recorded") && unticked.text.contains("left foot</textarea>"));
+    }
     assert_eq!(service.post_text(&lab, FORM, "walk=1&note=&complete=yes").await.status, StatusCode::SEE_OTHER);
     assert!(service.fetch(&lab).await.text.contains("Walk 2"));
     assert_eq!(service.post_text(&format!("{page}/close"), FORM, "note=").await.status, StatusCode::SEE_OTHER);

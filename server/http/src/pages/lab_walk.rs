@@ -55,7 +55,7 @@ pub(super) struct Walked {
     walk: u8,
     #[serde(default)]
     note: String,
-    /// Present if the box is ticked.
+    /// `yes` if the box is ticked.
     complete: Option<String>,
 }
 
@@ -97,13 +97,14 @@ pub(super) async fn record(
 ) -> Result<Response, PageError> {
     let walked = RecordedWalk { walk, note };
     let recorded = async {
-        if complete.is_none() {
-            return Err(Error::conflict(format!(
-                "Walk {walk} was not recorded. First tick that it is complete and measured: a recorded walk cannot be undone."
-            )));
-        }
         let mut writer = app.write().await?;
         if !lab::was_recorded(&mut writer, id, &walked).await? {
+            if complete.as_deref() != Some("yes") {
+                return Err(Error::conflict(format!(
+                    "Walk {walk} was not recorded. First tick that it is complete and measured: a recorded walk cannot be \
+                     undone."
+                )));
+            }
             lab::record_walk(&mut writer, &authorized.caller.actor, id, &walked).await?;
             commit(writer).await?;
         }
