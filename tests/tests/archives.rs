@@ -194,7 +194,7 @@ fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
-const FORGERIES: [Forgery; 64] = [
+const FORGERIES: [Forgery; 66] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its figures differ from its solve report"),
     ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated gait_rmse_rad is 0.01"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
@@ -415,11 +415,21 @@ const FORGERIES: [Forgery; 64] = [
         "the source of a preference is convergence",
     ),
     (
+        "an answer by a name with spaces around it",
+        |r| of_source(r, "clinician")["author"] = " Nina".into(),
+        "which is not a name without surrounding spaces",
+    ),
+    (
+        "an answer by an invisible name",
+        |r| of_source(r, "clinician")["author"] = "\u{200b}".into(),
+        "1 to 80 printable characters",
+    ),
+    (
         "an answer given twice",
         |r| {
             let mut row = of_source(r, "clinician").clone();
             // The first one was retracted.
-            for (number, author) in [(1, "Nina"), (2, " NINA")] {
+            for (number, author) in [(1, "Nina"), (2, "NINA")] {
                 row["seq"] = (90_000 + number).into();
                 row["id"] = format!("01900000-0000-7000-8000-{number:012}").into();
                 row["author"] = author.into();

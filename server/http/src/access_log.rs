@@ -266,8 +266,7 @@ pub(super) async fn note(
     let (method, uri) = (request.method().clone(), request.uri().clone());
     let object = object(&route, uri.path(), uri.query());
     let parameters = parameters.iter().flat_map(|parameters| parameters.iter().map(|(_, value)| value));
-    let mut named: Vec<String> =
-        parameters.filter(|_| !route.contains("{link}")).flat_map(|value| named_in(value)).collect();
+    let mut named: Vec<String> = parameters.filter(|_| !route.contains("{link}")).flat_map(named_in).collect();
     // Of the whole query, because `object` is truncated.
     let query: Vec<(String, String)> =
         uri.query().and_then(|query| serde_urlencoded::from_str(query).ok()).unwrap_or_default();

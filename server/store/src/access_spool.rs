@@ -82,9 +82,10 @@ impl Spool {
                 break;
             }
             lines += 1;
-            match serde_json::from_slice(&line) {
-                Ok(Line { at, access }) => noted.push((access, Tally { first_at: at, last_at: at, times: 1 })),
-                Err(_) => tracing::warn!(file = %self.path.display(), "ignoring a malformed line of the access spool"),
+            if let Ok(Line { at, access }) = serde_json::from_slice(&line) {
+                noted.push((access, Tally { first_at: at, last_at: at, times: 1 }));
+            } else {
+                tracing::warn!(file = %self.path.display(), "ignoring a malformed line of the access spool");
             }
         }
         Ok((lines > 0).then_some(noted))
