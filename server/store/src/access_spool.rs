@@ -69,7 +69,7 @@ pub fn take(record: &Path) -> StoreResult<Option<Spool>> {
 }
 
 impl Spool {
-    /// The next accesses, at most [`AT_ONCE`]; `None` at the end. Lines that no command wrote are ignored, with a warning.
+    /// The next accesses, a limited number at a time; `None` at the end. Lines that no command wrote are ignored, with a warning.
     ///
     /// # Errors
     /// If the file cannot be read.
