@@ -11,7 +11,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection};
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
@@ -76,6 +76,20 @@ async fn scheduled_backup_of_a_damaged_record_fails_and_keeps_the_last_good_one(
     assert!(backup::beside_record(&store).await.is_err());
     assert_eq!(claimed.backups().unwrap().len(), 1);
     verify::file(&good, &[]).await.unwrap();
+}
+
+#[tokio::test]
+async fn new_backup_stays_beside_a_file_with_a_time_in_the_future() {
+    let folder = tempfile::tempdir().unwrap();
+    let (database, out) = (folder.path().join("a.db"), tempfile::tempdir().unwrap());
+    record(&database).await;
+    let store = Store::open(&database).await.unwrap();
+    let claimed = BackupFolder::claim(&store, out.path()).unwrap();
+    let file = std::fs::File::create(out.path().join("a.db.scheduled-20990101T000000")).unwrap();
+    file.set_modified(SystemTime::now() + Duration::from_hours(24)).unwrap();
+    let (new, _) = claimed.add(&store, 1).await.unwrap();
+    assert!(new.exists());
+    assert_eq!(claimed.backups().unwrap().len(), 1);
 }
 
 #[tokio::test]

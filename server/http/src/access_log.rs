@@ -307,7 +307,7 @@ fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Opti
         return None;
     }
     if EXPORTS_BY_POST.contains(&route) && *method == Method::POST {
-        return Some(Kind::Export);
+        return Some(Kind::Export).filter(|_| !again);
     }
     if status == StatusCode::NO_CONTENT || NO_SUBJECT_DATA.contains(&route) {
         return None;

@@ -48,7 +48,6 @@ fn unreadable(path: &str, message: &str, pairs: &Pairs, beside: &[&str]) -> Erro
         _ if message.starts_with("UUID parsing failed") => "an identifier".to_owned(),
         _ => message.to_owned(),
     };
-    let shown = || document::shortened(&value.into());
     let message = match (missing, twice) {
         (Some(_), _) => format!("The query parameter {field} is missing."),
         (_, Some(_)) => format!("The query has the parameter {field} twice."),
@@ -58,7 +57,7 @@ fn unreadable(path: &str, message: &str, pairs: &Pairs, beside: &[&str]) -> Erro
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
             format!("The query parameter {field} is unknown. Known parameters: {known}.")
         }
-        _ => format!("The query parameter {field} is {}; it must be {allowed}.", shown()),
+        _ => format!("The query parameter {field} is {}; it must be {allowed}.", document::shortened(&value.into())),
     };
     Error::Unreadable(Box::new(FieldError {
         message,

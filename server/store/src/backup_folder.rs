@@ -69,7 +69,9 @@ impl BackupFolder {
         let cannot = |source| StoreError::Open { path: self.folder.clone(), source };
         let size = std::fs::metadata(&to).map_err(cannot)?.len();
         // Only now, so that the newest backup that remains is one that was verified.
-        for (old, _) in self.backups().map_err(cannot)?.into_iter().skip(keep.max(1)) {
+        // The new one stays, whatever times the others have.
+        let others = self.backups().map_err(cannot)?.into_iter().filter(|(path, _)| path.file_name() != to.file_name());
+        for (old, _) in others.skip(keep.saturating_sub(1)) {
             std::fs::remove_file(&old).map_err(|source| StoreError::Open { path: old, source })?;
         }
         Ok((to, size))
