@@ -11,6 +11,7 @@ use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::commit;
 use gaitwright_store::members::MemberKind;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{As, FORM, member, send, service, session_of, signed_in, token, user};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
@@ -490,4 +491,19 @@ async fn programs_are_not_sent_to_a_form() {
     let (_folder, service) = service().await;
     let figures = service.fetch("/metrics").await;
     assert_eq!((figures.status, figures.content_type()), (StatusCode::UNAUTHORIZED, "application/problem+json"));
+}
+
+#[tokio::test]
+async fn two_users_do_not_have_names_of_one_person() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let add = async |name: &str| service.post("/api/v1/users", &json!({"name": name, "role": "rater"})).await;
+    assert_eq!(add("Dr. Ünal").await.status, StatusCode::CREATED);
+    for same in ["dr. ünal", "DR.  ÜNAL", "Dr. U\u{308}nal", "\u{ff24}r. Ünal"] {
+        let refused = add(same).await;
+        assert_eq!(refused.status, StatusCode::CONFLICT, "{same}");
+        assert!(refused.text.contains("already a user"), "{}", refused.text);
+    }
+    assert_eq!(add("Dr. Unal").await.status, StatusCode::CREATED);
+    service.stop().await;
 }

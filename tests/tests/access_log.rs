@@ -182,6 +182,12 @@ async fn views_exports_and_refusals_name_who_what_and_whose() {
     assert_eq!(fetch(&script, &csv).await.status, StatusCode::FORBIDDEN);
     service.post_text("/sign-in", FORM, "name=nobody&password=wrong").await;
     fetch(&As::Nobody, "/health").await;
+    // A study that the caller may not see is not found.
+    let (access, json) = (format!("/api/v1/studies/{study}/access"), "application/json");
+    let restricted = send(&service, &admin, &Method::PUT, &access, json, r#"{"restricted": true}"#).await;
+    assert_eq!(restricted.status, StatusCode::OK, "{}", restricted.text);
+    let hidden = format!("/studies/{study}?tab=hidden");
+    assert_eq!(fetch(&clinician, &hidden).await.status, StatusCode::NOT_FOUND);
 
     let rows = rows(&service).await;
     let of = |kind: Kind, start: &str| {
@@ -204,6 +210,8 @@ async fn views_exports_and_refusals_name_who_what_and_whose() {
     let who: BTreeSet<(&str, u16)> = refused.iter().map(|row| (row.actor.as_str(), row.status)).collect();
     assert_eq!(who, BTreeSet::from([("not signed in", 401), ("token [Rate]", 403)]), "{refused:?}");
     assert_eq!(of(Kind::Refused, "/sign-in").len(), 1);
+    let hidden = of(Kind::Refused, &hidden);
+    assert!(hidden.len() == 1 && hidden[0].status == 404 && hidden[0].subject_id == Some(subject), "{hidden:?}");
     assert!(rows.iter().all(|row| row.route != "/health"));
 
     // Administrators search it, by page and by program.

@@ -194,7 +194,7 @@ fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
-const FORGERIES: [Forgery; 66] = [
+const FORGERIES: [Forgery; 68] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its figures differ from its solve report"),
     ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated gait_rmse_rad is 0.01"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
@@ -437,6 +437,16 @@ const FORGERIES: [Forgery; 66] = [
             }
         },
         "has answered this comparison already",
+    ),
+    (
+        "an answer from before its trials",
+        |r| of_source(r, "clinician")["created_at"] = "2020-01-01T00:00:00.000Z".into(),
+        "before trial",
+    ),
+    (
+        "an assessment from before its gaits",
+        |r| r.first("assessments")["created_at"] = "2020-01-01T00:00:00.000Z".into(),
+        "before trial",
     ),
     (
         "a suggestion out of space",
@@ -707,6 +717,23 @@ async fn an_entity_that_is_known_with_other_content_is_refused_by_name() {
         assert!(refusal.contains(&why) && refusal.contains("nothing was changed"), "{refusal}");
         store.close().await;
     }
+}
+
+#[tokio::test]
+async fn study_of_a_built_in_subject_is_imported_into_a_record_that_has_it_already() {
+    let (folder, service, study, file) = study().await;
+    let there = service.subject().await;
+    service.stop().await;
+    let other = Service::start(&folder.path().join("b.db"), Consistent::default(), 1).await;
+    let here = other.subject().await;
+    assert_ne!(here, there);
+    let mut rows = Rows::of(&file);
+    rows.first("subjects")["notes"] = json!("another person");
+    let refusal = import(&other.store, &rows.packed()).await.unwrap_err().to_string();
+    assert!(refusal.contains("has the name \"paper-"), "{refusal}");
+    assert_eq!(import(&other.store, &file).await.unwrap(), study);
+    assert_eq!(other.get(study).await.plan.subject_id, here);
+    other.stop().await;
 }
 
 #[tokio::test]

@@ -123,6 +123,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let heard_id = service.feedback(finished).await[0].id;
     let named = [
         ("/studies/{id}", finished.to_string()),
+        ("/subjects/{id}", person.to_string()),
         ("/trials/{id}", trials[0].id.to_string()),
         ("/jobs/{id}", format!("solve-{}", trials[0].id)),
         ("/preferences/{id}", heard_id.to_string()),
@@ -138,7 +139,14 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         let name = of.rsplit('/').next().unwrap();
         let answer = service.fetch(&path.replace(name, id).replace("{file}", "a.svg").replace("{side}", "first")).await;
         // None of these responses has results or answers of the subject.
-        let open = ["/api/v1/studies/{id}", "/api/v1/studies/{id}/access", "/api/v1/studies/{id}/members"];
+        let open = [
+            "/api/v1/studies/{id}",
+            "/api/v1/studies/{id}/access",
+            "/api/v1/studies/{id}/members",
+            "/api/v1/subjects/{id}",
+            "/api/v1/subjects/{id}/consents",
+            "/api/v1/subjects/{id}/reference-gaits",
+        ];
         let open = open.contains(&path.as_str());
         let expected = if open { StatusCode::OK } else { StatusCode::CONFLICT };
         assert_eq!(answer.status, expected, "{path}: {}", answer.text);
@@ -164,6 +172,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         format!("/studies/{finished}/figures"),
         format!("/lab-sessions/{session}"),
         format!("/lab/{session}"),
+        format!("/subjects/{person}/muscles"),
     ] {
         let refused = service.fetch(&path).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}");

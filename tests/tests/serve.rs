@@ -14,7 +14,7 @@ use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime};
 
 /// A service as a process, killed when dropped.
 struct Process {
@@ -38,7 +38,8 @@ impl Process {
         let mut said = Vec::new();
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
         while !said.last().is_some_and(|line: &String| line.contains(ready)) {
-            said.push(lines.next().expect("it ended before it was ready").unwrap());
+            let line = lines.next().unwrap_or_else(|| panic!("it ended before it was ready: {said:?}"));
+            said.push(line.unwrap());
         }
         // Reads later output, so that the pipe does not fill up.
         let later = std::thread::spawn(move || lines.map_while(Result::ok).collect());
@@ -126,6 +127,30 @@ fn system_page_lists_scheduled_backups() {
         std::thread::sleep(Duration::from_millis(50));
         listed()
     }));
+}
+
+#[test]
+fn failing_scheduled_backups_are_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let copies = folder.path().join("copies");
+    // Removes the folder of backups from a running service before its next backup is due, after so many seconds.
+    let without_folder = |seconds: u64| {
+        std::fs::create_dir(&copies).unwrap();
+        let made = SystemTime::now() - Duration::from_hours(24) + Duration::from_secs(seconds);
+        std::fs::File::create(copies.join("gaitwright.db.scheduled-1")).unwrap().set_modified(made).unwrap();
+        let begun = Instant::now();
+        let process = Process::start(folder.path(), &["--no-sign-in", "--backup-folder", "copies"], "listening on ");
+        std::fs::remove_dir_all(&copies).unwrap();
+        (begun.elapsed().as_secs() < seconds).then_some(process)
+    };
+    let process = [3, 9, 27, 81].into_iter().find_map(without_folder).unwrap();
+    let read = |path: &str| get(process.address(), path).unwrap();
+    let wait = || std::thread::sleep(Duration::from_millis(100));
+    assert!((0..900).inspect(|_| wait()).any(|_| read("/ready").body.contains("the last scheduled backup failed")));
+    assert_eq!(read("/ready").status, 200);
+    assert!(read("/metrics").body.contains("gaitwright_scheduled_backup_failed 1"));
+    let page = read("/system").body;
+    assert!(page.contains("The last attempt failed, and none has succeeded since"), "{page}");
 }
 
 #[test]

@@ -277,7 +277,10 @@ pub(super) async fn note(
         named.extend(identifiers(location));
     }
     let caller = answer.extensions().get::<Caller>();
-    let Some(kind) = kind_of(&route, &method, &answer, has_token || caller.is_some()) else { return Ok(answer) };
+    let names_object = named.iter().any(|name| Uuid::try_parse(name).is_ok());
+    let Some(kind) = kind_of(&route, &method, &answer, has_token || caller.is_some(), names_object) else {
+        return Ok(answer);
+    };
     let actor =
         caller.map_or_else(|| Actor::anonymous().as_str().to_owned(), |caller| caller.actor.as_str().to_owned());
     let (method, status) = (method.to_string(), answer.status().as_u16());
@@ -291,10 +294,15 @@ pub(super) async fn note(
 }
 
 /// The kind of access. `None` if the response shows no subject data, or refuses a request without a known caller.
-fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Option<Kind> {
+///
+/// An object that the caller may not see is not found, so 404 is a refusal where the request names an object.
+fn kind_of(route: &str, method: &Method, answer: &Response, known: bool, names_object: bool) -> Option<Kind> {
     let status = answer.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;
     if matches!(status, StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN) && (known || signing_in) {
+        return Some(Kind::Refused);
+    }
+    if status == StatusCode::NOT_FOUND && known && names_object && !NO_SUBJECT_DATA.contains(&route) {
         return Some(Kind::Refused);
     }
     let starts = |name, start: &[u8]| {

@@ -27,6 +27,11 @@ pub(crate) trait Located: Copy + Display + FromStr<Err: Display> + Send + Sync {
 
     /// The study that the object belongs to; `None` if it is shared by all studies.
     fn study(self, db: &mut Connection) -> impl Future<Output = StoreResult<Option<StudyId>>> + Send;
+
+    /// The subject, if that is the object.
+    fn subject(self) -> Option<SubjectId> {
+        None
+    }
 }
 
 macro_rules! of_study {
@@ -59,6 +64,18 @@ of_study!(MeasurementFileId, "measurement file", async |db: &mut Connection, id|
     StoreResult::Ok(lab_sessions::get(db, session).await?.study_id)
 });
 
+impl Located for SubjectId {
+    const WHAT: &'static str = "subject";
+
+    async fn study(self, _: &mut Connection) -> StoreResult<Option<StudyId>> {
+        Ok(None)
+    }
+
+    fn subject(self) -> Option<SubjectId> {
+        Some(self)
+    }
+}
+
 impl Located for JobId {
     const WHAT: &'static str = "job";
 
@@ -82,7 +99,6 @@ macro_rules! shared {
     };
 }
 
-shared!(SubjectId, "subject");
 shared!(BackupId, "backup");
 shared!(DeviceId, "device");
 shared!(ReferenceGaitId, "reference gait");
@@ -160,11 +176,14 @@ pub(super) async fn in_path<T: Located, P: Permission>(
     Ok((id, study))
 }
 
-/// Reads the identifier in the path, and refuses it if the subject of its study withdrew consent.
+/// Reads the identifier in the path, and refuses it if its subject, or that of its study, withdrew consent.
 pub(super) async fn visible<T: Located, P: Permission>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
     let (id, study) = in_path::<T, P>(parts, app).await?;
     if let Some(study) = study {
         consents::may_be_shown(&mut *app.read().await?, study).await?;
+    }
+    if let Some(subject) = id.subject() {
+        consents::has_not_withdrawn(&mut *app.read().await?, subject).await?;
     }
     Ok(id)
 }

@@ -87,6 +87,12 @@ pub(super) async fn get(_: Authorized<Read>, State(app): State<AppState>) -> Res
     ] {
         line(&mut text, format_args!("# HELP {name} {meaning}\n# TYPE {name} gauge\n{name} {value}"));
     }
+    if let Some(backups) = app.backups.scheduled() {
+        let name = "gaitwright_scheduled_backup_failed";
+        let failed = u8::from(backups.failure().is_some());
+        let meaning = "1 if the last scheduled backup failed";
+        line(&mut text, format_args!("# HELP {name} {meaning}\n# TYPE {name} gauge\n{name} {failed}"));
+    }
     requests(&mut text, &app.requests);
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response())
 }

@@ -137,6 +137,8 @@ pub(super) fn state(document: &mut Value) {
         add(schemas, "Dimension", "values", &values);
         add(schemas, "Dimension", "lengthscale", &json!({ "minimum": 1e-15, "maximum": 1e15 }));
         add(schemas, "SearchSpace", "dimensions", &json!({ "minItems": 1, "maxItems": TunedBounds::NAMES.len() }));
+        close(schemas, "Dimension");
+        close(schemas, "SearchSpace");
         state_bounds(schemas);
         let mut gait = settings(GaitSettings::default(), |s: &GaitSettings| s.validate().err().map(Error::from));
         if let Some(muscles) = gait.pointer_mut("/properties/muscles") {
@@ -210,9 +212,7 @@ fn state_emg(schemas: &mut Map<String, Value>) {
         add(schemas, "EmgSettings", field, &json!({ "default": usual }));
     }
     set(schemas, "EmgSettings", "order", json!({ "type": "integer", "enum": [2, 4, 6, 8], "default": 4 }));
-    if let Some(settings) = schemas.get_mut("EmgSettings").and_then(Value::as_object_mut) {
-        settings.insert("additionalProperties".to_owned(), json!(false));
-    }
+    close(schemas, "EmgSettings");
 }
 
 /// The schema of the options of a solve. The choice of a gait is a word, or an object with a percentage.
@@ -220,10 +220,8 @@ fn solve_options() -> Value {
     let of = |options: SolveOptions| settings(options, |s: &SolveOptions| s.validate().err().map(Error::from));
     let mut schema = of(SolveOptions::default());
     let nearest = BasinChoice::NearestToReference { within_percent: 0.0 };
-    let mut object =
+    let object =
         of(SolveOptions { basin_choice: nearest, ..SolveOptions::default() })["properties"]["basin_choice"].take();
-    object["required"] = json!(["nearest_to_reference"]);
-    object["properties"]["nearest_to_reference"]["required"] = json!(["within_percent"]);
     let word = json!({ "type": "string", "enum": [BasinChoice::LowestObjective] });
     schema["properties"]["basin_choice"] = json!({ "oneOf": [word, object] });
     schema
@@ -360,6 +358,13 @@ fn set(schemas: &mut Map<String, Value>, component: &str, field: &str, mut schem
     }
 }
 
+/// States that a component has no other fields.
+fn close(schemas: &mut Map<String, Value>, component: &str) {
+    if let Some(schema) = schemas.get_mut(component).and_then(Value::as_object_mut) {
+        schema.insert("additionalProperties".to_owned(), json!(false));
+    }
+}
+
 /// Replaces the schema of a component, and keeps its description.
 fn put(schemas: &mut Map<String, Value>, component: &str, mut schema: Value) {
     let Some(present) = schemas.get_mut(component) else { return };
@@ -434,7 +439,17 @@ fn shape(whole: &Value, place: &str, part: &Value, refusal: &dyn Fn(&Value) -> O
                 .iter()
                 .map(|(name, part)| (name.clone(), shape(whole, &format!("{place}/{name}"), part, refusal)))
                 .collect();
-            json!({ "type": "object", "properties": properties, "additionalProperties": false })
+            let needed = |name: &&String| {
+                let mut rest = fields.clone();
+                rest.remove(*name);
+                with(Value::Object(rest)).is_some()
+            };
+            let required: Vec<&String> = fields.keys().filter(needed).collect();
+            let mut schema = json!({ "type": "object", "properties": properties, "additionalProperties": false });
+            if !required.is_empty() {
+                schema["required"] = json!(required);
+            }
+            schema
         }
         Value::Bool(_) => json!({ "type": "boolean" }),
         Value::Number(number) => number_shape(number.is_f64(), with),

@@ -4,9 +4,9 @@
 //! are neither, and are not in progress, failed.
 
 use crate::error::Error;
+use crate::scheduled_backups::ScheduledBackups;
 use crate::studies::job::JobState;
 use gaitwright_store::audit::{self, Actor, AuditRow};
-use gaitwright_store::backup_folder::BackupFolder;
 use gaitwright_store::{BackupId, Connection, Instant, Store, Writer, backup, commit};
 use serde::Serialize;
 use serde_json::json;
@@ -38,8 +38,7 @@ pub struct Backup {
 #[derive(Debug, Default)]
 pub struct Backups {
     progress: Mutex<BTreeMap<BackupId, Progress>>,
-    /// The folder of scheduled backups, if there is one.
-    scheduled: Option<Arc<BackupFolder>>,
+    scheduled: Option<Arc<ScheduledBackups>>,
 }
 
 #[derive(Debug, Clone)]
@@ -76,13 +75,13 @@ fn object(id: BackupId) -> String {
 }
 
 impl Backups {
-    /// With the folder of scheduled backups, if there is one.
-    pub fn new(scheduled: Option<Arc<BackupFolder>>) -> Self {
+    /// With the scheduled backups, if there are any.
+    pub fn new(scheduled: Option<Arc<ScheduledBackups>>) -> Self {
         Self { scheduled, ..Self::default() }
     }
 
-    /// The folder of scheduled backups, if there is one.
-    pub fn scheduled(&self) -> Option<&BackupFolder> {
+    /// The scheduled backups, if there are any.
+    pub fn scheduled(&self) -> Option<&ScheduledBackups> {
         self.scheduled.as_deref()
     }
 

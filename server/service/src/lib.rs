@@ -11,6 +11,7 @@ pub mod backups;
 pub mod document;
 pub mod error;
 pub mod printable;
+pub mod scheduled_backups;
 pub mod studies;
 pub mod supervise;
 pub mod workers;

@@ -1,8 +1,8 @@
 //! Checks of the text that people type: names, notes and reasons.
 
 use crate::error::{Error, FieldError};
-use icu_properties::CodePointSetData;
-use icu_properties::props::DefaultIgnorableCodePoint;
+use icu_properties::props::{DefaultIgnorableCodePoint, GeneralCategory};
+use icu_properties::{CodePointMapData, CodePointSetData};
 use unicode_normalization::UnicodeNormalization;
 
 /// Characters that change the direction of text, so that one name can look like another.
@@ -11,13 +11,30 @@ const TURNING: [char; 12] = [
     '\u{2067}', '\u{2068}', '\u{2069}',
 ];
 
+/// Symbols that look like a space, or stand for text that is missing.
+const BLANK: [char; 3] = ['\u{2800}', '\u{fffc}', '\u{fffd}'];
+
+/// Whether names may contain the character. Line separators, unassigned and private characters have no agreed look.
+fn prints(c: char) -> bool {
+    use GeneralCategory as Category;
+    let category = CodePointMapData::<Category>::new().get(c);
+    let has_look = !matches!(
+        category,
+        Category::Control
+            | Category::LineSeparator
+            | Category::ParagraphSeparator
+            | Category::PrivateUse
+            | Category::Unassigned
+    );
+    has_look && !TURNING.contains(&c) && !BLANK.contains(&c)
+}
+
 /// The name, trimmed.
 ///
 /// # Errors
 /// [`Error::Invalid`] for an empty name, more than `longest` characters, or a character that does not print.
 pub fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a str, Error> {
     let trimmed = text.trim();
-    let prints = |c: char| !c.is_control() && !TURNING.contains(&c);
     if person(trimmed).is_empty() || trimmed.chars().count() > longest || !trimmed.chars().all(prints) {
         return Err(Error::invalid(field, text, &format!("1 to {longest} printable characters")));
     }
@@ -91,7 +108,20 @@ mod tests {
     #[test]
     fn names_are_trimmed_and_printable() {
         assert_eq!(name("name", " Dr. Ünal-Řehoř ", 80).unwrap(), "Dr. Ünal-Řehoř");
-        for bad in ["", "  ", "a\0b", "a\nb", "a\u{202e}b", "\u{200b}\u{ad}", &"x".repeat(81)] {
+        for bad in [
+            "",
+            "  ",
+            "a\0b",
+            "a\nb",
+            "a\u{202e}b",
+            "a\u{2028}b",
+            "a\u{2800}",
+            "a\u{fffc}",
+            "a\u{e000}",
+            "a\u{378}",
+            "\u{200b}\u{ad}",
+            &"x".repeat(81),
+        ] {
             let refusal = name("name", bad, 80).unwrap_err().to_string();
             assert!(refusal.contains("1 to 80 printable characters"), "{refusal}");
         }

@@ -1,6 +1,7 @@
 //! Background task that backs up the record on a schedule.
 
 use gaitwright_service::error::Error;
+use gaitwright_service::scheduled_backups::ScheduledBackups;
 use gaitwright_service::supervise::Task;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::backup_folder::BackupFolder;
@@ -24,7 +25,7 @@ pub(super) struct BackupPlan {
 /// A plan whose folder this process has claimed.
 #[derive(Debug, Clone)]
 pub(super) struct ClaimedPlan {
-    folder: Arc<BackupFolder>,
+    backups: Arc<ScheduledBackups>,
     every: Duration,
     keep: usize,
 }
@@ -32,24 +33,27 @@ pub(super) struct ClaimedPlan {
 impl BackupPlan {
     /// Claims the folder for the backups of a record.
     pub(super) fn claim(self, store: &Store) -> Result<ClaimedPlan, Error> {
-        let folder = Arc::new(BackupFolder::claim(store, &self.folder)?);
-        Ok(ClaimedPlan { folder, every: self.every, keep: self.keep })
+        let backups = Arc::new(ScheduledBackups::new(BackupFolder::claim(store, &self.folder)?));
+        Ok(ClaimedPlan { backups, every: self.every, keep: self.keep })
     }
 }
 
 impl ClaimedPlan {
-    /// The claimed folder.
-    pub(super) fn folder(&self) -> Arc<BackupFolder> {
-        Arc::clone(&self.folder)
+    /// The backups in the claimed folder.
+    pub(super) fn backups(&self) -> Arc<ScheduledBackups> {
+        Arc::clone(&self.backups)
     }
 
-    /// Makes backups as long as the task runs. Failures are logged and retried.
+    /// Makes backups as long as the task runs. Failures are logged, shown and retried.
     pub(super) async fn follow(self, store: Store, task: Task) -> Result<(), Error> {
         loop {
             task.works();
             let wait = match self.due_in() {
                 Ok(Duration::ZERO) => match self.copy(&store).await {
-                    Ok(()) => continue,
+                    Ok(()) => {
+                        self.backups.succeeded();
+                        continue;
+                    }
                     Err(error) => self.failed(&error),
                 },
                 Ok(wait) => wait,
@@ -62,13 +66,13 @@ impl ClaimedPlan {
     /// Time until the next backup, counted from the newest one, so that a restart neither adds nor skips a backup. A file
     /// with a time in the future does not count: it could keep backups from being made.
     fn due_in(&self) -> std::io::Result<Duration> {
-        let copies = self.folder.backups()?;
+        let copies = self.backups.folder().backups()?;
         let age = copies.iter().find_map(|(_, made)| SystemTime::now().duration_since(*made).ok());
         Ok(age.map_or(Duration::ZERO, |age| self.every.saturating_sub(age)))
     }
 
     async fn copy(&self, store: &Store) -> Result<(), Error> {
-        let (file, bytes) = self.folder.add(store, self.keep).await?;
+        let (file, bytes) = self.backups.folder().add(store, self.keep).await?;
         let mut writer = store.write().await?;
         let (object, detail) = (format!("file {}", file.display()), json!({ "bytes": bytes, "scheduled": true }));
         audit::append(&mut writer, &Actor::program(), "record.backup", &object, &detail).await?;
@@ -78,7 +82,8 @@ impl ClaimedPlan {
     }
 
     fn failed(&self, error: &Error) -> Duration {
-        tracing::error!(folder = %self.folder.path().display(), %error, "the record was not backed up; retrying in ten minutes");
+        tracing::error!(folder = %self.backups.folder().path().display(), %error, "the record was not backed up; retrying in ten minutes");
+        self.backups.failed(error.to_string());
         RETRY
     }
 }

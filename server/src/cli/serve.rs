@@ -99,7 +99,7 @@ impl Serve {
         let access = Arc::new(access);
         // Exports by commands while the service was not running.
         access.log.write(&store, true).await?;
-        let on_request = Arc::new(Backups::new(backups.as_ref().map(ClaimedPlan::folder)));
+        let on_request = Arc::new(Backups::new(backups.as_ref().map(ClaimedPlan::backups)));
         let mut state = AppState::new(scheduler.clone(), Arc::clone(&access), on_request, hosts);
         state.proxies = proxies.clone();
         let app = router(state);

@@ -19,7 +19,8 @@ pub enum Kind {
     View,
     /// The data was exported as a file.
     Export,
-    /// The request was refused: an invalid credential, a missing right, or a failed sign-in.
+    /// The request was refused: an invalid credential, a missing right, a failed sign-in, or an object that does not exist
+    /// or that the caller may not access.
     Refused,
 }
 

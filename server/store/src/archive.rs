@@ -146,7 +146,7 @@ pub async fn known(db: &mut Connection, table: &str, row: &Row) -> StoreResult<K
 /// Writes the rows of one study into a record.
 #[derive(Debug, Default)]
 pub struct Unpacking {
-    /// For devices and reference gaits that the record has under another identifier: that identifier.
+    /// For subjects, devices and reference gaits that the record has under another identifier: that identifier.
     pub same: HashMap<String, String>,
     sequence: HashMap<i64, i64>,
     columns: HashMap<&'static str, Vec<String>>,
@@ -182,7 +182,7 @@ impl Unpacking {
         let mut before = None;
         match table {
             "studies" => {
-                for column in ["device_id", "reference_gait_id"] {
+                for column in ["subject_id", "device_id", "reference_gait_id"] {
                     if let Some(other) = row.text(column).and_then(|id| self.same.get(id)).cloned() {
                         row.set(column, Cell::Text(other));
                     }

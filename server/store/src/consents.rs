@@ -111,3 +111,12 @@ pub async fn is_withdrawn(db: &mut Connection, study: StudyId) -> StoreResult<bo
 pub async fn may_be_shown(db: &mut Connection, study: StudyId) -> StoreResult<()> {
     if is_withdrawn(db, study).await? { Err(StoreError::Withdrawn) } else { Ok(()) }
 }
+
+/// Refuses to show or change what was measured of a subject who withdrew consent.
+///
+/// # Errors
+/// [`StoreError::Withdrawn`]; errors of the database.
+pub async fn has_not_withdrawn(db: &mut Connection, subject: SubjectId) -> StoreResult<()> {
+    let withdrawn = sqlx::query("select 1 from withdrawn_subjects where subject_id = ?").bind(subject);
+    if withdrawn.fetch_optional(db).await?.is_some() { Err(StoreError::Withdrawn) } else { Ok(()) }
+}

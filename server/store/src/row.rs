@@ -60,6 +60,14 @@ impl Row {
         }
     }
 
+    /// The real number of a column.
+    pub fn real(&self, column: &str) -> Option<f64> {
+        match self.0.get(column) {
+            Some(Cell::Real(number)) => Some(*number),
+            _ => None,
+        }
+    }
+
     /// Sets the value of a column.
     pub fn set(&mut self, column: &str, cell: Cell) {
         self.0.insert(column.to_owned(), cell);

@@ -6,6 +6,7 @@ use axum::Json;
 use axum::extract::State;
 use gaitwright_service::error::Error;
 use serde::Serialize;
+use std::fmt::Write;
 use utoipa::ToSchema;
 
 /// Health of the service.
@@ -49,6 +50,14 @@ pub(crate) async fn ready(State(app): State<AppState>) -> Result<String, Refusal
     if let Some(trouble) = app.scheduler.trouble() {
         return Err(Error::NotReady(trouble).into());
     }
+    let mut text = "ready".to_owned();
     // Below the reserve, answers still fit and only large work is refused.
-    Ok(app.store().room().map_or_else(|shortage| format!("ready; {shortage}"), |()| "ready".to_owned()))
+    if let Err(shortage) = app.store().room() {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "; {shortage}");
+    }
+    if app.backups.scheduled().is_some_and(|backups| backups.failure().is_some()) {
+        text.push_str("; the last scheduled backup failed, see the page System");
+    }
+    Ok(text)
 }

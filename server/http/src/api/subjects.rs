@@ -1,11 +1,12 @@
 //! REST: subjects, with consents, corrections and muscle measurements.
 
 use crate::AppState;
-use crate::accessible::Id;
+use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
+use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -114,7 +115,7 @@ pub(super) async fn consents(
 )]
 pub(super) async fn consent(
     State(app): State<AppState>,
-    Id(id, _): Id<SubjectId, Run>,
+    DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     IdempotentWith(request, new): IdempotentWith<Run, NewConsent>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
@@ -140,7 +141,7 @@ pub(super) async fn consent(
 )]
 pub(super) async fn withdraw(
     State(app): State<AppState>,
-    Id(id, _): Id<SubjectId, Run>,
+    DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     IdempotentWith(request, why): IdempotentWith<Run, Withdrawal>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
@@ -164,13 +165,13 @@ pub(super) async fn withdraw(
     operation_id = "list_subject_corrections",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "A page, oldest first", body = Page<Correction>)),
+    responses((status = 200, description = "A page, oldest first", body = Page<Correction>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn corrections(
     _: Authorized<Read>,
     State(app): State<AppState>,
-    Id(id, _): Id<SubjectId, Read>,
+    Visible(id, _): Visible<SubjectId, Read>,
     paging: Paging<i64>,
 ) -> Result<Json<Page<Correction>>, Refusal> {
     let mut reader = app.read().await?;
@@ -213,13 +214,13 @@ pub(super) async fn correct(
     operation_id = "get_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = schema::MuscleParameters)),
+    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = schema::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn muscles(
     _: Authorized<Read>,
     State(app): State<AppState>,
-    Id(id, _): Id<SubjectId, Read>,
+    Visible(id, _): Visible<SubjectId, Read>,
 ) -> Result<Json<MuscleParameters>, Refusal> {
     let mut reader = app.read().await?;
     subjects::get(&mut reader, id).await?;

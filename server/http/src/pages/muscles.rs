@@ -8,6 +8,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
 use crate::problem::Problem;
+use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -104,7 +105,7 @@ fn is_of(refused: &str, field: &str) -> bool {
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
-    Id(id, _): Id<SubjectId, Read>,
+    Visible(id, _): Visible<SubjectId, Read>,
 ) -> Page {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;

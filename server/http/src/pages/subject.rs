@@ -4,7 +4,7 @@ use super::error::{Page, PageError, page};
 use super::format::{variant, words};
 use super::refusal;
 use crate::AppState;
-use crate::accessible::Id;
+use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
 use crate::problem::Problem;
@@ -185,11 +185,11 @@ async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<St
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let consents = consents::of_subject(&mut reader, id).await?;
-    let corrections = subjects::corrections(&mut reader, id).await?;
     let studies = studies_of(&mut reader, caller.reach(), id).await?;
     let mut sessions = Vec::new();
     let last = consents.last();
     let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
+    let corrections = if withdrawn { Vec::new() } else { subjects::corrections(&mut reader, id).await? };
     for row in studies.iter().filter(|_| !withdrawn) {
         sessions.extend(sessions_of(&mut reader, &row.study).await?);
     }
@@ -242,7 +242,7 @@ pub(super) struct Signed {
 pub(super) async fn consent(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
-    Id(id, _): Id<SubjectId, Run>,
+    DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let done = give(&app, &authorized, id, form).await;
@@ -263,7 +263,7 @@ async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form:
 pub(super) async fn withdraw(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
-    Id(id, _): Id<SubjectId, Run>,
+    DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     Form(why): Form<Withdrawal>,
 ) -> Result<Response, PageError> {
     let done = end(&app, &authorized, id, &why).await;

@@ -10,9 +10,9 @@ use axum::extract::State;
 use gaitwright_service::access::{Administer, Caller, Permission, Read};
 use gaitwright_service::backups;
 use gaitwright_service::error::Error;
+use gaitwright_service::scheduled_backups::{Failure, ScheduledBackups};
 use gaitwright_service::studies::job::JobState;
 use gaitwright_store::backup::those_beside;
-use gaitwright_store::backup_folder::BackupFolder;
 use gaitwright_store::totals::{self, Totals};
 use gaitwright_store::{FORM, commit, jobs, trials};
 use std::time::Duration;
@@ -44,11 +44,17 @@ struct Scheduled {
     folder: String,
     /// The backups in it, newest first: name and bytes, or why it cannot be read.
     found: Result<Vec<(String, i64)>, String>,
+    failure: Option<Failure>,
 }
 
 impl Scheduled {
-    fn of(folder: &BackupFolder) -> Self {
-        Self { folder: folder.path().display().to_string(), found: folder.sizes().map_err(|e| e.to_string()) }
+    fn of(backups: &ScheduledBackups) -> Self {
+        let folder = backups.folder();
+        Self {
+            folder: folder.path().display().to_string(),
+            found: folder.sizes().map_err(|e| e.to_string()),
+            failure: backups.failure(),
+        }
     }
 }
 

@@ -97,6 +97,10 @@ mod tests {
             "buongiorno12345",
             "Haus Garten Wasser",
             "red green yellow",
+            "may the force be with you",
+            "MayTheForceBeWithYou!",
+            "Ich bin ein Berliner",
+            "hasta la vista baby 1",
         ];
         let twice = WEAK.iter().map(|weak| weak.repeat(2));
         for weak in WEAK.iter().chain(&longer).map(|weak| (*weak).to_owned()).chain(twice) {

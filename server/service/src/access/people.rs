@@ -31,12 +31,14 @@ pub struct NewUser {
 /// Adds a user.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the name is taken.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if a user has this name or one of the same person.
 pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewUser) -> Result<User, Error> {
     let name = printable::name("name", &new.name, 80)?;
-    let user = users::insert(writer, name, new.role).await.on_constraint(NAME_UNIQUE, || {
-        Error::conflict(format!("There is already a user {name:?}. Choose another name."))
-    })?;
+    let taken = |by: &str| Error::conflict(format!("There is already a user {by:?}. Choose another name."));
+    if let Some(same) = users::all(writer).await?.iter().find(|user| printable::is_same_name(&user.name, name)) {
+        return Err(taken(&same.name));
+    }
+    let user = users::insert(writer, name, new.role).await.on_constraint(NAME_UNIQUE, || taken(name))?;
     let detail = json!({ "name": name, "role": new.role });
     audit::append(writer, actor, "user.add", &format!("user {}", user.id), &detail).await?;
     Ok(user)
@@ -55,7 +57,7 @@ pub async fn way_in(writer: &mut Writer) -> Result<User, Error> {
     if let Some(first) = admins.first() {
         return Ok((*first).clone());
     }
-    let is_free = |name: &String| !all.iter().any(|user| user.name.eq_ignore_ascii_case(name));
+    let is_free = |name: &String| !all.iter().any(|user| printable::is_same_name(&user.name, name));
     let numbered = (2..).map(|number: u32| format!("{FIRST}-{number}"));
     let name = std::iter::once(FIRST.to_owned()).chain(numbered).find(is_free).unwrap_or_default();
     add(writer, &Actor::program(), &NewUser { name, role: Role::Admin }).await

@@ -44,6 +44,13 @@ pub async fn ensure(db: &mut Connection) -> Result<(), Error> {
     Ok(())
 }
 
+/// Whether a subject is as [`ensure`] adds it.
+pub fn is_built_in(pseudonym: &str, body: optimizer::Subject, notes: &str) -> bool {
+    PAPER.iter().any(|&(number, name, text)| {
+        name == pseudonym && text == notes && optimizer::Subject::builtin(number).is_ok_and(|known| known == body)
+    })
+}
+
 /// The subject of the record with this height and mass: one of the paper's, or one named by height and mass.
 ///
 /// # Errors

@@ -333,6 +333,10 @@ async fn answers(
     for assessment in &noted {
         let what = format!("assessment {}", assessment.id);
         at(&what, of_gaits(trials, [assessment.first, assessment.second]))?;
+        let compared = [assessment.first, assessment.second].map(|id| trials.get(&id).copied());
+        if let [Some(first), Some(second)] = compared {
+            at(&what, after_both(assessment.created_at, [first, second]))?;
+        }
         let wanted = sorted(assessment.first, assessment.second);
         if assessment.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
             return Err(refuse(format!("{what}: the preference derived from it is about other trials")));
@@ -388,6 +392,14 @@ fn pair(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
     }
 }
 
+/// Checks that an answer is not older than what it compares.
+fn after_both(answered_at: Instant, compared: [&Trial; 2]) -> Result<(), String> {
+    match compared.iter().find(|trial| trial.created_at > answered_at) {
+        Some(trial) => Err(format!("it is from {answered_at}, before trial {} was planned", trial.number)),
+        None => Ok(()),
+    }
+}
+
 /// Checks a row of the feedback log against the trials that it names.
 fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
     let trial =
@@ -405,6 +417,7 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
         }
         FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
             let (a, b) = (trial(a)?, trial(b)?);
+            after_both(row.created_at, [a, b])?;
             if a.state != TrialState::Converged || b.state != TrialState::Converged {
                 return Err("it compares a trial that did not converge".to_owned());
             }

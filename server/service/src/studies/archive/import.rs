@@ -1,5 +1,6 @@
 //! Imports an archive into the record.
 
+use super::super::catalogue;
 use super::check;
 use super::file::{Next, Unpacker, Whole, refuse};
 use super::signature::PublicKey;
@@ -10,7 +11,7 @@ use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::imports::{self, NewImport};
 use gaitwright_store::quarantine::Quarantine;
 use gaitwright_store::row::{Cell, Row};
-use gaitwright_store::{Store, StoreError, StudyId, Writer, commit, events, studies};
+use gaitwright_store::{Store, StoreError, StudyId, Writer, commit, events, studies, subjects};
 use serde_json::json;
 use std::io::Read;
 use tokio::sync::mpsc;
@@ -152,7 +153,8 @@ fn does_not_fit(reason: impl std::fmt::Display) -> Error {
 }
 
 /// Whether a subject, device or reference gait must be written. An identical row may exist already. A different row
-/// with the same identifier or name is a contradiction that a person must resolve.
+/// with the same identifier or name is a contradiction that a person must resolve. Built-in subjects have another
+/// identifier in each record, and nothing of a person, so they are the same.
 async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unpacking) -> Result<bool, Error> {
     let id = row.text("id").unwrap_or_default().to_owned();
     let what = match table {
@@ -170,8 +172,25 @@ async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unp
             let differing: Vec<String> = columns.iter().map(|column| format!("{column} differs")).collect();
             Err(does_not_fit(format!("{what} {id} exists here with different content ({})", differing.join(", "))))
         }
-        Known::NameTaken(name) => Err(does_not_fit(format!(
-            "another {what} here has the name {name:?}. Rename one of them on the system where it was created"
-        ))),
+        Known::NameTaken(name) => {
+            if table == "subjects"
+                && is_built_in(row)
+                && let Some(here) = subjects::by_pseudonym(writer, &name).await?
+            {
+                unpacking.same.insert(id, here.id.to_string());
+                return Ok(false);
+            }
+            Err(does_not_fit(format!(
+                "another {what} here has the name {name:?}. Import the archive into a record without it"
+            )))
+        }
     }
+}
+
+/// Whether the row of a subject is that of a built-in one.
+fn is_built_in(row: &Row) -> bool {
+    let number = |column| row.real(column).unwrap_or(f64::NAN);
+    let body = gait_optimizer::Subject { height_m: number("height_m"), body_mass_kg: number("body_mass_kg") };
+    let [pseudonym, notes] = ["pseudonym", "notes"].map(|column| row.text(column).unwrap_or_default());
+    catalogue::is_built_in(pseudonym, body, notes)
 }
