@@ -153,7 +153,7 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
     let acknowledged = Mutex::new(Vec::<String>::new());
     let (stop, counter) = (AtomicBool::new(false), AtomicU32::new(0));
     std::thread::scope(|scope| {
-        for _ in 0..2 {
+        for _ in 0..4 {
             scope.spawn(|| {
                 while !stop.load(Ordering::Relaxed) {
                     let pseudonym = format!("W{}", counter.fetch_add(1, Ordering::Relaxed));
@@ -172,7 +172,7 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
             if study.is_none() {
                 study = Some(start_study(&process.address));
             }
-            std::thread::sleep(Duration::from_millis(splitmix(&mut random) % 120));
+            std::thread::sleep(Duration::from_millis(splitmix(&mut random) % 500));
         }
         stop.store(true, Ordering::Relaxed);
     });
