@@ -115,9 +115,11 @@ mod settings;
 mod solve;
 mod start;
 mod status;
+mod vector_instructions;
 
 pub use nonlinear_program::{EliminationBlocks, NonlinearProgram, SparsityPattern};
 pub use settings::{BarrierStrategy, BoundMultiplierStart, DualRegularisation, LinearSolver, NlpSettings};
 pub use solve::solve;
 pub use start::{StartPoint, WarmPoint};
 pub use status::{NlpCounts, NlpError, NlpIteration, NlpPhase, NlpResult, NlpStatus, Residuals, Timing};
+pub use vector_instructions::vector_instructions;

@@ -9,6 +9,7 @@ mod choices;
 mod config;
 mod convert;
 mod database_file;
+mod doctor;
 mod emg;
 mod gait_file;
 mod lineage;
@@ -91,6 +92,10 @@ enum Command {
     Audit(audit::Audit),
     /// Show the settings of the service.
     Config(config::Config),
+    /// Check the machine, the settings and the record. Exits with 1 if anything is wrong.
+    ///
+    /// The output is meant for bug reports: it contains no data of subjects and no secrets.
+    Doctor(doctor::Doctor),
     /// Print the description of the REST interface (OpenAPI 3.1).
     Openapi,
     /// Back up a record, even while the service is running.
@@ -119,6 +124,7 @@ impl Command {
         let record: AnchoredFlags = match self {
             Self::Serve(serve) => return serve.flags.clone(),
             Self::Config(config) => return config.flags(),
+            Self::Doctor(doctor) => return doctor.flags(),
             Self::Worker(worker) => return worker.flags(),
             Self::Tune(tune) => tune.record.clone(),
             Self::Audit(audit) => audit.record().clone(),
@@ -166,6 +172,10 @@ pub fn run() -> ExitCode {
         Command::Convert(convert) => convert.run().map(|()| Ended::Done),
         Command::Audit(audit) => runtime.block_on(audit.run(&settings)).map(|()| Ended::Done),
         Command::Config(_) => settings.show().map(|()| Ended::Done),
+        Command::Doctor(doctor) => {
+            let healthy = runtime.block_on(doctor.run(&settings));
+            healthy.map(|healthy| if healthy { Ended::Done } else { Ended::Failed })
+        }
         Command::Openapi => {
             let text = openapi::text().map_err(|e| Error::Internal(e.to_string()));
             text.and_then(|text| data(text.trim_end())).map(|()| Ended::Done)

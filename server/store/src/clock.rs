@@ -1,6 +1,7 @@
 //! The latest instant of a decision about access, so that expired sessions stay expired when the clock is set back.
 
-use super::{Connection, Instant, StoreResult};
+use super::{Connection, Instant, StoreResult, read_only};
+use std::path::Path;
 
 /// The latest instant in the record.
 ///
@@ -8,6 +9,22 @@ use super::{Connection, Instant, StoreResult};
 /// Errors of the database.
 pub async fn latest(db: &mut Connection) -> StoreResult<Option<Instant>> {
     Ok(sqlx::query_scalar("select latest from clock").fetch_optional(db).await?)
+}
+
+/// The latest instant in a record that another process may own; `None` for a schema version without it.
+///
+/// # Errors
+/// As [`read_only::open`].
+pub async fn latest_of_file(record: &Path) -> StoreResult<Option<Instant>> {
+    let pool = read_only::open(record).await?;
+    let found = async {
+        let mut db = pool.acquire().await?;
+        let table = sqlx::query("select 1 from sqlite_master where type = 'table' and name = 'clock'");
+        if table.fetch_optional(&mut *db).await?.is_some() { latest(&mut db).await } else { Ok(None) }
+    };
+    let found = found.await;
+    pool.close().await;
+    found
 }
 
 /// Records an instant, unless a later one is recorded.

@@ -83,7 +83,7 @@ pub use id::{
 pub use lent::{Lent, LentWriter, Reader};
 pub use packed::{Packed, PackedText};
 pub use schema_versions::FORM;
-pub use space::DEFAULT_RESERVE_BYTES;
+pub use space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use time::{Instant, now, set_machine_clock};
 pub use writing::Writer;
 

@@ -26,6 +26,8 @@ use std::time::Duration;
 const ACK_WAITS_PER_LEASE: u32 = 3;
 /// Pause before a retry after an error of the broker.
 const AGAIN: Duration = Duration::from_secs(1);
+/// Longest time for a check of the broker.
+const REACHED_WITHIN: Duration = Duration::from_secs(5);
 /// How long the broker holds a request for messages, and the interval of its heartbeats.
 const EXPIRES: Duration = Duration::from_secs(10);
 const BROKER_HEARTBEAT: Duration = Duration::from_secs(2);
@@ -36,6 +38,17 @@ pub(super) struct Link {
     context: Context,
     queue: String,
     lease: Duration,
+}
+
+/// Connects to a broker once, and returns its version.
+///
+/// # Errors
+/// [`DispatchError::Unreachable`], also if the broker has no JetStream.
+pub async fn reach(url: &str) -> Result<String, DispatchError> {
+    let options = async_nats::ConnectOptions::new().connection_timeout(REACHED_WITHIN);
+    let client = options.connect(url).await.map_err(unreachable)?;
+    let about = client.server_info();
+    if about.jetstream { Ok(about.version) } else { Err(unreachable("it runs without JetStream")) }
 }
 
 impl Link {

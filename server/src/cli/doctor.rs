@@ -1,0 +1,110 @@
+//! `gaitwright doctor`: checks the machine, the settings and the record, for bug reports.
+
+use super::config::{Flags, Settings};
+use super::output::data;
+use clap::Args;
+use gaitwright_service::error::Error;
+use gaitwright_service::workers::nats;
+use gaitwright_store::{FORM, clock, free_bytes, now, verify};
+use std::path::{Path, PathBuf};
+use std::thread::available_parallelism;
+
+/// How far another machine's clock may be ahead without notice, s.
+const CLOCKS_DIFFER_S: i64 = 5;
+
+#[derive(Debug, Args)]
+pub(super) struct Doctor {
+    #[command(flatten)]
+    flags: Box<Flags>,
+}
+
+/// The outcome of a check.
+enum Found {
+    Good(String),
+    Trouble(String),
+}
+use Found::{Good, Trouble};
+
+impl Doctor {
+    pub(super) fn flags(&self) -> Flags {
+        (*self.flags).clone()
+    }
+
+    /// Prints a line for each check. Returns whether all is well.
+    pub(super) async fn run(self, settings: &Settings) -> Result<bool, Error> {
+        let database = settings.database();
+        let mut checks = vec![
+            ("program", program()),
+            ("kernels", Good(format!("vector instructions: {}", interior_point::vector_instructions()))),
+            ("disk", disk(&database, settings.reserve_bytes()?)),
+        ];
+        if database.exists() {
+            checks.push(("record", record(&database, settings.anchor().as_slice()).await));
+            checks.push(("clock", clock_after(&database).await));
+        } else {
+            checks.push(("record", Good(format!("there is none yet at {}", database.display()))));
+            checks.push(("clock", Good(now().to_string())));
+        }
+        checks.push(("broker", broker(settings).await?));
+        for (what, found) in &checks {
+            let (state, text) = match found {
+                Good(text) => ("ok", text),
+                Trouble(text) => ("trouble", text),
+            };
+            data(&format!("{state:<8}{what:<9}{text}"))?;
+        }
+        Ok(checks.iter().all(|(_, found)| matches!(found, Good(_))))
+    }
+}
+
+fn program() -> Found {
+    let (version, os, architecture) = (env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH);
+    let processors = available_parallelism().map_or_else(|_| "unknown".to_owned(), |number| number.to_string());
+    Good(format!("gaitwright {version}, schema {FORM}, {os} {architecture}, processors: {processors}"))
+}
+
+fn disk(database: &Path, reserve: u64) -> Found {
+    let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
+    let folder = database.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    match free_bytes(folder) {
+        _ if !folder.is_dir() => Trouble(format!("the folder {} does not exist", folder.display())),
+        Some(free) if free < reserve => {
+            Trouble(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
+        }
+        Some(free) => Good(format!("{} free, reserve {}", gigabytes(free), gigabytes(reserve))),
+        None => Good("this system does not report free space".to_owned()),
+    }
+}
+
+async fn record(database: &Path, anchors: &[PathBuf]) -> Found {
+    match verify::file(database, anchors).await {
+        Ok(whole) => Good(format!(
+            "{} is whole: audit trail of {} rows, {} seals, anchors: {}",
+            database.display(),
+            whole.audit.0,
+            whole.seals.map_or(0, |(seals, _)| seals),
+            whole.anchors.len()
+        )),
+        Err(error) => Trouble(error.to_string()),
+    }
+}
+
+/// A clock that is behind the record was set back.
+async fn clock_after(database: &Path) -> Found {
+    let present = now();
+    match clock::latest_of_file(database).await {
+        Ok(Some(latest)) if latest > present.plus_seconds(CLOCKS_DIFFER_S) => {
+            Trouble(format!("{present} is earlier than {latest} in the record: the clock was set back"))
+        }
+        Ok(_) => Good(present.to_string()),
+        Err(error) => Trouble(error.to_string()),
+    }
+}
+
+async fn broker(settings: &Settings) -> Result<Found, Error> {
+    let Some((url, _)) = settings.nats()? else { return Ok(Good("no NATS broker is set".to_owned())) };
+    Ok(match nats::reach(url).await {
+        Ok(version) => Good(format!("NATS {version} with JetStream")),
+        Err(error) => Trouble(error.to_string()),
+    })
+}

@@ -1,0 +1,88 @@
+//! `gaitwright doctor` names what is wrong, and fails only then.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gaitwright_store::{Store, clock, commit};
+use gaitwright_tests::broker::Broker;
+use gaitwright_tests::cli;
+use gaitwright_tests::every_table::filled;
+use sqlx::sqlite::SqliteConnection;
+use sqlx::{AssertSqlSafe, Connection};
+use std::path::Path;
+
+/// Its exit code, and its lines.
+fn doctor(folder: &Path, arguments: &[&str]) -> (Option<i32>, Vec<String>) {
+    let arguments: Vec<&str> = ["doctor"].iter().chain(arguments).copied().collect();
+    let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder, &arguments);
+    let text = String::from_utf8(output.stdout).unwrap();
+    (output.status.code(), text.lines().map(str::to_owned).collect())
+}
+
+/// The only trouble of a run, which fails.
+#[track_caller]
+fn trouble((code, lines): (Option<i32>, Vec<String>)) -> String {
+    assert_eq!(code, Some(1), "{lines:?}");
+    let mut troubles = lines.iter().filter(|line| line.starts_with("trouble"));
+    let found = troubles.next().expect("a trouble").clone();
+    assert!(troubles.next().is_none(), "{lines:?}");
+    found
+}
+
+async fn change(database: &Path, sql: &str) {
+    let mut connection = SqliteConnection::connect(database.to_str().unwrap()).await.unwrap();
+    sqlx::query(AssertSqlSafe(sql.to_owned())).execute(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+}
+
+#[test]
+fn healthy_machine_without_a_record_is_described_and_nothing_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, lines) = doctor(folder.path(), &[]);
+    assert_eq!(code, Some(0), "{lines:?}");
+    let said: Vec<&str> = lines.iter().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
+    assert_eq!(said, ["program", "kernels", "disk", "record", "clock", "broker"]);
+    assert!(lines.iter().all(|line| line.starts_with("ok ")), "{lines:?}");
+    assert!(lines[3].contains("there is none yet"), "{lines:?}");
+    assert!(cli::files(folder.path()).is_empty());
+}
+
+#[tokio::test]
+async fn clock_that_was_set_back_is_named() {
+    let (folder, database) = filled().await;
+    let (code, lines) = doctor(folder.path(), &["--database", "a.db"]);
+    assert_eq!(code, Some(0), "{lines:?}");
+    assert!(lines[3].contains("a.db is whole"), "{lines:?}");
+    let store = Store::open(&database).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    clock::reach(&mut writer, "2099-01-01T00:00:00.000Z".parse().unwrap()).await.unwrap();
+    commit(writer).await.unwrap();
+    store.close().await;
+    let clock = trouble(doctor(folder.path(), &["--database", "a.db"]));
+    assert!(clock.contains("clock") && clock.contains("was set back"), "{clock}");
+}
+
+#[tokio::test]
+async fn changed_row_is_named() {
+    let (folder, database) = filled().await;
+    change(&database, "update subjects set notes = 'forged'").await;
+    let record = trouble(doctor(folder.path(), &["--database", "a.db"]));
+    assert!(record.contains("record") && record.contains("of subjects was changed"), "{record}");
+}
+
+#[test]
+fn unreachable_broker_and_missing_folder_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let broker = trouble(doctor(folder.path(), &["--nats", "nats://127.0.0.1:1"]));
+    assert!(broker.contains("The NATS broker failed"), "{broker}");
+    let disk = trouble(doctor(folder.path(), &["--database", "no/such/a.db"]));
+    assert!(disk.contains("does not exist"), "{disk}");
+}
+
+#[test]
+fn reachable_broker_is_named_with_its_version() {
+    let Some(broker) = Broker::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    // The process may not listen yet.
+    let found = (0..100).map(|_| doctor(folder.path(), &["--nats", &broker.url()])).find(|(code, _)| *code == Some(0));
+    assert!(found.unwrap().1[5].contains("with JetStream"));
+}
