@@ -57,6 +57,29 @@ fn infeasible_problems_are_reported_infeasible() {
     }
 }
 
+/// The restoration phase has an objective of its own, so the scale of the problem's objective must not change its
+/// termination test or its multipliers.
+#[test]
+fn restoration_phase_ignores_the_scale_of_the_objective() {
+    let problem = |weight: f64| {
+        let functions: fn(&[Dual]) -> (Dual, Vec<Dual>) = if weight > 1.0 {
+            |x| (1e8 * (x[0] + square(x[1])), vec![square(x[0]) + square(x[1]) + 1.0])
+        } else {
+            |x| (x[0] + square(x[1]), vec![square(x[0]) + square(x[1]) + 1.0])
+        };
+        Small::new("no real root", &[2.0, 1.0], &[EQ], &[], functions)
+    };
+    let settings = NlpSettings { gradient_scaling: Some(1.0), ..NlpSettings::default() };
+    let [plain, steep] = [1.0, 1e8].map(|weight| run(&problem(weight), &[2.0, 1.0], &settings));
+    for r in [&plain, &steep] {
+        assert_eq!(r.status, NlpStatus::Infeasible, "{r:?}");
+        // The multiplier of a violated row is the weight of its violation, in the units of the scaled row.
+        let weight = r.row_multipliers[0].abs();
+        assert!((weight - settings.elastic_weight / 4.0).abs() < 1.0, "{weight}");
+    }
+    assert!(steep.iterations <= plain.iterations + 3, "{} {}", steep.iterations, plain.iterations);
+}
+
 #[test]
 fn infeasible_sparse_problem_is_reported_by_every_linear_solver() {
     // The cart cannot swing the pole up in at most 5 s with 0.1 N.
