@@ -40,6 +40,7 @@
 
 mod acquisition;
 mod action;
+mod action_moments;
 mod comparisons;
 mod error;
 mod feedback;
