@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use crate::action::ActionIndex;
 use crate::error::Result;
+use crate::fit::Fit;
 use crate::inference::Approximation;
 use crate::kernel::Kernel;
 use crate::linalg::{BLOCK, Block, Cholesky, Square, block_dots, dot};
 use crate::observations::ObservedPoints;
 use crate::random::Random;
-use crate::update_chain::Fit;
 
 /// Share of the prior variance that bounds the rounding error of a covariance.
 const ROUNDING: f64 = 1e-9;
