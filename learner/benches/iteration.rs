@@ -1,7 +1,7 @@
 //! Time of one iteration of a study on the grid of Table I (11,664 actions): posterior and proposal.
 //!
 //! `cargo bench -p gait-learner`. Each visited action has one comparison and one label. `warm`: the cache holds the
-//! posterior before the last action, as in a running study. `cold`: the cache is empty, as after a start.
+//! fit before the last action, as in a running study. `cold`: the cache is empty, as after a start.
 
 #![allow(clippy::expect_used, missing_docs, unreachable_pub)]
 

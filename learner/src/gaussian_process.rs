@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use crate::action::ActionIndex;
 use crate::error::Result;
+use crate::fit::Fit;
 use crate::inference::Approximation;
 use crate::kernel::Kernel;
-use crate::linalg::{Cholesky, Square, dot};
+use crate::linalg::{BLOCK, Block, Cholesky, Square, block_dots, dot};
 use crate::observations::ObservedPoints;
 use crate::random::Random;
-use crate::update_chain::Fit;
 
 /// Share of the prior variance that bounds the rounding error of a covariance.
 const ROUNDING: f64 = 1e-9;
@@ -75,6 +75,16 @@ impl GaussianProcess {
     /// Posterior variance of an action.
     pub(crate) fn variance(&self, a: &View) -> f64 {
         self.covariance(a, a).max(0.0)
+    }
+
+    /// For a block of actions, given by their prior covariances with the points: their posterior variances without
+    /// nugget.
+    pub(crate) fn block_variances(&self, mut columns: Block) -> [f64; BLOCK] {
+        let observed = self.observed();
+        observed.prior.solve_lower_block(&mut columns);
+        let explained = block_dots(&columns, &columns);
+        let kept = self.approximation().block_variances(&observed.prior, columns);
+        std::array::from_fn(|lane| (self.kernel.variance - explained[lane] + kept[lane]).max(0.0))
     }
 
     /// Posterior covariance matrix of distinct actions, regularised for a Cholesky factorisation.

@@ -1,4 +1,4 @@
-//! The learner: the posterior given a log, and a cache that makes the next posterior cheap.
+//! The learner: the posterior given a log, and a cache for calls with the same feedback.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::action::ActionIndex;
 use crate::error::Result;
 use crate::feedback::{Feedback, FeedbackLog};
+use crate::fit::{LastFit, ProcessModel, log_evidence};
 use crate::gaussian_process::GaussianProcess;
 use crate::hyperparameters::Hyperparameters;
 use crate::inference::{Approximate, ExpectationPropagation, Laplace};
@@ -15,18 +16,17 @@ use crate::observations::Observation;
 use crate::posterior::Posterior;
 use crate::search_space::SearchSpace;
 use crate::settings::{Inference, Labels, LearnerSettings};
-use crate::update_chain::{ProcessModel, UpdateChain, log_evidence};
 
-/// A cache of the last posterior of a study. With it, the next posterior costs an update instead of a new fit.
+/// A cache of the last fit of a study. With it, calls with unchanged feedback cost no new fit.
 ///
 /// The cache never changes a result: each method gives the same bits as the function of the same name.
 #[derive(Debug, Clone, Default)]
 pub struct Learner {
     cached_for: Option<(SearchSpace, LearnerSettings)>,
-    utility: UpdateChain,
-    feasibility: UpdateChain,
-    /// The hyperparameters of the chain of the utility.
-    chain_hyperparameters: Option<Hyperparameters>,
+    utility: LastFit,
+    feasibility: LastFit,
+    /// The hyperparameters of the last fit of the utility.
+    fitted_with: Option<Hyperparameters>,
     /// The last learned hyperparameters, and the observations that they were learned from.
     learned: Option<(Vec<Observation>, Hyperparameters)>,
 }
@@ -125,22 +125,22 @@ impl Learner {
             Inference::ExpectationPropagation => &ExpectationPropagation::default(),
         };
         let learned = self.hyperparameters(space, log, settings, method, &infeasible)?;
-        if self.chain_hyperparameters.as_ref() != Some(&learned) {
-            self.utility = UpdateChain::default();
-            self.chain_hyperparameters = Some(learned.clone());
+        if self.fitted_with.as_ref() != Some(&learned) {
+            self.utility = LastFit::default();
+            self.fitted_with = Some(learned.clone());
         }
         let preference_noise = settings.preference_noise * learned.preference_noise;
         let kernel = Arc::new(Kernel::new(space, &kernel_shape(space, settings, &learned.lengthscales)));
         let model = ProcessModel { space, kernel: &kernel, link: settings.link, method };
         let [of_utility, of_feasibility] = observations(log, settings, preference_noise, &infeasible);
-        let fit = self.utility.advance(&model, &of_utility)?;
+        let fit = self.utility.get_or_fit(&model, of_utility)?;
         let utility = GaussianProcess { kernel: Arc::clone(&kernel), fit };
         let feasibility = match settings.labels {
             Labels::InUtility => None,
             Labels::Separate => {
                 let kernel = Arc::new(Kernel::new(space, &feasibility_shape(space, settings)));
                 let model = ProcessModel { space, kernel: &kernel, link: settings.link, method };
-                let fit = self.feasibility.advance(&model, &of_feasibility)?;
+                let fit = self.feasibility.get_or_fit(&model, of_feasibility)?;
                 Some(GaussianProcess { kernel, fit })
             }
         };

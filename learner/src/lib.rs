@@ -40,9 +40,11 @@
 
 mod acquisition;
 mod action;
+mod action_moments;
 mod comparisons;
 mod error;
 mod feedback;
+mod fit;
 mod gaussian_process;
 mod grid_sample;
 mod hyperparameters;
@@ -58,7 +60,6 @@ mod random;
 mod search_space;
 mod settings;
 mod special_functions;
-mod update_chain;
 mod whole_grid;
 
 pub use action::ActionIndex;

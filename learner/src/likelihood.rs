@@ -59,15 +59,6 @@ impl Interval {
         (below(self.high) - below(self.low)).max(0.0)
     }
 
-    /// Slope and curvature only. For the logistic link the value is NaN, because it costs more.
-    pub(crate) fn derivatives(&self, link: Link, d: f64) -> LogLikelihood {
-        let (low, high) = ((self.low - d) / self.noise, (self.high - d) / self.noise);
-        self.scaled(match link {
-            Link::Logistic => logistic_derivatives(low, high),
-            Link::Probit => probit(low, high),
-        })
-    }
-
     fn scaled(&self, standard: LogLikelihood) -> LogLikelihood {
         LogLikelihood {
             value: standard.value,
@@ -87,19 +78,13 @@ fn sigmoids(z: f64) -> (f64, f64) {
 /// `sigma(u) - sigma(l) = sigma(u) sigma(-l) (1 - exp(l - u))` avoids cancellation; only the first two factors depend
 /// on `d`.
 fn logistic(low: f64, high: f64) -> LogLikelihood {
-    let derivatives = logistic_derivatives(low, high);
+    let (below_high, beyond_high) = sigmoids(high);
+    let (beyond_low, above_low) = sigmoids(low);
     let gap = high - low;
     let narrow = if gap.is_finite() { special_functions::ln(-libm::expm1(-gap)) } else { 0.0 };
     let tail = |z: f64| if z == f64::INFINITY { 0.0 } else { special_functions::ln_sigmoid(z) };
-    LogLikelihood { value: tail(high) + tail(-low) + narrow, ..derivatives }
-}
-
-/// [`logistic`] without the value.
-fn logistic_derivatives(low: f64, high: f64) -> LogLikelihood {
-    let (below_high, beyond_high) = sigmoids(high);
-    let (beyond_low, above_low) = sigmoids(low);
     LogLikelihood {
-        value: f64::NAN,
+        value: tail(high) + tail(-low) + narrow,
         slope: beyond_low - beyond_high,
         curvature: below_high * beyond_high + above_low * beyond_low,
     }

@@ -1,5 +1,6 @@
 //! Observations of the utility, and the points of the grid that they are about.
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use crate::action::ActionIndex;
@@ -17,6 +18,15 @@ pub(crate) struct Observation {
     /// Action with coefficient -1.
     pub(crate) minus: Option<ActionIndex>,
     pub(crate) interval: Interval,
+}
+
+impl Observation {
+    /// An order that depends on the observations alone.
+    pub(crate) fn canonical_order(&self, other: &Self) -> Ordering {
+        let numbers = |o: &Self| [o.interval.low, o.interval.high, o.interval.noise];
+        let actions = (self.plus, self.minus).cmp(&(other.plus, other.minus));
+        numbers(self).iter().zip(numbers(other)).fold(actions, |order, (a, b)| order.then(a.total_cmp(&b)))
+    }
 }
 
 /// An observation in terms of points: one factor ("site") of the likelihood.
@@ -47,25 +57,9 @@ pub(crate) struct ObservedPoints {
 }
 
 impl ObservedPoints {
-    /// A copy with capacity for one more point.
-    pub(crate) fn roomy(&self) -> Self {
-        Self {
-            points: self.points.clone(),
-            levels: self.levels.clone(),
-            prior: self.prior.roomy(),
-            sites: self.sites.clone(),
-            slots: self.slots.clone(),
-        }
-    }
-
     /// Position of an action among the points.
     pub(crate) fn slot(&self, action: ActionIndex) -> Option<usize> {
         self.slots.get(&action).copied()
-    }
-
-    /// Whether an observation is about an action that is not a point yet.
-    pub(crate) fn lacks(&self, observation: &Observation) -> bool {
-        self.slot(observation.plus).is_none() || observation.minus.is_some_and(|minus| self.slot(minus).is_none())
     }
 
     /// The point of an action, added if it is new.

@@ -158,11 +158,10 @@ fn propose_from(posterior: &Posterior, pending: &[ActionIndex], seed: u64) -> Re
                 (action, ProposalReason::LinesExhausted)
             }
         }
-        Method::Eubo if small => {
-            let found = eubo::on_lines(posterior, best, pending, &taken, random);
+        Method::Eubo => {
+            let found = eubo::proposal(posterior, best, pending, &taken, random);
             (found.ok_or(exhausted)?, ProposalReason::ExpectedBestUtility)
         }
-        Method::Eubo => (eubo::over_candidates(posterior, best, &taken, random), ProposalReason::ExpectedBestUtility),
         Method::Thompson if small => {
             let found = thompson::over_grid(posterior, &taken, random)?;
             (found.ok_or(exhausted)?, ProposalReason::JointThompson)

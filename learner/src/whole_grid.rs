@@ -126,15 +126,9 @@ impl<'a> WholeGrid<'a> {
 
     /// Posterior variances, without nugget, of actions given by their indices.
     pub(crate) fn variances(&self, actions: &[usize]) -> Vec<f64> {
-        let observed = self.process.observed();
-        let total = self.process.kernel.variance;
         let mut variances = Vec::with_capacity(actions.len());
         for chunk in actions.chunks(BLOCK) {
-            let mut block = self.columns(chunk);
-            observed.prior.solve_lower_block(&mut block);
-            let explained = crate::linalg::block_dots(&block, &block);
-            let kept = self.process.approximation().block_variances(&observed.prior, block);
-            variances.extend((0..chunk.len()).map(|lane| (total - explained[lane] + kept[lane]).max(0.0)));
+            variances.extend_from_slice(&self.process.block_variances(self.columns(chunk))[..chunk.len()]);
         }
         variances
     }

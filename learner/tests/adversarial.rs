@@ -8,6 +8,7 @@ use gait_learner::{
     Method, SearchSpace, comparisons_to_ask, posterior, propose, propose_batch, what_to_ask,
 };
 use proptest::prelude::*;
+use std::collections::HashSet;
 
 fn space(shape: &[usize]) -> SearchSpace {
     let dimensions = shape
@@ -371,6 +372,33 @@ proptest! {
             learner.posterior(&space, &log_to(stop), &settings).unwrap();
         }
         agrees_with_a_new_one(&mut learner, &space, &log_to(feedback.len()), &settings);
+    }
+
+    #[test]
+    fn posterior_does_not_depend_on_the_order_of_answers(
+        settings in any_settings(),
+        feedback in prop::collection::vec(any_feedback(36, 5), 1..40),
+        order in prop::collection::vec(any::<u32>(), 40),
+    ) {
+        let space = space(&[3, 4, 3]);
+        // The last label of an action counts, so each action gets one.
+        let mut labelled = HashSet::new();
+        let mut feedback = with_categories_of(&settings, feedback);
+        feedback.retain(|feedback| match feedback {
+            Feedback::Label { action, .. } => labelled.insert(*action),
+            _ => true,
+        });
+        let mut places: Vec<usize> = (0..feedback.len()).collect();
+        places.sort_by_key(|&place| order[place]);
+        let shuffled = places.iter().map(|&place| feedback[place]).collect();
+        let visited: Vec<ActionIndex> = (0..feedback.len() as u64).map(|i| ActionIndex(i * 7 % 36)).collect();
+        let of = |feedback| posterior(&space, &FeedbackLog { visited: visited.clone(), feedback }, &settings).unwrap();
+        let (given, shuffled) = (of(feedback), of(shuffled));
+        for action in (0..space.len()).map(ActionIndex) {
+            let (a, b) = (given.predict(action).unwrap(), shuffled.predict(action).unwrap());
+            assert_eq!(a.mean.to_bits(), b.mean.to_bits());
+            assert_eq!(a.standard_deviation.to_bits(), b.standard_deviation.to_bits());
+        }
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub mod point;
 
 pub use anatomy::{Axis, FootPoint, Side};
 pub use anthropometry::{Body, WalkerModel};
-pub use coordinates::{COORDINATES, JOINTS, LINKS, link_angles, relative_angles, to_generalised};
+pub use coordinates::{COORDINATES, JOINTS, LINKS, link_angles, to_generalised};
 pub use dynamics::{InverseDynamics, PointState};
 pub use point::{Chain, ContactPoint, LegGeometry};
 

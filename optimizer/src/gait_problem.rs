@@ -16,6 +16,7 @@ pub mod entries;
 mod evaluation;
 pub mod fibres;
 mod gait_of_variables;
+mod hermite_simpson;
 pub mod hip_velocity;
 pub mod inter_node_check;
 pub mod layout;

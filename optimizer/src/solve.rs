@@ -31,7 +31,7 @@ pub use report::{
 pub use warm_start::WarmStart;
 use warm_start::on_mesh_of;
 
-/// Solves a gait problem. Equal inputs give equal bits.
+/// Solves a gait problem. Without a time limit ([`SolveOptions::time_limit_s`]), equal inputs give equal bits.
 ///
 /// A cold start solves from [`SolveOptions::initial_guesses`] initial guesses and chooses a gait by
 /// [`SolveOptions::basin_choice`]. If none converges, it tries further guesses until one does

@@ -49,7 +49,7 @@ fn group(name: RowName) -> String {
     use RowKind as K;
     match name.place {
         RowPlace::Point { domain, point } => {
-            let domain = DOMAINS[usize::from(domain)];
+            let domain = DOMAINS[domain];
             let suffix = match name.kind {
                 K::Friction | K::Height | K::Clearance | K::PhaseRate => "ineq",
                 K::TouchdownSpeed => "guardvel",
@@ -66,7 +66,7 @@ fn group(name: RowName) -> String {
             format!("{domain}:{suffix}")
         }
         RowPlace::Transition { domain } => {
-            let (from, to) = (usize::from(domain), (usize::from(domain) + 1) % 8);
+            let (from, to) = (domain, (domain + 1) % 8);
             let suffix = match name.kind {
                 K::PositionReset => "q",
                 K::Impact => "imp",

@@ -3,21 +3,21 @@
 //! `E max(f(x), f(b)) - E f(b) = d Phi(d/s) + s phi(d/s)`, with `d` and `s` the mean and standard deviation of
 //! `f(x) - f(b)`, `b` the incumbent. The variance of an action costs `O(n^2)`, everything else `O(n)`. Therefore the
 //! search ranks the actions by an upper bound and computes exact values in that order, until no bound exceeds the best
-//! value. The result is the exact maximiser over the grid.
+//! value. The result is the exact maximiser over the grid, or over candidates if the grid is too large.
 
 use std::collections::HashSet;
 
 use crate::acquisition::avoidance::Avoidance;
-use crate::acquisition::candidates::{highest, near_best_or_random};
+use crate::acquisition::candidates::near_best_or_random;
 use crate::acquisition::line;
 use crate::action::ActionIndex;
+use crate::action_moments::{ActionMoments, ActionSet};
 use crate::gaussian_process::GaussianProcess;
 use crate::linalg::BLOCK;
 use crate::posterior::Posterior;
 use crate::random::Random;
 use crate::search_space::SearchSpace;
 use crate::special_functions;
-use crate::whole_grid::WholeGrid;
 
 /// Number of candidates if the grid is too large to evaluate.
 const CANDIDATES: usize = 2000;
@@ -87,7 +87,7 @@ impl ProbabilityBound {
 
 /// Moments of the difference between every action and the incumbent.
 struct Duel<'a> {
-    grid: WholeGrid<'a>,
+    moments: ActionMoments<'a>,
     incumbent_mean: f64,
     incumbent_variance: f64,
     means: Vec<f64>,
@@ -97,24 +97,31 @@ struct Duel<'a> {
     prior: Vec<f64>,
     /// Reduction of the incumbent's variance by its observations.
     spent: f64,
-    /// For each pending action, a vector over the grid whose squares its observation would subtract from the variances.
+    /// For each pending action, a vector over the actions whose squares its observation would subtract from the variances.
     pending: Vec<Vec<f64>>,
 }
 
 impl<'a> Duel<'a> {
-    fn new(space: &SearchSpace, process: &'a GaussianProcess, best: ActionIndex, pending: &[ActionIndex]) -> Self {
-        let grid = WholeGrid::new(space, process);
+    /// `set` must have the incumbent and the pending actions.
+    fn new(
+        space: &SearchSpace,
+        process: &'a GaussianProcess,
+        set: &ActionSet,
+        best: ActionIndex,
+        pending: &[ActionIndex],
+    ) -> Self {
+        let moments = ActionMoments::new(space, process, set);
         let view = process.view(best, space.levels(best));
         let incumbent_variance = process.variance(&view);
-        let prior = grid.prior_with(space, best);
-        let means = grid.form(&process.approximation().weights);
-        let mut covariances = grid.form(&process.covariance_weights(&view));
+        let prior = moments.prior_with(space, best);
+        let means = moments.form(&process.approximation().weights);
+        let mut covariances = moments.form(&process.covariance_weights(&view));
         for (covariance, prior) in covariances.iter_mut().zip(&prior) {
             *covariance += prior;
         }
         let spent = (process.kernel.variance + process.kernel.nugget - incumbent_variance).max(1e-12);
         let mut duel = Self {
-            grid,
+            moments,
             incumbent_mean: view.mean,
             incumbent_variance,
             means,
@@ -124,7 +131,7 @@ impl<'a> Duel<'a> {
             pending: Vec::new(),
         };
         for &action in pending {
-            duel.suppose_known(space, process, action, best);
+            duel.suppose_known(space, process, set, action, best);
         }
         duel
     }
@@ -134,14 +141,15 @@ impl<'a> Duel<'a> {
         &mut self,
         space: &SearchSpace,
         process: &GaussianProcess,
+        set: &ActionSet,
         action: ActionIndex,
         best: ActionIndex,
     ) {
-        let (Ok(at), Ok(incumbent)) = (usize::try_from(action.0), usize::try_from(best.0)) else { return };
+        let (Some(at), Some(incumbent)) = (set.position(action), set.position(best)) else { return };
         let view = process.view(action, space.levels(action));
         let weights = process.covariance_weights(&view);
-        let mut column = self.grid.form(&weights);
-        for (value, prior) in column.iter_mut().zip(self.grid.prior_with(space, action)) {
+        let mut column = self.moments.form(&weights);
+        for (value, prior) in column.iter_mut().zip(self.moments.prior_with(space, action)) {
             *value += prior;
         }
         let mut variance = process.variance(&view) + process.kernel.nugget;
@@ -190,7 +198,7 @@ impl<'a> Duel<'a> {
 
 /// Probability that an action is feasible.
 struct Chance<'a> {
-    grid: WholeGrid<'a>,
+    moments: ActionMoments<'a>,
     means: Vec<f64>,
     threshold: f64,
     prior_sd: f64,
@@ -198,10 +206,10 @@ struct Chance<'a> {
 }
 
 impl<'a> Chance<'a> {
-    fn new(space: &SearchSpace, process: &'a GaussianProcess, threshold: f64) -> Self {
-        let grid = WholeGrid::new(space, process);
-        let means = grid.form(&process.approximation().weights);
-        Self { grid, means, threshold, prior_sd: process.kernel.variance.sqrt(), bounds: ProbabilityBound::new() }
+    fn new(space: &SearchSpace, process: &'a GaussianProcess, set: &ActionSet, threshold: f64) -> Self {
+        let moments = ActionMoments::new(space, process, set);
+        let means = moments.form(&process.approximation().weights);
+        Self { moments, means, threshold, prior_sd: process.kernel.variance.sqrt(), bounds: ProbabilityBound::new() }
     }
 
     fn bound(&self, x: usize) -> f64 {
@@ -209,7 +217,7 @@ impl<'a> Chance<'a> {
     }
 
     fn of(&self, actions: &[usize]) -> Vec<f64> {
-        let variances = self.grid.variances(actions);
+        let variances = self.moments.variances(actions);
         let chance = |(&x, v): (&usize, f64)| {
             special_functions::normal_cdf((self.means[x] - self.threshold) / v.max(1e-12).sqrt())
         };
@@ -229,16 +237,24 @@ pub(crate) fn against(
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
 ) -> Option<ActionIndex> {
+    // Above the limit of a whole grid, `among` is present.
+    let set = match (posterior.space().enumerable(), among) {
+        (Ok(len), _) => ActionSet::Grid(len),
+        (Err(_), among) => {
+            ActionSet::list(among.into_iter().flatten().chain(pending).chain([&best]).copied().collect())
+        }
+    };
     let avoidance = Avoidance::of(posterior);
-    let found = maximiser(posterior, best, taken, pending, among, avoidance.as_ref());
+    let found = maximiser(posterior, &set, best, taken, pending, among, avoidance.as_ref());
     if found.is_none() && avoidance.is_some() {
-        return maximiser(posterior, best, taken, pending, among, None);
+        return maximiser(posterior, &set, best, taken, pending, among, None);
     }
     found
 }
 
 fn maximiser(
     posterior: &Posterior,
+    set: &ActionSet,
     best: ActionIndex,
     taken: &HashSet<ActionIndex>,
     pending: &[ActionIndex],
@@ -246,9 +262,9 @@ fn maximiser(
     avoidance: Option<&Avoidance<'_>>,
 ) -> Option<ActionIndex> {
     let space = posterior.space();
-    let duel = Duel::new(space, &posterior.utility, best, pending);
+    let duel = Duel::new(space, &posterior.utility, set, best, pending);
     let threshold = posterior.settings().ordinal_thresholds.first().copied().unwrap_or(f64::NEG_INFINITY);
-    let chance = posterior.feasibility.as_ref().map(|process| Chance::new(space, process, threshold));
+    let chance = posterior.feasibility.as_ref().map(|process| Chance::new(space, process, set, threshold));
     // An infeasible incumbent: any feasible action is better, so only the probability counts.
     let hopeless = chance.is_some() && posterior.infeasible.contains(&best);
     let total = posterior.utility.kernel.variance;
@@ -258,9 +274,9 @@ fn maximiser(
         let gain = if hopeless { 1.0 } else { bounds.of(duel.lead(x), variance) };
         gain * chance.as_ref().map_or(1.0, |chance| chance.bound(x))
     };
-    let mut free = vec![among.is_none(); duel.means.len()];
+    let mut free = vec![among.is_none(); set.len()];
     let mut mark = |action: &ActionIndex, value: bool| {
-        if let Some(free) = usize::try_from(action.0).ok().and_then(|x| free.get_mut(x)) {
+        if let Some(free) = set.position(*action).and_then(|x| free.get_mut(x)) {
             *free = value;
         }
     };
@@ -281,11 +297,11 @@ fn maximiser(
     let mut top: Option<(f64, usize)> = None;
     let mut consider = |chunk: &[(f64, usize)]| {
         let highest = top.map_or(f64::NEG_INFINITY, |(value, _)| value);
-        let allowed = |x: &usize| avoidance.is_none_or(|avoidance| avoidance.allows(ActionIndex(*x as u64)));
+        let allowed = |x: &usize| avoidance.is_none_or(|avoidance| avoidance.allows(set.action(*x)));
         let actions: Vec<usize> = chunk.iter().map(|c| c.1).filter(allowed).collect();
         let gains: Vec<(usize, f64)> = actions
             .iter()
-            .zip(duel.grid.variances(&actions))
+            .zip(duel.moments.variances(&actions))
             .map(|(&x, own)| (x, if hopeless { 1.0 } else { expected_gain(duel.lead(x), duel.variance(x, own)) }))
             .filter(|&(x, gain)| gain * chance.as_ref().map_or(1.0, |chance| chance.bound(x)) >= highest)
             .collect();
@@ -314,11 +330,12 @@ fn maximiser(
         }
         highest = consider(chunk);
     }
-    top.map(|(_, x)| ActionIndex(x as u64))
+    top.map(|(_, x)| set.action(x))
 }
 
-/// The maximiser over some random lines through the best action, or over the whole grid if they have no candidate.
-pub(crate) fn on_lines(
+/// The action to propose: the maximiser over some random lines through the best action in the first trials, if the
+/// settings have lines, and otherwise over the whole grid, or over candidates if the grid is too large.
+pub(crate) fn proposal(
     posterior: &Posterior,
     best: ActionIndex,
     pending: &[ActionIndex],
@@ -333,37 +350,11 @@ pub(crate) fn on_lines(
             return Some(action);
         }
     }
-    against(posterior, best, taken, pending, None)
-}
-
-/// The maximiser over candidates, for a grid that is too large to evaluate.
-pub(crate) fn over_candidates(
-    posterior: &Posterior,
-    best: ActionIndex,
-    taken: &HashSet<ActionIndex>,
-    random: &mut Random,
-) -> ActionIndex {
-    let space = posterior.space();
+    if posterior.space().enumerable().is_ok() {
+        return against(posterior, best, taken, pending, None);
+    }
     let candidates = near_best_or_random(posterior, best, taken, CANDIDATES, random);
-    let avoidance = Avoidance::of(posterior);
-    let incumbent = posterior.utility.view(best, space.levels(best));
-    let values: Vec<f64> = candidates
-        .iter()
-        .map(|&action| {
-            let (mean, variance) =
-                posterior.utility.difference(&posterior.utility.view(action, space.levels(action)), &incumbent);
-            if avoidance.as_ref().is_some_and(|avoidance| !avoidance.allows(action)) {
-                // Less than any expected gain.
-                return -1.0;
-            }
-            let chance = match &posterior.feasibility {
-                Some(_) => posterior.probability_of_converging(action).unwrap_or(1.0),
-                None => 1.0,
-            };
-            expected_gain(mean, variance) * chance
-        })
-        .collect();
-    highest(&candidates, &values)
+    against(posterior, best, taken, pending, Some(&candidates))
 }
 
 #[cfg(test)]
@@ -420,6 +411,81 @@ mod tests {
                 }
             }
             assert_eq!(against(&posterior, best, &taken, &[], None), Some(top.1));
+        }
+    }
+
+    /// A log of random comparisons and labels; each action converges with this probability.
+    fn random_log(space: &SearchSpace, actions: usize, converges: f64, seed: u64) -> FeedbackLog {
+        let mut random = Random::new(seed, 0);
+        let mut log = FeedbackLog::default();
+        while log.visited.len() < actions {
+            let action = ActionIndex(random.below(space.len()));
+            if log.visited.contains(&action) {
+                continue;
+            }
+            if let Some(&other) = log.visited.last() {
+                let (winner, loser) = if random.uniform() < 0.5 { (action, other) } else { (other, action) };
+                log.feedback.push(Feedback::Preference { winner, loser });
+            }
+            log.feedback.push(Feedback::Label { action, category: usize::from(random.uniform() < converges) });
+            log.visited.push(action);
+        }
+        log
+    }
+
+    fn space_of(levels: &[i32]) -> SearchSpace {
+        let dimension = |(d, &n): (usize, &i32)| {
+            let values = (0..n).map(f64::from).collect();
+            Dimension { name: d.to_string(), values, lengthscale: 1.3 }
+        };
+        SearchSpace::new(levels.iter().enumerate().map(dimension).collect()).unwrap()
+    }
+
+    #[test]
+    fn list_of_all_actions_has_the_maximiser_of_the_grid() {
+        let space = space_of(&[3, 4, 3, 5]);
+        for (seed, converges) in [(1, 0.7), (2, 0.7), (3, 0.0), (4, 0.7), (5, 0.5)] {
+            let avoidance = (seed == 4).then_some(-0.2);
+            let settings = LearnerSettings { avoidance, nugget: 0.01, ..LearnerSettings::of(Method::Eubo) };
+            let log = random_log(&space, 20, converges, seed);
+            let posterior = posterior(&space, &log, &settings).unwrap();
+            let best = posterior.best().unwrap();
+            let pending = [ActionIndex(5), ActionIndex(77), ActionIndex(130)];
+            let taken: HashSet<ActionIndex> = log.visited.iter().chain(&pending).copied().collect();
+            let avoidance = Avoidance::of(&posterior);
+            let all: Vec<ActionIndex> = (0..space.len()).rev().map(ActionIndex).collect();
+            let [on_grid, on_list] = [ActionSet::Grid(180), ActionSet::list(all)]
+                .map(|set| maximiser(&posterior, &set, best, &taken, &pending, None, avoidance.as_ref()));
+            assert!(on_grid.is_some());
+            assert_eq!(on_grid, on_list, "{seed}");
+        }
+    }
+
+    #[test]
+    fn grids_too_large_to_enumerate_have_the_same_objective() {
+        let space = space_of(&[30, 40, 30, 50]);
+        for (seed, converges) in [(1, 0.5), (2, 0.5), (3, 0.5), (4, 0.0), (5, 0.0)] {
+            let settings = LearnerSettings { lines: 0, ordinal_noise: 1.0, ..LearnerSettings::of(Method::Eubo) };
+            let log = random_log(&space, 20, converges, seed);
+            let posterior = posterior(&space, &log, &settings).unwrap();
+            let best = posterior.best().unwrap();
+            let taken: HashSet<ActionIndex> = log.visited.iter().copied().collect();
+            let mut random = Random::new(seed, 20);
+            let candidates = near_best_or_random(&posterior, best, &taken, CANDIDATES, &mut random);
+            let incumbent = posterior.utility.view(best, space.levels(best));
+            let feasibility = posterior.feasibility.as_ref().unwrap();
+            let value = |&action: &ActionIndex| {
+                let levels = space.levels(action);
+                let (mean, variance) =
+                    posterior.utility.difference(&posterior.utility.view(action, levels.clone()), &incumbent);
+                let view = feasibility.view(action, levels);
+                let chance = special_functions::normal_cdf(view.mean / feasibility.variance(&view).sqrt());
+                // Any feasible action is better than an infeasible incumbent.
+                if posterior.infeasible.contains(&best) { chance } else { chance * expected_gain(mean, variance) }
+            };
+            let highest = candidates.iter().map(value).fold(0.0, f64::max);
+            let proposed = crate::propose::propose(&space, &log, &[], &settings, seed).unwrap().action;
+            assert!(value(&proposed) >= highest * (1.0 - 1e-9), "{seed}: {} {highest}", value(&proposed));
         }
     }
 }

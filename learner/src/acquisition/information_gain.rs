@@ -28,6 +28,8 @@ const SAMPLES: usize = 256;
 /// Mutual information with common random numbers.
 struct InformationGain<'a> {
     settings: &'a LearnerSettings,
+    /// As set, or as learned.
+    preference_noise: f64,
     /// Intervals of utilities that a label can name.
     grades: Vec<Interval>,
     normals: Vec<[f64; 2]>,
@@ -53,7 +55,7 @@ fn binary_entropy(p: f64) -> f64 {
 }
 
 impl<'a> InformationGain<'a> {
-    fn new(settings: &'a LearnerSettings, random: &mut Random) -> Self {
+    fn new(settings: &'a LearnerSettings, preference_noise: f64, random: &mut Random) -> Self {
         let categories = 0..settings.categories();
         let mut grades: Vec<Interval> = match settings.labels {
             Labels::InUtility => categories.map(|category| settings.label_interval(category)).collect(),
@@ -62,7 +64,12 @@ impl<'a> InformationGain<'a> {
         if grades.is_empty() {
             grades.push(Interval { low: f64::NEG_INFINITY, high: f64::INFINITY, noise: settings.ordinal_noise });
         }
-        Self { settings, grades, normals: (0..SAMPLES).map(|_| [random.normal(), random.normal()]).collect() }
+        Self {
+            settings,
+            preference_noise,
+            grades,
+            normals: (0..SAMPLES).map(|_| [random.normal(), random.normal()]).collect(),
+        }
     }
 
     /// Information of the label and the comparison of an action, in nats. With separate labels, `feasibility` is the
@@ -85,18 +92,18 @@ impl<'a> InformationGain<'a> {
         let sd = variance[0].max(1e-18).sqrt();
         let slope = covariance / sd;
         let rest = (variance[1] - slope * slope).max(0.0).sqrt();
-        let settings = self.settings;
-        let better = Interval { low: 0.0, high: f64::INFINITY, noise: settings.preference_noise };
+        let link = self.settings.link;
+        let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.preference_noise };
         let mut marginal = vec![[0.0; 2]; self.grades.len()];
         let mut conditional = 0.0;
         for [z, w] in &self.normals {
             let f = mean[0] + sd * z;
             let partner = mean[1] + slope * z + rest * w;
-            let preferred = if *compared { better.probability(settings.link, f - partner) } else { 1.0 };
+            let preferred = if *compared { better.probability(link, f - partner) } else { 1.0 };
             // Given the utilities, preference and label are independent, so their entropies add.
             conditional += binary_entropy(preferred) / SAMPLES as f64;
             for (grade, marginal) in self.grades.iter().zip(&mut marginal) {
-                let label = grade.probability(settings.link, f);
+                let label = grade.probability(link, f);
                 conditional += entropy(label) / SAMPLES as f64;
                 marginal[0] += preferred * label / SAMPLES as f64;
                 marginal[1] += (1.0 - preferred) * label / SAMPLES as f64;
@@ -114,7 +121,7 @@ pub(crate) fn over_candidates(
     random: &mut Random,
 ) -> ActionIndex {
     let space = posterior.space();
-    let gain = InformationGain::new(posterior.settings(), random);
+    let gain = InformationGain::new(posterior.settings(), posterior.preference_noise, random);
     let avoidance = Avoidance::of(posterior);
     let partner = match posterior.settings().partner {
         Partner::Previous => posterior.visited().last().copied().unwrap_or(best),
@@ -150,6 +157,9 @@ pub(crate) fn over_candidates(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::feedback::{Feedback, FeedbackLog};
+    use crate::learner::posterior;
+    use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::Method;
 
     /// Mutual information of all feedback with both processes, by its definition and plain Monte Carlo.
@@ -189,7 +199,7 @@ mod tests {
                 preference_noise: 0.2,
                 ..LearnerSettings::of(Method::InformationGain)
             };
-            let gain = InformationGain::new(&settings, &mut Random::new(1, 0));
+            let gain = InformationGain::new(&settings, settings.preference_noise, &mut Random::new(1, 0));
             for compared in [true, false] {
                 for feasibility in [(-1.0, 0.3), (0.1, 0.7), (2.0, 0.2)] {
                     let exact = by_definition(&settings, &utility(compared), feasibility);
@@ -200,5 +210,27 @@ mod tests {
             // An action that is certainly infeasible gives no information.
             assert!(gain.of(&utility(true), Some((-9.0, 0.1))) < 1e-6);
         }
+    }
+
+    #[test]
+    fn proposal_depends_on_the_learned_preference_noise() {
+        let dimension = Dimension { name: "x".into(), values: (0..200).map(f64::from).collect(), lengthscale: 4.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let settings = LearnerSettings::of(Method::InformationGain);
+        let mut log = FeedbackLog::default();
+        for step in 0..30 {
+            let (a, b) = (ActionIndex(step * 6), ActionIndex(step * 6 + 3));
+            log.visited.extend([a, b]);
+            log.feedback.push(Feedback::Preference { winner: a, loser: b });
+        }
+        let mut posterior = posterior(&space, &log, &settings).unwrap();
+        let best = posterior.best().unwrap();
+        let taken: HashSet<ActionIndex> = log.visited.iter().copied().collect();
+        let mut proposals = HashSet::new();
+        for preference_noise in [0.02, 1.0, 20.0] {
+            posterior.preference_noise = preference_noise;
+            proposals.insert(over_candidates(&posterior, best, &taken, &mut Random::new(3, 0)));
+        }
+        assert!(proposals.len() > 1, "{proposals:?}");
     }
 }

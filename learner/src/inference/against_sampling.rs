@@ -5,6 +5,7 @@
 
 use super::{Approximate, ExpectationPropagation, Laplace};
 use crate::action::ActionIndex;
+use crate::fit::{Fit, ProcessModel};
 use crate::kernel::Kernel;
 use crate::likelihood::{Interval, Link};
 use crate::observations::Observation;
@@ -12,7 +13,6 @@ use crate::observations::ObservedPoints;
 use crate::random::Random;
 use crate::search_space::{Dimension, SearchSpace};
 use crate::settings::LearnerSettings;
-use crate::update_chain::{ProcessModel, UpdateChain};
 
 /// Sampled means and standard deviations of the points under the exact posterior.
 fn sampled(observed: &ObservedPoints, draws: usize) -> (Vec<f64>, Vec<f64>) {
@@ -96,7 +96,7 @@ fn approximations_agree_with_long_sampling() {
         let observations = observations(noise, ties, 5, &space);
         let run = |method: &dyn Approximate| {
             let model = ProcessModel { space: &space, kernel: &kernel, link: Link::Probit, method };
-            UpdateChain::default().advance(&model, &observations).unwrap()
+            Fit::of(&model, &observations).unwrap()
         };
         let fits = [run(&ExpectationPropagation::default()), run(&Laplace)];
         let (mean, sd) = sampled(&fits[0].observed, 40_000);

@@ -8,9 +8,6 @@ use crate::likelihood::Link;
 use crate::linalg::{Block, Cholesky, Square, add_scaled, block_dots};
 use crate::observations::{ObservedPoints, Site};
 
-/// Number of points after which a method computes its approximation from scratch, to limit the rounding error.
-pub(super) const REFRESH: usize = 64;
-
 /// The normal factor of one site, in natural parameters.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Factor {
@@ -33,11 +30,8 @@ pub(crate) struct Approximation {
 
 /// A method of approximate inference.
 pub(crate) trait Approximate {
-    /// The approximation for all sites. `previous` is the approximation for the first points and sites, to start from.
-    ///
-    /// The result depends on the arguments only.
-    fn advance(&self, observed: &ObservedPoints, link: Link, previous: Option<&Approximation>)
-    -> Result<Approximation>;
+    /// The approximation for all sites.
+    fn approximate(&self, observed: &ObservedPoints, link: Link) -> Result<Approximation>;
 
     /// Logarithm of the approximate marginal likelihood of all sites.
     fn log_evidence(&self, observed: &ObservedPoints, link: Link, approximation: &Approximation) -> Result<f64>;
@@ -79,4 +73,16 @@ pub(crate) fn whitened_precision(prior: &Cholesky, sites: &[Site], factors: &[Fa
         }
     }
     Cholesky::new(&prior.identity_plus_transposed_product(&product))
+}
+
+/// Posterior covariance `L B^-1 L'`; `precision` is the Cholesky factor of `B`.
+pub(super) fn covariance(prior: &Cholesky, precision: &Cholesky) -> Square {
+    let n = prior.order();
+    let mut columns = Square::zeros(n);
+    for i in 0..n {
+        let row = columns.row_mut(i);
+        row[..=i].copy_from_slice(prior.row(i));
+        precision.solve_lower(row);
+    }
+    columns.outer_product()
 }

@@ -3,9 +3,9 @@
 //! Each update chooses the normal factor that matches mean and variance of the site's functional under the exact
 //! likelihood of the site times its cavity.
 
-use super::approximation::{Approximate, Approximation, Factor, REFRESH, whitened_precision};
-use super::site_updates::{Cavity, FactorRule, WorkingApproximation, shifts};
-use crate::error::Result;
+use super::approximation::{Approximate, Approximation, Factor, whitened_precision};
+use super::site_updates::{Cavity, WorkingApproximation, shifts};
+use crate::error::{LearnerError, Result};
 use crate::likelihood::Link;
 use crate::likelihood::LogLikelihood;
 use crate::linalg::dot;
@@ -14,7 +14,7 @@ use crate::special_functions;
 
 /// Expectation propagation with sequential updates.
 pub(crate) struct ExpectationPropagation {
-    /// Largest neglected change: of the mean in posterior standard deviations, of the variance as a share.
+    /// Largest neglected change at first: of the mean in posterior standard deviations, of the variance as a share.
     pub(crate) tolerance: f64,
     /// Largest number of sweeps over the sites.
     pub(crate) sweeps: usize,
@@ -22,7 +22,7 @@ pub(crate) struct ExpectationPropagation {
 
 impl Default for ExpectationPropagation {
     fn default() -> Self {
-        Self { tolerance: 1e-4, sweeps: 30 }
+        Self { tolerance: 1e-8, sweeps: 320 }
     }
 }
 
@@ -33,39 +33,52 @@ fn mass(site: &Site, cavity: Cavity) -> LogLikelihood {
     interval.log_likelihood(Link::Probit, cavity.mean)
 }
 
-impl FactorRule for ExpectationPropagation {
-    fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor> {
-        let variance = 1.0 / cavity.precision;
-        let at = mass(site, cavity);
-        let mean = cavity.mean + variance * at.slope;
-        // precision = 1 / tilted - 1 / variance, where tilted = variance (1 - variance curvature).
-        let shrink = (variance * at.curvature).min(1.0 - 1e-12);
-        let precision = at.curvature / (1.0 - shrink);
-        let shift = mean * (cavity.precision + precision) - cavity.mean * cavity.precision;
-        (precision.is_finite() && shift.is_finite()).then_some(Factor { precision, shift })
-    }
+/// Number of sweeps after which the tolerance grows tenfold. Far from an interval, or with a narrow one, the moments of a
+/// likelihood lose digits to cancellation, which hides smaller changes.
+const RELAXED: usize = 40;
+/// Number of sweeps after which the factors move half the way only.
+const UNDAMPED: usize = 100;
+/// Number of sweeps after which mean and covariance are recomputed, to limit the rounding error.
+const REFRESH: usize = 10;
+
+/// The factor that matches the moments of the site's likelihood times its cavity.
+fn matching_factor(site: &Site, cavity: Cavity) -> Option<Factor> {
+    let variance = 1.0 / cavity.precision;
+    let at = mass(site, cavity);
+    let mean = cavity.mean + variance * at.slope;
+    // precision = 1 / tilted - 1 / variance, where tilted = variance (1 - variance curvature).
+    let shrink = (variance * at.curvature).min(1.0 - 1e-12);
+    let precision = at.curvature / (1.0 - shrink);
+    let shift = mean * (cavity.precision + precision) - cavity.mean * cavity.precision;
+    (precision.is_finite() && shift.is_finite()).then_some(Factor { precision, shift })
 }
 
 impl Approximate for ExpectationPropagation {
-    fn advance(
-        &self,
-        observed: &ObservedPoints,
-        _link: Link,
-        previous: Option<&Approximation>,
-    ) -> Result<Approximation> {
+    fn approximate(&self, observed: &ObservedPoints, _link: Link) -> Result<Approximation> {
         let (prior, sites) = (&observed.prior, &observed.sites);
-        let mut working = WorkingApproximation::extend(observed, previous);
-        let old = previous.map_or(0, |p| p.mean.len());
-        working.sweep(sites, previous.map_or(0, |p| p.factors.len()), self, self.tolerance, self.sweeps);
-        if prior.order() / REFRESH != old / REFRESH || !working.is_sound() {
-            working.refresh(prior, sites)?;
-            working.sweep(sites, sites.len(), self, self.tolerance, self.sweeps);
+        let mut working = WorkingApproximation::of(prior, sites, vec![Factor::default(); sites.len()])?;
+        // Settled means that no site needs an update of a mean and a covariance that were just recomputed.
+        let (mut recomputed, mut tolerance) = (true, self.tolerance);
+        for sweep in 1..=self.sweeps {
+            let share = if sweep > UNDAMPED { 0.5 } else { 1.0 };
+            let settled = working.sweep(sites, &matching_factor, tolerance, share);
+            if settled && recomputed && working.is_sound() {
+                return Ok(working.finish(prior));
+            }
+            if sweep % RELAXED == 0 {
+                tolerance *= 10.0;
+            }
+            recomputed = settled || sweep % REFRESH == 0 || !working.is_sound();
+            if recomputed {
+                working.refresh(prior, sites)?;
+            }
         }
-        Ok(working.finish(prior))
+        Err(LearnerError::Numerical(format!("expectation propagation did not settle in {} sweeps", self.sweeps)))
     }
 
     fn log_evidence(&self, observed: &ObservedPoints, _link: Link, approximation: &Approximation) -> Result<f64> {
-        let working = WorkingApproximation::of(approximation);
+        let factors = approximation.factors.clone();
+        let working = WorkingApproximation::of(&observed.prior, &observed.sites, factors)?;
         let mut total = 0.0;
         for (site, &factor) in observed.sites.iter().zip(&working.factors) {
             if let Some(cavity) = working.cavity(site, factor) {
@@ -136,5 +149,18 @@ mod tests {
             assert!((got.mean - mean).abs() < 0.02, "{action}: {got:?} against {mean} {sd}");
             assert!((got.standard_deviation - sd).abs() < 0.02, "{action}: {got:?} against {mean} {sd}");
         }
+    }
+
+    #[test]
+    fn sweeps_that_do_not_settle_are_an_error() {
+        let space =
+            SearchSpace::new(vec![Dimension { name: "x".into(), values: vec![0.0, 1.0], lengthscale: 1.0 }]).unwrap();
+        let (winner, loser) = (ActionIndex(0), ActionIndex(1));
+        let log =
+            FeedbackLog { visited: vec![winner, loser], feedback: vec![Feedback::Preference { winner, loser }; 3] };
+        let belief = posterior(&space, &log, &LearnerSettings::published(Method::Eubo)).unwrap();
+        let stopped = ExpectationPropagation { sweeps: 2, ..ExpectationPropagation::default() };
+        let fitted = stopped.approximate(belief.utility.observed(), Link::Probit);
+        assert!(fitted.is_err_and(|error| error.to_string().contains("did not settle in 2 sweeps")));
     }
 }

@@ -3,13 +3,8 @@
 //! Newton's method works in whitened coordinates `f = L v`, `K = L L'`. The Hessian of the objective `1/2 v'v - sum log
 //! P` is `B = I + L' W L`, whose eigenvalues are at least 1, and `K` is never inverted (Rasmussen and Williams 2006,
 //! algorithm 3.1).
-//!
-//! From a previous approximation few factors change, so sweeps of site updates are faster. Each update moves a factor
-//! to the mode of the site's functional given its cavity; the fixed point is the mode of the posterior. If the sweeps
-//! do not converge, Newton's method continues.
 
-use super::approximation::{Approximate, Approximation, Factor, REFRESH, whitened_precision};
-use super::site_updates::{Cavity, FactorRule, WorkingApproximation, covariance};
+use super::approximation::{Approximate, Approximation, Factor, covariance, whitened_precision};
 use crate::error::{LearnerError, Result};
 use crate::likelihood::Link;
 use crate::linalg::dot;
@@ -19,72 +14,77 @@ use crate::observations::{ObservedPoints, Site};
 pub(crate) struct Laplace;
 
 /// Largest number of Newton steps.
-const MAX_STEPS: usize = 200;
-/// Squared Newton decrement at convergence: the squared distance to the mode in posterior standard deviations.
+const MAX_STEPS: usize = 1000;
+/// Squared Newton decrement, the squared distance to the mode in posterior standard deviations, from which on the
+/// convergence is quadratic: one more full step ends at the mode to rounding error.
 const DECREMENT: f64 = 1e-10;
-/// The same as a share of the objective, because its rounding error hides smaller steps.
+/// The same as a share of the objective, because its rounding error hides smaller steps from the line search.
 const RELATIVE_DECREMENT: f64 = 1e-13;
-/// Largest neglected change of a site: of the mean in posterior standard deviations, of the variance as a share.
-const TOLERANCE: f64 = 1e-3;
-/// Largest number of sweeps over the sites before Newton's method takes over.
-const SWEEPS: usize = 20;
-
-/// Chooses the factor from mode and curvature of the site's likelihood times its cavity.
-struct ModeAlong(Link);
-
-impl FactorRule for ModeAlong {
-    fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor> {
-        let at = |d: f64| site.interval.derivatives(self.0, d);
-        // The slope of the log-likelihood decreases in d, so the mode lies between the cavity mean and this point.
-        let reach = cavity.mean + at(cavity.mean).slope / cavity.precision;
-        let (mut low, mut high) = (cavity.mean.min(reach), cavity.mean.max(reach));
-        let mut d = 0.5 * (low + high);
-        for _ in 0..100 {
-            let here = at(d);
-            let rise = (d - cavity.mean) * cavity.precision - here.slope;
-            let newton = d - rise / (cavity.precision + here.curvature);
-            if rise > 0.0 {
-                high = d;
-            } else {
-                low = d;
-            }
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            let done = (next - d).abs() * cavity.precision.sqrt() < 1e-9;
-            d = next;
-            if done {
-                break;
-            }
-        }
-        let here = at(d);
-        let shift = here.slope + here.curvature * d;
-        (here.curvature.is_finite() && shift.is_finite()).then_some(Factor { precision: here.curvature, shift })
-    }
-
-    fn settled(&self, site: &Site, present: Factor, mean: f64, variance: f64) -> bool {
-        let here = site.interval.derivatives(self.0, mean);
-        let force = present.shift - present.precision * mean - here.slope;
-        (force * variance.sqrt()).abs() < 0.5 * TOLERANCE
-            && ((present.precision - here.curvature) * variance).abs() < 0.5 * TOLERANCE
-    }
-}
 
 impl Approximate for Laplace {
-    fn advance(
-        &self,
-        observed: &ObservedPoints,
-        link: Link,
-        previous: Option<&Approximation>,
-    ) -> Result<Approximation> {
+    /// Newton's method with a backtracking line search, from the prior mean.
+    fn approximate(&self, observed: &ObservedPoints, link: Link) -> Result<Approximation> {
         let (prior, sites) = (&observed.prior, &observed.sites);
-        if let Some(previous) = previous
-            && prior.order() / REFRESH == previous.mean.len() / REFRESH
-        {
-            let mut working = WorkingApproximation::extend(observed, Some(previous));
-            if working.sweep(sites, previous.factors.len(), &ModeAlong(link), TOLERANCE, SWEEPS) && working.is_sound() {
-                return Ok(working.finish(prior));
-            }
+        let n = prior.order();
+        let mut v = vec![0.0; n];
+        let mut f = vec![0.0; n];
+        let mut value = -log_likelihood(sites, link, &f);
+        let mut at_mode = false;
+        for _ in 0..MAX_STEPS {
+            let mut slope = vec![0.0; n];
+            let factors: Vec<Factor> = sites
+                .iter()
+                .map(|site| {
+                    let d = site.of(&f);
+                    let at = site.interval.log_likelihood(link, d);
+                    slope[site.plus] += at.slope;
+                    if let Some(minus) = site.minus {
+                        slope[minus] -= at.slope;
+                    }
+                    Factor { precision: at.curvature, shift: at.slope + at.curvature * d }
+                })
+                .collect();
+            let precision = whitened_precision(prior, sites, &factors)?;
+            let pull = prior.multiply_transposed(&slope);
+            let gradient: Vec<f64> = v.iter().zip(&pull).map(|(v, p)| v - p).collect();
+            let mut step = gradient.clone();
+            precision.solve(&mut step);
+            let decrement = dot(&gradient, &step);
+            let enough = DECREMENT.max(RELATIVE_DECREMENT * value.abs());
+            let moved = |length: f64| {
+                let v: Vec<f64> = v.iter().zip(&step).map(|(v, s)| v - length * s).collect();
+                let f = prior.multiply(&v);
+                let value = 0.5 * dot(&v, &v) - log_likelihood(sites, link, &f);
+                (v, f, value)
+            };
+            let next = if at_mode {
+                None
+            } else if decrement <= enough {
+                at_mode = true;
+                Some(moved(1.0))
+            } else {
+                let lengths = std::iter::successors(Some(1.0), |length| Some(0.5 * length));
+                let trials = lengths.take_while(|&length| length > 1e-10).map(|length| (length, moved(length)));
+                trials
+                    .into_iter()
+                    .find(|(length, trial)| trial.2 <= value - 1e-4 * length * decrement)
+                    .map(|found| found.1)
+            };
+            let Some(next) = next else {
+                // At the mode, or the objective cannot decrease in double precision.
+                let mut weights = v.clone();
+                prior.solve_upper(&mut weights);
+                return Ok(Approximation {
+                    mean: f,
+                    weights,
+                    whitened: v,
+                    factors,
+                    covariance: covariance(prior, &precision),
+                });
+            };
+            (v, f, value) = next;
         }
-        newton(observed, link, previous)
+        Err(LearnerError::Numerical(format!("Laplace's approximation did not converge in {MAX_STEPS} Newton steps")))
     }
 
     fn log_evidence(&self, observed: &ObservedPoints, link: Link, approximation: &Approximation) -> Result<f64> {
@@ -100,78 +100,20 @@ fn log_likelihood(sites: &[Site], link: Link, f: &[f64]) -> f64 {
     sites.iter().map(|s| s.interval.log_likelihood(link, s.of(f)).value).sum()
 }
 
-/// Newton's method with a backtracking line search. A new point starts at `v = 0`, its conditional prior mean.
-fn newton(observed: &ObservedPoints, link: Link, previous: Option<&Approximation>) -> Result<Approximation> {
-    let (prior, sites) = (&observed.prior, &observed.sites);
-    let n = prior.order();
-    let mut v = previous.map_or_else(Vec::new, |p| p.whitened.clone());
-    v.resize(n, 0.0);
-    let mut f = prior.multiply(&v);
-    let mut value = 0.5 * dot(&v, &v) - log_likelihood(sites, link, &f);
-    for _ in 0..MAX_STEPS {
-        let mut slope = vec![0.0; n];
-        let factors: Vec<Factor> = sites
-            .iter()
-            .map(|site| {
-                let d = site.of(&f);
-                let at = site.interval.log_likelihood(link, d);
-                slope[site.plus] += at.slope;
-                if let Some(minus) = site.minus {
-                    slope[minus] -= at.slope;
-                }
-                Factor { precision: at.curvature, shift: at.slope + at.curvature * d }
-            })
-            .collect();
-        let precision = whitened_precision(prior, sites, &factors)?;
-        let pull = prior.multiply_transposed(&slope);
-        let gradient: Vec<f64> = v.iter().zip(&pull).map(|(v, p)| v - p).collect();
-        let mut step = gradient.clone();
-        precision.solve(&mut step);
-        let decrement = dot(&gradient, &step);
-        let enough = DECREMENT.max(RELATIVE_DECREMENT * value.abs());
-        let mut length = 1.0;
-        let mut moved = None;
-        while decrement > enough && length > 1e-10 {
-            let trial: Vec<f64> = v.iter().zip(&step).map(|(v, s)| v - length * s).collect();
-            let trial_f = prior.multiply(&trial);
-            let trial_value = 0.5 * dot(&trial, &trial) - log_likelihood(sites, link, &trial_f);
-            if trial_value <= value - 1e-4 * length * decrement {
-                moved = Some((trial, trial_f, trial_value));
-                break;
-            }
-            length *= 0.5;
-        }
-        let Some(next) = moved else {
-            // Converged, or the objective cannot decrease in double precision.
-            let mut weights = v.clone();
-            prior.solve_upper(&mut weights);
-            return Ok(Approximation {
-                mean: f,
-                weights,
-                whitened: v,
-                factors,
-                covariance: covariance(prior, &precision),
-            });
-        };
-        (v, f, value) = next;
-    }
-    Err(LearnerError::Numerical(format!("Laplace's approximation did not converge in {MAX_STEPS} Newton steps")))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::action::ActionIndex;
+    use crate::fit::{Fit, ProcessModel};
     use crate::kernel::Kernel;
     use crate::likelihood::Interval;
     use crate::observations::Observation;
     use crate::random::Random;
     use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::LearnerSettings;
-    use crate::update_chain::{ProcessModel, UpdateChain};
 
     #[test]
-    fn update_chain_ends_at_the_mode_of_newtons_method() {
+    fn mean_is_the_mode_to_rounding_error() {
         let dimensions = (0..4)
             .map(|d| Dimension { name: d.to_string(), values: vec![0.0, 1.0, 2.0, 3.0], lengthscale: 1.0 })
             .collect();
@@ -197,17 +139,19 @@ mod tests {
                 last = action;
             }
             let model = ProcessModel { space: &space, kernel: &kernel, link, method: &Laplace };
-            let fit = UpdateChain::default().advance(&model, &observations).unwrap();
-            let exact = newton(&fit.observed, link, None).unwrap();
-            let mut largest = [0.0_f64; 2];
-            for i in 0..exact.mean.len() {
-                largest[0] = largest[0].max((exact.mean[i] - fit.approximation.mean[i]).abs());
-                for j in 0..exact.mean.len() {
-                    let difference = exact.covariance.at(i, j) - fit.approximation.covariance.at(i, j);
-                    largest[1] = largest[1].max(difference.abs());
+            let fit = Fit::of(&model, &observations).unwrap();
+            let Approximation { mean, whitened, .. } = &fit.approximation;
+            let mut slope = vec![0.0; mean.len()];
+            for site in &fit.observed.sites {
+                let at = site.interval.log_likelihood(link, site.of(mean));
+                slope[site.plus] += at.slope;
+                if let Some(minus) = site.minus {
+                    slope[minus] -= at.slope;
                 }
             }
-            assert!(largest[0] < 5e-3 && largest[1] < 5e-3, "{link:?} {noise}: {largest:?}");
+            let pull = fit.observed.prior.multiply_transposed(&slope);
+            let largest = whitened.iter().zip(pull).fold(0.0_f64, |largest, (v, p)| largest.max((v - p).abs()));
+            assert!(largest < 1e-9, "{link:?} {noise}: {largest}");
         }
     }
 }

@@ -1,13 +1,13 @@
 //! Site-by-site updates of an approximation by rank-one changes of its covariance.
 //!
 //! A new factor of one site changes the `n x n` covariance by a matrix of rank one. An update costs `O(n^2)`; detecting
-//! that a site needs none costs `O(1)`. The method chooses the new factor from the cavity of the site: the distribution
-//! of its functional under all other factors.
+//! that a site needs none costs `O(1)`. The new factor follows from the cavity of the site: the distribution of its
+//! functional under all other factors.
 
-use super::approximation::{Approximation, Factor, whitened_precision};
+use super::approximation::{Approximation, Factor, covariance, whitened_precision};
 use crate::error::Result;
-use crate::linalg::{Cholesky, Square, add_scaled, dot};
-use crate::observations::{ObservedPoints, Site};
+use crate::linalg::{Cholesky, Square, add_scaled};
+use crate::observations::Site;
 
 /// Normal distribution of a site's functional without the factor of the site.
 #[derive(Debug, Clone, Copy)]
@@ -16,16 +16,8 @@ pub(super) struct Cavity {
     pub(super) precision: f64,
 }
 
-/// Rule by which a method chooses factors.
-pub(super) trait FactorRule {
-    /// The factor of a site, given its cavity. `None` keeps the present factor.
-    fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor>;
-
-    /// A cheap sufficient test that the present factor needs no update, at the present moments of the functional.
-    fn settled(&self, _site: &Site, _present: Factor, _mean: f64, _variance: f64) -> bool {
-        false
-    }
-}
+/// The new factor of a site, given its cavity. `None` keeps the present factor.
+pub(super) type Rule<'a> = dyn Fn(&Site, Cavity) -> Option<Factor> + 'a;
 
 /// Smallest precision of a usable cavity, as a share of the precision of the marginal.
 const MIN_CAVITY: f64 = 1e-10;
@@ -45,14 +37,12 @@ pub(super) struct WorkingApproximation {
 }
 
 impl WorkingApproximation {
-    /// Continues from an approximation of the same points and sites.
-    pub(super) fn of(approximation: &Approximation) -> Self {
-        Self {
-            covariance: approximation.covariance.clone(),
-            delayed: Vec::new(),
-            mean: approximation.mean.clone(),
-            factors: approximation.factors.clone(),
-        }
+    /// The approximation of these factors.
+    pub(super) fn of(prior: &Cholesky, sites: &[Site], factors: Vec<Factor>) -> Result<Self> {
+        let mut working =
+            Self { covariance: Square::zeros(prior.order()), delayed: Vec::new(), mean: Vec::new(), factors };
+        working.refresh(prior, sites)?;
+        Ok(working)
     }
 
     /// Posterior variance of a site's functional.
@@ -83,38 +73,6 @@ impl WorkingApproximation {
         self.delayed.clear();
     }
 
-    /// Extends the previous approximation. New points get their conditional prior, new sites the factor 1.
-    pub(super) fn extend(observed: &ObservedPoints, previous: Option<&Approximation>) -> Self {
-        let n = observed.prior.order();
-        let mut working = match previous {
-            Some(Approximation { mean, factors, covariance, .. }) => Self {
-                covariance: covariance.grown(n - mean.len()),
-                delayed: Vec::new(),
-                mean: mean.clone(),
-                factors: factors.clone(),
-            },
-            None => Self { covariance: Square::zeros(n), delayed: Vec::new(), mean: Vec::new(), factors: Vec::new() },
-        };
-        let old = working.mean.len();
-        working.mean.resize(n, 0.0);
-        working.factors.resize(observed.sites.len(), Factor::default());
-        for i in old..n {
-            // Row i of L holds the whitened covariances with the earlier points and the conditional standard deviation.
-            let row = observed.prior.row(i);
-            let mut gain = row[..i].to_vec();
-            observed.prior.solve_upper(&mut gain);
-            let with_others: Vec<f64> = (0..i).map(|j| dot(&working.covariance.row(j)[..i], &gain)).collect();
-            working.mean[i] = dot(&working.mean[..i], &gain);
-            for (j, &c) in with_others.iter().enumerate() {
-                working.covariance.row_mut(j)[i] = c;
-            }
-            let last = working.covariance.row_mut(i);
-            last[..i].copy_from_slice(&with_others);
-            last[i] = row[i] * row[i] + dot(&with_others, &gain);
-        }
-        working
-    }
-
     /// The cavity of a site with this factor. `None` if it is improper.
     pub(super) fn cavity(&self, site: &Site, factor: Factor) -> Option<Cavity> {
         let variance = self.variance(site);
@@ -126,53 +84,38 @@ impl WorkingApproximation {
             .then(|| Cavity { mean: (site.of(&self.mean) / variance - factor.shift) / precision, precision })
     }
 
-    /// Updates one factor if the mean moves by more than `tolerance` standard deviations or the variance by more than
-    /// that share. Returns whether it did.
-    fn replace(&mut self, index: usize, site: &Site, rule: &dyn FactorRule, tolerance: f64) -> bool {
+    /// Moves one factor by a share of the way to its new value, if the mean moves by more than `tolerance` standard
+    /// deviations or the variance by more than that share. Returns whether it did.
+    fn replace(&mut self, index: usize, site: &Site, rule: &Rule<'_>, tolerance: f64, share: f64) -> bool {
         let old = self.factors[index];
         let (mean, spread) = (site.of(&self.mean), self.variance(site));
-        if tolerance > 0.0 && rule.settled(site, old, mean, spread) {
-            return false;
-        }
-        let Some(new) = self.cavity(site, old).and_then(|cavity| rule.factor(site, cavity)) else { return false };
+        let Some(new) = self.cavity(site, old).and_then(|cavity| rule(site, cavity)) else { return false };
         let (more_precision, more_shift) = (new.precision - old.precision, new.shift - old.shift);
-        let gain = 1.0 / (more_precision * spread + 1.0);
-        let move_by = (more_shift - more_precision * mean) * gain;
-        if (move_by * spread.sqrt()).abs() < tolerance && (more_precision * spread * gain).abs() < tolerance {
+        let change = |share: f64| {
+            let gain = 1.0 / (share * more_precision * spread + 1.0);
+            (share * (more_shift - more_precision * mean) * gain, share * more_precision * gain)
+        };
+        let (move_by, narrow_by) = change(1.0);
+        if (move_by * spread.sqrt()).abs() < tolerance && (narrow_by * spread).abs() < tolerance {
             return false;
         }
+        let (move_by, narrow_by) = change(share);
         let column = self.column(site);
         add_scaled(&mut self.mean, move_by, &column);
-        self.delayed.push((-more_precision * gain, column));
+        self.delayed.push((-narrow_by, column));
         if self.delayed.len() == DELAYED {
             self.apply_delayed();
         }
-        self.factors[index] = new;
+        self.factors[index] =
+            Factor { precision: old.precision + share * more_precision, shift: old.shift + share * more_shift };
         true
     }
 
-    /// Updates the new sites, then sweeps over all sites until none needs an update. Returns whether that happened
-    /// within `sweeps` sweeps.
-    pub(super) fn sweep(
-        &mut self,
-        sites: &[Site],
-        first_new: usize,
-        rule: &dyn FactorRule,
-        tolerance: f64,
-        sweeps: usize,
-    ) -> bool {
-        for (index, site) in sites.iter().enumerate().skip(first_new) {
-            self.replace(index, site, rule, 0.0);
-        }
-        let mut settled = false;
-        for _ in 0..sweeps {
-            settled = true;
-            for (index, site) in sites.iter().enumerate() {
-                settled &= !self.replace(index, site, rule, tolerance);
-            }
-            if settled {
-                break;
-            }
+    /// Updates each site in turn. Returns whether none needed an update.
+    pub(super) fn sweep(&mut self, sites: &[Site], rule: &Rule<'_>, tolerance: f64, share: f64) -> bool {
+        let mut settled = true;
+        for (index, site) in sites.iter().enumerate() {
+            settled &= !self.replace(index, site, rule, tolerance, share);
         }
         self.apply_delayed();
         settled
@@ -201,18 +144,6 @@ impl WorkingApproximation {
         prior.solve_upper(&mut weights);
         Approximation { mean: self.mean, weights, whitened, factors: self.factors, covariance: self.covariance }
     }
-}
-
-/// Posterior covariance `L B^-1 L'`; `precision` is the Cholesky factor of `B`.
-pub(super) fn covariance(prior: &Cholesky, precision: &Cholesky) -> Square {
-    let n = prior.order();
-    let mut columns = Square::zeros(n);
-    for i in 0..n {
-        let row = columns.row_mut(i);
-        row[..=i].copy_from_slice(prior.row(i));
-        precision.solve_lower(row);
-    }
-    columns.outer_product()
 }
 
 /// `sum_s shift_s a_s`, `a_s` the coefficients of site `s`.

@@ -52,18 +52,6 @@ impl Square {
         &mut self.data[i * self.n..(i + 1) * self.n]
     }
 
-    /// The matrix with `extra` rows and columns of zeros added.
-    pub(crate) fn grown(&self, extra: usize) -> Self {
-        let n = self.n + extra;
-        let mut data = Vec::with_capacity(n * n);
-        for i in 0..self.n {
-            data.extend_from_slice(self.row(i));
-            data.resize((i + 1) * n, 0.0);
-        }
-        data.resize(n * n, 0.0);
-        Self { n, data }
-    }
-
     /// The matrix plus a multiple of the identity.
     pub(crate) fn ridged(&self, ridge: f64) -> Self {
         let mut ridged = self.clone();
@@ -119,13 +107,6 @@ impl Cholesky {
             factor.append(&matrix.row(i)[..=i])?;
         }
         Ok(factor)
-    }
-
-    /// A copy with capacity for one more row.
-    pub(crate) fn roomy(&self) -> Self {
-        let mut packed = Vec::with_capacity(self.packed.len() + self.n + 1);
-        packed.extend_from_slice(&self.packed);
-        Self { n: self.n, packed }
     }
 
     /// Appends a row of the matrix up to its diagonal.

@@ -33,6 +33,8 @@ fn best_elastics(c: f64, mu: f64, rho: f64) -> (f64, f64) {
 fn elastic_formulation<'p>(base: &Formulation<'p>, w: &[f64], mu: f64, rho: f64) -> Formulation<'p> {
     let mut form = base.clone();
     form.tally = EvaluationTally::default();
+    // The elastic objective is not scaled, so neither are the multipliers and tolerances of the phase.
+    form.objective_scale = 1.0;
     let first = form.row_variables.len();
     for i in 0..form.m {
         if form.rows[i] != RowForm::Free {
@@ -158,7 +160,10 @@ pub(crate) fn finish(
         // A feasible point that the filter rejects because of entries from before the phase.
         Ending::Converged | Ending::Stalled if feasible && progress => run.filter.clear(),
         Ending::Converged if !feasible || run.program_violation() > LEFT_OVER * settings.violation_tolerance => {
-            run.point.y.copy_from_slice(&phase.point.y);
+            // The multipliers of the phase belong to an objective without scale.
+            for (y, of_phase) in run.point.y.iter_mut().zip(&phase.point.y) {
+                *y = of_phase * run.form.objective_scale;
+            }
             return Some(Ending::Infeasible);
         }
         Ending::Converged => return Some(Ending::Stalled),

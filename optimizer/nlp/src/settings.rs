@@ -75,6 +75,7 @@ pub struct NlpSettings {
     /// Iterations (restoration phase included) before [`NlpStatus::IterationLimit`](crate::NlpStatus). Default 1000.
     pub max_iterations: usize,
     /// Wall time in seconds before [`NlpStatus::TimeLimit`](crate::NlpStatus). Default infinity (JSON: null). From 0.
+    /// With a finite limit, equal inputs give equal bits only if the solve ends before it.
     #[serde(with = "infinite_as_null")]
     pub max_seconds: f64,
     /// |x| beyond which the problem is called unbounded. Default 1e20 (IPOPT `diverging_iterates_tol`).

@@ -18,7 +18,7 @@ pub enum NlpStatus {
     Unbounded,
     /// [`max_iterations`](crate::NlpSettings::max_iterations) is reached.
     IterationLimit,
-    /// [`max_seconds`](crate::NlpSettings::max_seconds) is reached.
+    /// [`max_seconds`](crate::NlpSettings::max_seconds) is reached. The point depends on the speed of the machine.
     TimeLimit,
     /// The caller cancelled the solve.
     Cancelled,

@@ -57,6 +57,29 @@ fn infeasible_problems_are_reported_infeasible() {
     }
 }
 
+/// The restoration phase has an objective of its own, so the scale of the problem's objective must not change its
+/// termination test or its multipliers.
+#[test]
+fn restoration_phase_ignores_the_scale_of_the_objective() {
+    let problem = |weight: f64| {
+        let functions: fn(&[Dual]) -> (Dual, Vec<Dual>) = if weight > 1.0 {
+            |x| (1e8 * (x[0] + square(x[1])), vec![square(x[0]) + square(x[1]) + 1.0])
+        } else {
+            |x| (x[0] + square(x[1]), vec![square(x[0]) + square(x[1]) + 1.0])
+        };
+        Small::new("no real root", &[2.0, 1.0], &[EQ], &[], functions)
+    };
+    let settings = NlpSettings { gradient_scaling: Some(1.0), ..NlpSettings::default() };
+    let [plain, steep] = [1.0, 1e8].map(|weight| run(&problem(weight), &[2.0, 1.0], &settings));
+    for r in [&plain, &steep] {
+        assert_eq!(r.status, NlpStatus::Infeasible, "{r:?}");
+        // The multiplier of a violated row is the weight of its violation, in the units of the scaled row.
+        let weight = r.row_multipliers[0].abs();
+        assert!((weight - settings.elastic_weight / 4.0).abs() < 1.0, "{weight}");
+    }
+    assert!(steep.iterations <= plain.iterations + 3, "{} {}", steep.iterations, plain.iterations);
+}
+
 #[test]
 fn infeasible_sparse_problem_is_reported_by_every_linear_solver() {
     // The cart cannot swing the pole up in at most 5 s with 0.1 N.
@@ -74,12 +97,11 @@ fn hs13_without_constraint_qualification_is_no_false_optimum() {
     })
     .all_bounds(0.0, INF);
     let r = cold(&problem);
-    // The optimum (1, 0) is not a KKT point. The solver may stop near it but must not report another point as
-    // converged.
+    // The optimum (1, 0) is not a KKT point. The solver must stop near it, and within the violation tolerance, which
+    // near the cusp leaves x1 a range of 0.01.
     assert!((r.x[0] - 1.0).abs() < 0.02 && r.x[1].abs() < 1e-3, "{r:?}");
-    if r.status == NlpStatus::Converged {
-        assert!(r.residuals.violation < 1e-6);
-    }
+    assert!(r.x[1] >= -1e-6 && r.x[1] - (1.0 - r.x[0]).powi(3) <= 1e-6, "{r:?}");
+    assert!((r.objective - 1.0).abs() < 0.04, "{r:?}");
 }
 
 #[test]
@@ -270,6 +292,7 @@ fn warm_starts_need_few_iterations() {
 #[test]
 fn barrier_strategies_and_initial_barriers_reach_the_same_optimum() {
     let problem = cart_pole(60, 20.0, 1);
+    let mut first = None;
     for (barrier_strategy, mu_initial) in
         [(BarrierStrategy::Monotone, 0.1), (BarrierStrategy::Monotone, 1e-3), (BarrierStrategy::Adaptive, 0.1)]
     {
@@ -278,6 +301,8 @@ fn barrier_strategies_and_initial_barriers_reach_the_same_optimum() {
                 NlpSettings { barrier_strategy, mu_initial, bound_multiplier_start, ..NlpSettings::default() };
             let r = run(&problem, &problem.start, &settings);
             assert_eq!(r.status, NlpStatus::Converged, "{settings:?} {:?}", r.counts);
+            let first = *first.get_or_insert(r.objective);
+            assert!((r.objective - first).abs() < 1e-7, "{settings:?}: {} {first}", r.objective);
         }
     }
 }
@@ -316,8 +341,9 @@ fn observer_gets_every_iterate_of_both_phases() {
     let r = r.unwrap();
     assert_eq!(numbers.first(), Some(&0));
     assert!(numbers.windows(2).all(|w| w[1] == w[0] || w[1] == w[0] + 1), "{numbers:?}");
-    assert!(phases.contains(&NlpPhase::Restoration));
-    assert_eq!(r.counts.regular_iterations + r.counts.restoration_iterations, r.iterations);
+    assert_eq!(numbers.last(), Some(&r.iterations));
+    let entered = phases.windows(2).filter(|p| *p == [NlpPhase::Regular, NlpPhase::Restoration]).count();
+    assert_eq!(entered, r.counts.restoration_phases);
 }
 
 #[test]

@@ -3,10 +3,12 @@
 
 mod standard_problems;
 
-use interior_point::{BarrierStrategy, LinearSolver, NlpSettings, NlpStatus, StartPoint, solve};
-use standard_problems::hock_schittkowski;
+use interior_point::{
+    BarrierStrategy, LinearSolver, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, StartPoint, solve,
+};
 use standard_problems::sparse::{Sparse, cart_pole, gait_sized};
 use standard_problems::swing_up::SwingUp;
+use standard_problems::{Small, hock_schittkowski};
 
 fn misses(settings: &NlpSettings, golden: Option<&[(&str, usize)]>) -> Vec<String> {
     let mut misses = Vec::new();
@@ -60,30 +62,68 @@ fn standard_set_converges_with_the_adaptive_barrier() {
     assert!(others.is_empty(), "{others:?}");
 }
 
+/// Largest violation of the KKT conditions at a result, from the functions of the problem alone: bounds of variables and
+/// rows, signs and complementarity of the multipliers, gradient of the Lagrangian. The last two are relative to the
+/// size of the multipliers.
+fn kkt_violation(problem: &Small, r: &NlpResult) -> f64 {
+    let (n, m) = (problem.start.len(), problem.row_lower.len());
+    let (mut gradient, mut rows, mut jacobian) = (vec![0.0; n], vec![0.0; m], vec![0.0; n * m]);
+    problem.gradient(&r.x, &mut gradient);
+    problem.constraints(&r.x, &mut rows);
+    problem.jacobian(&r.x, &mut jacobian);
+    let multipliers = r.row_multipliers.iter().chain(&r.lower_multipliers).chain(&r.upper_multipliers);
+    let size = multipliers.fold(1.0_f64, |size, y| size.max(y.abs()));
+    let mut worst = 0.0_f64;
+    let mut pair = |value: f64, (low, high): (f64, f64), (at_low, at_high): (f64, f64)| {
+        worst = worst.max(low - value).max(value - high).max(-at_low / size).max(-at_high / size);
+        for (distance, multiplier) in [(value - low, at_low), (high - value, at_high)] {
+            // Without a bound the multiplier is zero.
+            let product = if distance.is_finite() { distance.abs().min(1.0) * multiplier } else { multiplier };
+            worst = worst.max(product.abs() / size);
+        }
+    };
+    for i in 0..m {
+        let y = r.row_multipliers[i];
+        let bounds = (problem.row_lower[i], problem.row_upper[i]);
+        pair(rows[i], bounds, ((-y).max(0.0), y.max(0.0)));
+    }
+    for j in 0..n {
+        pair(r.x[j], (problem.lower[j], problem.upper[j]), (r.lower_multipliers[j], r.upper_multipliers[j]));
+    }
+    for j in 0..n {
+        let of_rows: f64 = (0..m).map(|i| r.row_multipliers[i] * jacobian[j * m + i]).sum();
+        let slope = gradient[j] + of_rows - r.lower_multipliers[j] + r.upper_multipliers[j];
+        worst = worst.max(slope.abs() / size);
+    }
+    worst
+}
+
+/// Random starts whose solve ends at a local minimum of the violation, although each problem is feasible.
+const LOCALLY_INFEASIBLE: [&str; 2] = ["HS63 from start 0", "HS104 from start 0"];
+
 #[test]
-fn converged_points_from_random_starts_satisfy_the_tolerances() {
-    let (mut solves, mut converged) = (0, 0);
+fn solves_from_random_starts_end_at_kkt_points() {
+    let mut infeasible = Vec::new();
     for problem in hock_schittkowski::all() {
         let mut seed = 777u64;
         let mut random = || {
             seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
         };
-        for _ in 0..3 {
+        for start in 0..3 {
             let x = problem.start.iter().map(|v| v + (1.0 + v.abs()) * random()).collect();
             let r = solve(&problem, &StartPoint::Cold(x), &NlpSettings::default(), &mut |_| {}, &|| false).unwrap();
-            solves += 1;
-            if r.status == NlpStatus::Converged {
-                converged += 1;
-                let s = r.scaled_residuals;
-                assert!(r.residuals.violation <= 1e-6, "{}: {r:?}", problem.name);
-                assert!(s.dual_infeasibility <= 1e-8 && s.complementarity <= 1e-8, "{}: {r:?}", problem.name);
-            } else {
-                assert!(r.status == NlpStatus::Infeasible && r.residuals.violation > 1e-6, "{}: {r:?}", problem.name);
+            let name = format!("{} from start {start}", problem.name);
+            if r.status == NlpStatus::Infeasible {
+                infeasible.push(name);
+                continue;
             }
+            assert_eq!(r.status, NlpStatus::Converged, "{name}");
+            let violation = kkt_violation(&problem, &r);
+            assert!(violation < 2e-6, "{name}: {violation}, {r:?}");
         }
     }
-    assert!(converged * 100 >= solves * 98, "{converged} of {solves}");
+    assert_eq!(infeasible, LOCALLY_INFEASIBLE);
 }
 
 #[test]

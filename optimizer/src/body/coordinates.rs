@@ -39,12 +39,6 @@ pub fn to_generalised(p: &[f64; LINKS]) -> [f64; LINKS] {
     [-(p[0] + left + right), left, -left_shank, p[3], right, -right_shank, p[6]]
 }
 
-/// Inverse of [`link_angles`]: relative angles from absolute link angles.
-#[inline]
-pub fn relative_angles(psi: &[f64; LINKS]) -> [f64; LINKS] {
-    [-psi[0], psi[1] - psi[0], psi[1] - psi[2], psi[3] - psi[2], psi[4] - psi[0], psi[4] - psi[5], psi[6] - psi[5]]
-}
-
 /// `A^T H A` for a 7 x 7 matrix H in link space, symmetric or not.
 #[inline]
 pub fn congruence(h: &[[f64; LINKS]; LINKS]) -> [[f64; LINKS]; LINKS] {

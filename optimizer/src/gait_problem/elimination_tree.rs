@@ -146,9 +146,8 @@ pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable, activations_are
     for (row, name) in rows.names.iter().enumerate() {
         tree.block_of_row[row] = match name.place {
             RowPlace::Stride => root,
-            RowPlace::Transition { domain } => transitions[usize::from(domain)],
-            RowPlace::Point { domain, point } => {
-                let (d, k) = (usize::from(domain), usize::from(point));
+            RowPlace::Transition { domain } => transitions[domain],
+            RowPlace::Point { domain: d, point: k } => {
                 let blocks = &domains[d];
                 let into_impact = CYCLE[(d + 1) % CYCLE.len()].opens_with_impact();
                 let before_impact = into_impact && k == layout.domains[d].last();
@@ -162,7 +161,7 @@ pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable, activations_are
                     RowKind::ContactVelocity | RowKind::OutputVelocity | RowKind::HipVelocity if before_impact => {
                         transitions[d]
                     }
-                    RowKind::MuscleForce => blocks.muscles[k] + usize::from(name.component),
+                    RowKind::MuscleForce => blocks.muscles[k] + name.component,
                     _ => blocks.points[k],
                 }
             }

@@ -1,13 +1,10 @@
 //! Rows of C8: Hermite-Simpson integration of fibre velocities to fibre lengths, in optimal fibre lengths.
 
 use super::entries::Entries;
+use super::hermite_simpson::{SLOPE, STATE};
 use super::programme::{DomainContext, GaitProgramme};
 use super::rows::DomainRows;
 use crate::muscle::MUSCLE_COUNT;
-
-/// Coefficients of (z0, zm, z1) and of h times (f0, fm, f1) in the rows of midpoint and endpoint.
-const STATE: [[f64; 3]; 2] = [[-0.5, 1.0, -0.5], [-1.0, 0.0, 1.0]];
-const SLOPE: [[f64; 3]; 2] = [[-1.0 / 8.0, 0.0, 1.0 / 8.0], [-1.0 / 6.0, -4.0 / 6.0, -1.0 / 6.0]];
 
 /// Values.
 pub(super) fn values(

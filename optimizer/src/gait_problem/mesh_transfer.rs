@@ -99,7 +99,7 @@ fn whatever_the_point(name: RowName) -> RowName {
 /// Position of a row in its domain, 0 to 1.
 fn sigma(programme: &GaitProgramme, name: RowName) -> f64 {
     let RowPlace::Point { domain, point } = name.place else { return 0.0 };
-    programme.layout.domains[usize::from(domain)].sigma(usize::from(point))
+    programme.layout.domains[domain].sigma(point)
 }
 
 /// Simpson weight of the node of a row; 1 for an integration row.
@@ -112,7 +112,7 @@ fn weight(programme: &GaitProgramme, name: RowName) -> f64 {
         | RowKind::EndpointPhaseRate
         | RowKind::MidpointFibre
         | RowKind::EndpointFibre => 1.0,
-        _ => programme.layout.domains[usize::from(domain)].simpson(usize::from(point)),
+        _ => programme.layout.domains[domain].simpson(point),
     }
 }
 
@@ -183,8 +183,7 @@ mod tests {
                 }
             }
             let rows = programme.rows.names.iter();
-            point.row_multipliers =
-                rows.map(|name| weight(programme, *name) * (1.0 + f64::from(name.component))).collect();
+            point.row_multipliers = rows.map(|name| weight(programme, *name) * (1.0 + name.component as f64)).collect();
             let tail = programme.layout.hip_velocities;
             for values in [&mut point.x, &mut point.lower_multipliers, &mut point.upper_multipliers] {
                 values[tail..].fill(4.0);

@@ -44,7 +44,7 @@ pub enum RowKind {
 
 impl RowKind {
     /// Number of the constraint in the paper.
-    pub fn constraint(self, component: u8) -> &'static str {
+    pub fn constraint(self, component: usize) -> &'static str {
         match self {
             Self::Dynamics
             | Self::ContactAcceleration
@@ -74,7 +74,7 @@ impl RowKind {
             Self::StepLength | Self::Speed => "C4",
             Self::MuscleForce => "C5-C7",
             Self::MidpointFibre | Self::EndpointFibre => "C8",
-            Self::MuscleTorque => ["C9", "C10", "C11", "C12"][usize::from(component).min(3)],
+            Self::MuscleTorque => ["C9", "C10", "C11", "C12"].get(component).copied().unwrap_or("C9-C12"),
         }
     }
 
@@ -119,14 +119,14 @@ pub enum RowPlace {
     /// Node `point` of domain `domain`.
     Point {
         /// 0..8.
-        domain: u8,
+        domain: usize,
         /// 0..K.
-        point: u16,
+        point: usize,
     },
     /// From the end of `domain` to the start of the next one.
     Transition {
         /// 0..8.
-        domain: u8,
+        domain: usize,
     },
     /// The whole stride.
     Stride,
@@ -140,7 +140,7 @@ pub struct RowName {
     /// Kind.
     pub kind: RowKind,
     /// Component; its meaning depends on the kind.
-    pub component: u8,
+    pub component: usize,
 }
 
 const COORDINATE_NAMES: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
@@ -161,51 +161,68 @@ fn contact_name(row: ContactRow) -> String {
     format!("{point}_{side} {axis}")
 }
 
+/// Name of a domain; a number that no domain has is named as such.
+fn domain_name(domain: usize) -> String {
+    CYCLE.get(domain).map_or_else(|| format!("domain {domain}"), |domain| domain.name().to_owned())
+}
+
 impl RowName {
-    /// Name of the component: a coordinate, a contact row, a muscle, ...
+    /// Name of the component: a coordinate, a contact row, a muscle, ... A component that the kind does not have is named
+    /// by its number, never as another one.
     pub fn component_name(&self) -> String {
-        let component = usize::from(self.component);
+        let component = self.component;
         let domain = match self.place {
-            RowPlace::Point { domain, .. } | RowPlace::Transition { domain } => CYCLE.get(usize::from(domain)).copied(),
+            RowPlace::Point { domain, .. } | RowPlace::Transition { domain } => CYCLE.get(domain).copied(),
             RowPlace::Stride => None,
         };
-        match self.kind {
+        let of = |names: &[&str]| names.get(component).map(|name| (*name).to_owned());
+        let name = match self.kind {
             RowKind::Dynamics | RowKind::PositionReset | RowKind::VelocityReset | RowKind::Impact => {
-                COORDINATE_NAMES[component.min(8)].to_owned()
+                of(&COORDINATE_NAMES)
             }
             RowKind::ContactAcceleration | RowKind::ContactPosition | RowKind::ContactVelocity => {
-                domain.and_then(|d| d.contact_rows().get(component).copied()).map_or_else(String::new, contact_name)
+                domain.and_then(|d| d.contact_rows().get(component).copied()).map(contact_name)
             }
             RowKind::OutputPosition | RowKind::OutputVelocity | RowKind::OutputAcceleration => domain
                 .and_then(|d| d.outputs().get(component).copied())
-                .map_or_else(String::new, |i| COORDINATE_NAMES[i].to_owned()),
-            RowKind::Friction => format!(
-                "{} foot, {} edge",
-                if component < 2 { "stance" } else { "trailing" },
-                if component % 2 == 0 { "forward" } else { "backward" }
-            ),
-            RowKind::ImpactFriction => {
-                format!("landing heel, {} edge", if component == 0 { "forward" } else { "backward" })
-            }
+                .and_then(|i| COORDINATE_NAMES.get(i))
+                .map(|name| (*name).to_owned()),
+            RowKind::Friction => of(&[
+                "stance foot, forward edge",
+                "stance foot, backward edge",
+                "trailing foot, forward edge",
+                "trailing foot, backward edge",
+            ]),
+            RowKind::ImpactFriction => of(&["landing heel, forward edge", "landing heel, backward edge"]),
             RowKind::Height | RowKind::Clearance | RowKind::TouchdownSpeed => {
-                ["heel_L", "toe_L", "heel_R", "toe_R"][component.min(3)].to_owned()
+                of(&["heel_L", "toe_L", "heel_R", "toe_R"])
             }
             RowKind::FibreReset | RowKind::MuscleForce | RowKind::MidpointFibre | RowKind::EndpointFibre => {
-                MUSCLES[component.min(MUSCLE_COUNT - 1)].name.to_owned()
+                MUSCLES.get(component).map(|muscle| muscle.name.to_owned())
             }
-            RowKind::MuscleTorque => ["hip_L", "knee_L", "ankle_L", "hip_R"][component.min(3)].to_owned(),
-            RowKind::StepLength => ["right step", "left step"][component.min(1)].to_owned(),
-            _ => String::new(),
-        }
+            RowKind::MuscleTorque => of(&["hip_L", "knee_L", "ankle_L", "hip_R"]),
+            RowKind::StepLength => of(&["right step", "left step"]),
+            RowKind::HipPhase
+            | RowKind::HipVelocity
+            | RowKind::HipAcceleration
+            | RowKind::MidpointPhase
+            | RowKind::EndpointPhase
+            | RowKind::MidpointPhaseRate
+            | RowKind::EndpointPhaseRate
+            | RowKind::PhaseEnd
+            | RowKind::PhaseRate
+            | RowKind::Speed => of(&[""]),
+        };
+        name.unwrap_or_else(|| format!("component {component}"))
     }
 
     /// `SS1_R node 3, C3 swing-foot clearance, heel_L`.
     pub fn label(&self) -> String {
         let place = match self.place {
-            RowPlace::Point { domain, point } => format!("{} node {point}", CYCLE[usize::from(domain).min(7)].name()),
+            RowPlace::Point { domain, point } => format!("{} node {point}", domain_name(domain)),
             RowPlace::Transition { domain } => {
-                let from = usize::from(domain).min(7);
-                format!("{} to {}", CYCLE[from].name(), CYCLE[(from + 1) % 8].name())
+                let next = if domain + 1 == CYCLE.len() { 0 } else { domain + 1 };
+                format!("{} to {}", domain_name(domain), domain_name(next))
             }
             RowPlace::Stride => "stride".to_owned(),
         };
@@ -319,7 +336,6 @@ impl RowTable {
     fn add(&mut self, place: RowPlace, kind: RowKind, count: usize, lower: f64, upper: f64) -> usize {
         let first = self.names.len();
         for component in 0..count {
-            let component = u8::try_from(component).unwrap_or(u8::MAX);
             self.names.push(RowName { place, kind, component });
             self.lower.push(lower);
             self.upper.push(upper);
@@ -329,7 +345,7 @@ impl RowTable {
 
     fn add_one(&mut self, place: RowPlace, kind: RowKind, component: usize, lower: f64, upper: f64) -> usize {
         let row = self.add(place, kind, 1, lower, upper);
-        self.names[row].component = u8::try_from(component).unwrap_or(u8::MAX);
+        self.names[row].component = component;
         row
     }
 
@@ -337,18 +353,15 @@ impl RowTable {
     /// steps, touchdown and phase rate.
     pub fn new(layout: &Layout) -> Self {
         let mut table = Self::default();
-        for (d, domain_layout) in layout.domains.iter().enumerate() {
+        for (domain, domain_layout) in layout.domains.iter().enumerate() {
             let mut rows = DomainRows::default();
             for k in 0..domain_layout.points {
-                let point = table.point_rows(layout, d, k);
+                let point = table.point_rows(layout, domain, k);
                 rows.points.push(point);
             }
-            let domain = u8::try_from(d).unwrap_or(0);
-            let last = RowPlace::Point { domain, point: u16::try_from(domain_layout.last()).unwrap_or(u16::MAX) };
-            let interval_end =
-                |i: usize| RowPlace::Point { domain, point: u16::try_from(2 * i + 2).unwrap_or(u16::MAX) };
-            let interval_mid =
-                |i: usize| RowPlace::Point { domain, point: u16::try_from(2 * i + 1).unwrap_or(u16::MAX) };
+            let last = RowPlace::Point { domain, point: domain_layout.last() };
+            let interval_end = |i: usize| RowPlace::Point { domain, point: 2 * i + 2 };
+            let interval_mid = |i: usize| RowPlace::Point { domain, point: 2 * i + 1 };
             if domain_layout.domain.kind == DomainKind::Ss1 {
                 rows.zero_dynamics = Some(table.names.len());
                 for i in 0..domain_layout.intervals {
@@ -368,7 +381,7 @@ impl RowTable {
             }
             let transition = RowPlace::Transition { domain };
             rows.position_reset = table.add(transition, RowKind::PositionReset, 9, 0.0, 0.0);
-            let next = CYCLE[(d + 1) % CYCLE.len()];
+            let next = CYCLE[(domain + 1) % CYCLE.len()];
             if next.opens_with_impact() {
                 rows.velocity_reset = table.add(transition, RowKind::Impact, 9, 0.0, 0.0);
                 if next.kind == DomainKind::Ds2 {
@@ -391,8 +404,7 @@ impl RowTable {
         let domain_layout = &layout.domains[d];
         let domain = domain_layout.domain;
         let (nc, ny) = (domain_layout.contacts, domain_layout.outputs.len());
-        let place =
-            RowPlace::Point { domain: u8::try_from(d).unwrap_or(0), point: u16::try_from(k).unwrap_or(u16::MAX) };
+        let place = RowPlace::Point { domain: d, point: k };
         let first = k == 0;
         let mut equality = |kind, count| self.add(place, kind, count, 0.0, 0.0);
         let mut rows = PointRows {
@@ -489,5 +501,39 @@ impl RowTable {
                 rows.heights.push(HeightRow { foot_point, row, clearance });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn row_outside_the_tables_is_not_labelled_as_another_row() {
+        let label = |place, kind, component| RowName { place, kind, component }.label();
+        let node = RowPlace::Point { domain: 3, point: 70_000 };
+        assert_eq!(
+            label(node, RowKind::Dynamics, 8),
+            format!("{} node 70000, C1 equation of motion, ankle_R", CYCLE[3].name())
+        );
+        for kind in [
+            RowKind::Dynamics,
+            RowKind::ContactPosition,
+            RowKind::OutputPosition,
+            RowKind::Friction,
+            RowKind::ImpactFriction,
+            RowKind::Clearance,
+            RowKind::MuscleForce,
+            RowKind::MuscleTorque,
+            RowKind::StepLength,
+            RowKind::Speed,
+        ] {
+            assert!(label(node, kind, 300).ends_with(", component 300"), "{}", label(node, kind, 300));
+        }
+        assert!(label(node, RowKind::MuscleTorque, 4).contains("C9-C12"));
+        assert!(label(RowPlace::Point { domain: 9, point: 0 }, RowKind::Speed, 0).starts_with("domain 9 node 0"));
+        let last = label(RowPlace::Transition { domain: 7 }, RowKind::Impact, 0);
+        assert!(last.starts_with(&format!("{} to {}", CYCLE[7].name(), CYCLE[0].name())), "{last}");
+        assert!(label(RowPlace::Transition { domain: 8 }, RowKind::Impact, 0).starts_with("domain 8 to domain 9"));
     }
 }

@@ -4,6 +4,7 @@
 //! h/6 (f_0 + 4 f_m + f_1)` for (z, f) = (dp, dp_dot) and (dp_dot, dp_ddot). The phase limit pb is dp at the last node.
 
 use super::entries::Entries;
+use super::hermite_simpson::{SLOPE, STATE};
 use super::layout::{Q, QD, QDD};
 use super::programme::{DomainContext, GaitProgramme};
 use super::rows::DomainRows;
@@ -38,10 +39,6 @@ pub(super) fn values(
         g[row] = context.phase.derivatives(&point)[0] - programme.layout.value(x, end);
     }
 }
-
-/// Coefficients of (z0, zm, z1) and of h times (f0, fm, f1) in the rows of midpoint and endpoint.
-const STATE: [[f64; 3]; 2] = [[-0.5, 1.0, -0.5], [-1.0, 0.0, 1.0]];
-const SLOPE: [[f64; 3]; 2] = [[-1.0 / 8.0, 0.0, 1.0 / 8.0], [-1.0 / 6.0, -4.0 / 6.0, -1.0 / 6.0]];
 
 /// Jacobian.
 pub(super) fn jacobian(

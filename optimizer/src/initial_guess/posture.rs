@@ -210,7 +210,7 @@ fn linearised_step(
         let mut grounded = [false; 4];
         let within = !last;
         if within {
-            for &(d, k) in &instant.members {
+            for &(d, _) in &instant.members {
                 for (contact, target, foot_point) in programme.contact_targets_at(d, right_step, stride) {
                     let seen = grounded[foot_point] && contact.axis == Axis::Z;
                     let flat_x = contact.axis == Axis::X
@@ -233,7 +233,6 @@ fn linearised_step(
                     }
                     equality_rhs.push(target - position);
                 }
-                let _ = k;
             }
             for (foot_point, on_ground) in grounded.iter().enumerate() {
                 if *on_ground {

@@ -14,7 +14,8 @@ pub struct SolveOptions {
     pub tolerance: f64,
     /// Largest number of iterations of each phase; tracking phases have at most 200.
     pub max_iterations: usize,
-    /// Largest wall time of the whole solve, s; `None` for no limit.
+    /// Largest wall time of the whole solve, s; `None` for no limit. With a limit, equal inputs need not give equal bits:
+    /// the machine's speed decides which attempts and iterations come before it.
     pub time_limit_s: Option<f64>,
     /// Number of threads, 1 to 16: for initial guesses in parallel, then for the linear algebra of each. The result
     /// does not depend on it.

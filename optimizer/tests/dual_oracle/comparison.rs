@@ -276,7 +276,7 @@ fn curvature(
 }
 
 /// The domain of a group of rows, for messages and for parts of the Hessian.
-fn group(name: RowName) -> (String, u8) {
+fn group(name: RowName) -> (String, usize) {
     let domain = match name.place {
         RowPlace::Point { domain, .. } | RowPlace::Transition { domain } => domain,
         RowPlace::Stride => 8,
@@ -286,7 +286,7 @@ fn group(name: RowName) -> (String, u8) {
 
 /// Rows with second derivatives that are not all zero: rows with rotations, phases, muscle curves or products with a
 /// duration. The phase of the Bezier curves depends on the state in SS1 only.
-fn is_curved(kind: RowKind, domain: u8) -> bool {
+fn is_curved(kind: RowKind, domain: usize) -> bool {
     let ss1 = domain % 4 == 3;
     match kind {
         RowKind::OutputPosition => return ss1,
@@ -313,7 +313,7 @@ fn hessian_of_the_lagrangian_matches_dual_numbers() {
     each_case(|pair, x, random| {
         let (n, m) = (pair.production.variables(), pair.production.rows());
         let mut values = vec![0.0; pair.production.hessian_pattern().row_indices.len()];
-        let mut groups: BTreeMap<(String, u8), Vec<usize>> = BTreeMap::new();
+        let mut groups: BTreeMap<(String, usize), Vec<usize>> = BTreeMap::new();
         for (row, name) in pair.names().iter().enumerate() {
             groups.entry(group(*name)).or_default().push(row);
         }

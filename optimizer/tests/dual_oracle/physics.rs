@@ -244,7 +244,7 @@ fn standing() -> PointVariables {
 /// The (row, component) of a kind at a point or transition.
 fn rows_of(programme: &GaitProgramme, place: RowPlace, kind: RowKind) -> Vec<(usize, usize)> {
     let names = programme.rows.names.iter().enumerate();
-    names.filter(|(_, n)| n.place == place && n.kind == kind).map(|(i, n)| (i, usize::from(n.component))).collect()
+    names.filter(|(_, n)| n.place == place && n.kind == kind).map(|(i, n)| (i, n.component)).collect()
 }
 
 #[test]

@@ -26,12 +26,11 @@ pub(crate) struct Rows<D> {
 
 impl<D: Scalar> Rows<D> {
     fn add(&mut self, kind: RowKind, component: usize, value: D) {
-        let component = u8::try_from(component).unwrap();
         self.list.push((RowName { place: self.place, kind, component }, value));
     }
 
     fn at(&mut self, domain: usize, point: usize) {
-        self.place = RowPlace::Point { domain: u8::try_from(domain).unwrap(), point: u16::try_from(point).unwrap() };
+        self.place = RowPlace::Point { domain, point };
     }
 }
 
@@ -337,7 +336,7 @@ fn transition_rows<D: Scalar>(problem: &Problem, gait: &GaitVariables<D>, d: usi
     let next = (d + 1) % 8;
     let before = &gait.domains[d].points[problem.domains[d].points() - 1];
     let after = &gait.domains[next].points[0];
-    rows.place = RowPlace::Transition { domain: u8::try_from(d).unwrap() };
+    rows.place = RowPlace::Transition { domain: d };
     for i in 0..9 {
         let shift = if i == 0 && next == 0 { gait.stride } else { constant(0.0) };
         rows.add(RowKind::PositionReset, i, after.q[i] - (before.q[i] - shift));
