@@ -15,7 +15,7 @@ const DRAWS: usize = 1000;
 pub const MOST_ANSWERS: usize = 1500;
 /// Number of studies whose results are cached.
 const KEPT: usize = 16;
-/// Number of studies whose learner is cached, so that the next posterior is an update.
+/// Number of studies whose learner is cached, so that a proposal and the pages share one fit.
 const KEPT_LEARNERS: usize = 4;
 /// The learner of a study with more trials is not cached: its memory grows with the square, here to about 100 MB.
 const MOST_KEPT_TRIALS: usize = 2000;
