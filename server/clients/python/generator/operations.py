@@ -195,7 +195,8 @@ def module(tag: str, operations: list[Operation]) -> str:
     about = f"Operations with the tag `{tag}`."
     words = re.split(r"\W+", methods + " ".join(aliases))
     lines = [header(about), "from __future__ import annotations", "", *imports(operations, words)]
-    lines += [*([""] if aliases else []), *aliases, "", "", f"class {camel(tag)}Methods(Transport):", f'    """{about}"""', ""]
+    lines += ["", *aliases] if aliases else []
+    lines += ["", "", f"class {camel(tag)}Methods(Transport):", f'    """{about}"""', ""]
     return "\n".join(lines) + "\n" + methods
 
 
