@@ -58,5 +58,5 @@ def follow(
         except (OSError, http.client.HTTPException):
             if failures + 1 >= transport.tries:
                 raise
-        time.sleep(0.2 * 2**failures)
+        time.sleep(min(0.2 * 2**failures, 10))
         failures += 1
