@@ -40,7 +40,7 @@ class Operation:
 
     def type_of(self, schema: Schema) -> str:
         name = python_type(schema, no_inline)
-        self.used.update(word for word in name.replace("[", " ").replace("]", " ").split() if word in self.schemas)
+        self.used.update(word for word in re.findall(r"\w+", name) if word in self.schemas)
         return name
 
     def success(self) -> tuple[str, Schema]:
