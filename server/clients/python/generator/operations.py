@@ -153,10 +153,8 @@ class Operation:
         parameters = self.parameters()
         lines = [f"    def {self.name}({', '.join(parameters)}) -> {result}:"]
         if len(lines[0]) > 120:
-            # A comma after `**body` is a syntax error in Python 3.9.
-            comma = "" if parameters[-1].startswith("**") else ","
             inner = ",\n        ".join(parameters)
-            lines = [f"    def {self.name}(", f"        {inner}{comma}", f"    ) -> {result}:"]
+            lines = [f"    def {self.name}(", f"        {inner},", f"    ) -> {result}:"]
         lines += docstring(self.about(), "        ")
         call = f"{function}({', '.join(arguments)})"
         line = f"        return cast({cast}, {call})" if cast else f"        return {call}"

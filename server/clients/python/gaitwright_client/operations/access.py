@@ -76,7 +76,7 @@ class AccessMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyAccess]
+        **body: Unpack[StudyAccess],
     ) -> StudyAccess:
         """Restrict or open a study.
 
@@ -128,7 +128,7 @@ class AccessMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewMember]
+        **body: Unpack[NewMember],
     ) -> Member:
         """Add a member to a study.
 

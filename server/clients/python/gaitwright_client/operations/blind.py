@@ -32,7 +32,7 @@ class BlindMethods(Transport):
         token: str,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[RaterAnswer]
+        **body: Unpack[RaterAnswer],
     ) -> Answered:
         """Answer a blind pair.
 
@@ -90,7 +90,7 @@ class BlindMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Unblind]
+        **body: Unpack[Unblind],
     ) -> UnblindedRater:
         """Unblind a rater.
 

@@ -48,7 +48,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewLabAnswer]
+        **body: Unpack[NewLabAnswer],
     ) -> InTheLab:
         """Record the answer of the subject.
 
@@ -72,7 +72,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Closing]
+        **body: Unpack[Closing],
     ) -> SessionView:
         """Close a lab session.
 
@@ -137,7 +137,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Processing]
+        **body: Unpack[Processing],
     ) -> EmgView:
         """Process EMG recordings.
 
@@ -185,7 +185,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewEmg]
+        **body: Unpack[NewEmg],
     ) -> MeasurementFile:
         """Upload an EMG recording of a walk.
 
@@ -209,7 +209,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewMotion]
+        **body: Unpack[NewMotion],
     ) -> MeasurementFile:
         """Upload joint angles of a walk.
 
@@ -252,7 +252,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[UnblindSession]
+        **body: Unpack[UnblindSession],
     ) -> SessionView:
         """Unblind a lab session.
 
@@ -277,7 +277,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[RecordedWalk]
+        **body: Unpack[RecordedWalk],
     ) -> InTheLab:
         """Record a walk.
 
@@ -324,7 +324,7 @@ class LabMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewSession]
+        **body: Unpack[NewSession],
     ) -> SessionView:
         """Plan a lab session.
 

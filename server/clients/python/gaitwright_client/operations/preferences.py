@@ -43,7 +43,7 @@ class PreferencesMethods(Transport):
         assessment_id: AssessmentId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Retract]
+        **body: Unpack[Retract],
     ) -> Assessment:
         """Retract an assessment.
 
@@ -71,7 +71,7 @@ class PreferencesMethods(Transport):
         preference_id: FeedbackId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Retract]
+        **body: Unpack[Retract],
     ) -> FeedbackRow:
         """Retract a preference.
 
@@ -102,7 +102,7 @@ class PreferencesMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewAssessment]
+        **body: Unpack[NewAssessment],
     ) -> Assessment:
         """Record an assessment of two gaits.
 
@@ -134,7 +134,7 @@ class PreferencesMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewPreference]
+        **body: Unpack[NewPreference],
     ) -> Recorded:
         """Record a preference.
 
@@ -179,7 +179,7 @@ class PreferencesMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Suggestion]
+        **body: Unpack[Suggestion],
     ) -> FeedbackRow:
         """Record a suggestion.
 
@@ -203,7 +203,7 @@ class PreferencesMethods(Transport):
         trial_id: TrialId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewSafetyReport]
+        **body: Unpack[NewSafetyReport],
     ) -> SafetyReport:
         """Report a gait as unsafe.
 
@@ -228,7 +228,7 @@ class PreferencesMethods(Transport):
         trial_id: TrialId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[SafetyReviewToMake]
+        **body: Unpack[SafetyReviewToMake],
     ) -> SafetyReview:
         """Review the safety reports of a gait.
 

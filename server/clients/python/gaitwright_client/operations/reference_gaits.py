@@ -33,7 +33,7 @@ class ReferenceGaitsMethods(Transport):
         self,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewReferenceGait]
+        **body: Unpack[NewReferenceGait],
     ) -> ReferenceGait:
         """Import a reference gait from a recording.
 

@@ -75,7 +75,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Change]
+        **body: Unpack[Change],
     ) -> StudyView:
         """Update a study.
 
@@ -119,7 +119,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Extend]
+        **body: Unpack[Extend],
     ) -> StudyView:
         """Raise the trial budget of a study.
 
@@ -144,7 +144,7 @@ class StudiesMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Fork]
+        **body: Unpack[Fork],
     ) -> StudyView:
         """Fork a study.
 
@@ -190,7 +190,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why]
+        **body: Unpack[Why],
     ) -> StudyView:
         """Pause a study.
 
@@ -230,7 +230,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why]
+        **body: Unpack[Why],
     ) -> StudyView:
         """Resume a study.
 
@@ -254,7 +254,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why]
+        **body: Unpack[Why],
     ) -> StudyView:
         """Start a study.
 
@@ -278,7 +278,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why]
+        **body: Unpack[Why],
     ) -> StudyView:
         """Stop a study.
 

@@ -59,7 +59,7 @@ class SubjectsMethods(Transport):
         subject_id: SubjectId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewConsent]
+        **body: Unpack[NewConsent],
     ) -> Consent:
         """Record consent.
 
@@ -88,7 +88,7 @@ class SubjectsMethods(Transport):
         subject_id: SubjectId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewCorrection]
+        **body: Unpack[NewCorrection],
     ) -> Correction:
         """Correct height and mass of a subject.
 
@@ -119,7 +119,7 @@ class SubjectsMethods(Transport):
         subject_id: SubjectId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[MuscleParameters]
+        **body: Unpack[MuscleParameters],
     ) -> MuscleParameters:
         """Set measured muscle values of a subject.
 
@@ -150,7 +150,7 @@ class SubjectsMethods(Transport):
         subject_id: SubjectId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Withdrawal]
+        **body: Unpack[Withdrawal],
     ) -> Consent:
         """Withdraw consent.
 
