@@ -266,6 +266,15 @@ impl Service {
         router(self.state()).layer(map_request(for_localhost))
     }
 
+    /// Answers requests on a port of its own, for programs. Returns the address, without a scheme.
+    pub async fn listening(&self) -> String {
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let router = self.router();
+        tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
+        address
+    }
+
     /// `GET`.
     pub async fn fetch(&self, path: &str) -> Answer {
         self.send(Request::get(path).body(Body::empty()).unwrap()).await

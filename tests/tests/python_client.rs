@@ -1,53 +1,131 @@
-//! The Python client: the description has each of its operations, and its example runs to the end. Without python3 the
-//! test is skipped with a message.
+//! The Python client: it is what its generator makes of the description, its types hold, and the example, the guide and
+//! the notebook run against a service. Where python3 or a module is absent, a test is skipped with a message.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_http::openapi;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::skipped::skipped;
 use serde_json::Value;
-use std::path::PathBuf;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
 
-fn python(arguments: &[&str]) -> Option<String> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../server/clients/python");
-    let output = Command::new("python3").arg("-B").args(arguments).current_dir(folder).output();
-    let Ok(output) = output else {
-        skipped("there is no python3");
+/// The address in the guide and in the notebook.
+const ADDRESS: &str = "127.0.0.1:8080";
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn python(arguments: &[&str]) -> std::io::Result<Output> {
+    Command::new("python3")
+        .arg("-B")
+        .args(arguments)
+        .env("MPLBACKEND", "Agg")
+        .current_dir(repository().join("server/clients/python"))
+        .output()
+}
+
+/// Whether python3 has these modules. Otherwise the test is skipped.
+fn has(modules: &[&str]) -> bool {
+    for import in modules.iter().map(|module| format!("import {module}")) {
+        if !python(&["-c", &import]).is_ok_and(|output| output.status.success()) {
+            skipped(&format!("python3 cannot {import}"));
+            return false;
+        }
+    }
+    true
+}
+
+/// What a Python program with these modules prints, or `None` if it is skipped. A program that fails fails the test.
+fn ran(modules: &[&str], arguments: &[&str]) -> Option<String> {
+    if !has(modules) {
         return None;
-    };
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    Some(String::from_utf8(output.stdout).unwrap())
+    }
+    let output = python(arguments).unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    Some(text)
+}
+
+async fn ran_beside(modules: &[&str], arguments: Vec<String>) -> Option<String> {
+    // Asked on the thread of the test, because its name is in the message.
+    if !has(modules) {
+        return None;
+    }
+    #[allow(clippy::disallowed_methods)] // a test waits for a process or a thread
+    let beside =
+        tokio::task::spawn_blocking(move || ran(&[], &arguments.iter().map(String::as_str).collect::<Vec<_>>()));
+    beside.await.unwrap()
+}
+
+async fn service() -> (TempDir, Service, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let address = service.listening().await;
+    (folder, service, address)
 }
 
 #[test]
-fn every_operation_of_the_client_is_in_the_description() {
-    let program = "import json, gaitwright_client as g\n\
-                   print(json.dumps([[n, *o, callable(getattr(g.Client, n, None))] for n, o in g.OPERATIONS.items()]))";
-    let Some(text) = python(&["-c", program]) else { return };
-    let known: Vec<(String, String, String, bool)> = serde_json::from_str(&text).unwrap();
-    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
-    assert!(known.len() > 20);
-    for (name, method, path, is_method) in known {
-        assert!(document["paths"][&path][&method].is_object(), "{name}: {method} {path} is not described");
-        assert!(is_method || name == "tell", "{name} is listed and cannot be called");
-    }
+fn the_client_is_what_the_generator_makes_of_the_description() {
+    // `json` is in every Python: without it there is no python3.
+    ran(&["json"], &["generate.py", "--check"]);
+}
+
+#[test]
+fn the_client_repeats_pages_follows_and_waits() {
+    ran(&["json"], &["-m", "unittest", "--quiet"]);
+}
+
+#[test]
+fn the_types_of_the_client_are_strict() {
+    ran(&["mypy", "numpy"], &["-m", "mypy", "--cache-dir=/dev/null", "."]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_example_runs_a_study_to_its_end() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let address = format!("http://{}", listener.local_addr().unwrap());
-    let router = service.router();
-    tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
-    #[allow(clippy::disallowed_methods)] // a test waits for a process or a thread
-    let ran = tokio::task::spawn_blocking(move || python(&["example.py", &address])).await.unwrap();
-    let Some(text) = ran else { return };
+    let (_folder, service, address) = service().await;
+    let arguments = vec!["example.py".to_owned(), format!("http://{address}")];
+    let Some(text) = ran_beside(&["json"], arguments).await else { return };
     assert_eq!(text.lines().filter(|line| line.starts_with("trial ")).count(), 10, "{text}");
-    assert!(text.lines().last().unwrap().starts_with("best: trial "), "{text}");
+    assert!(text.lines().last().unwrap().starts_with("finished; best: trial "), "{text}");
+    service.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_programs_of_the_guide_run() {
+    let (_folder, service, address) = service().await;
+    let guide = std::fs::read_to_string(repository().join("docs/lab-script.md")).unwrap();
+    let blocks: Vec<&str> = guide.split("```python\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    assert_eq!(blocks.len(), 3, "a loop, a wait, and tables");
+    assert!(blocks[0].contains(ADDRESS));
+    let program = |blocks: &[&str]| vec!["-c".to_owned(), blocks.concat().replace(ADDRESS, &address)];
+    let Some(text) = ran_beside(&["json"], program(&blocks[..2])).await else { return };
+    assert!(text.contains("{'a1': ") && text.contains("'converged': 3"), "{text}");
+    if let Some(with_tables) = ran_beside(&["numpy"], program(&blocks)).await {
+        assert!(with_tables.lines().count() > text.lines().count(), "{with_tables}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_notebook_plots_a_gait_and_its_rmse() {
+    let (_folder, service, address) = service().await;
+    let study = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let text = std::fs::read_to_string(repository().join("server/clients/python/gait.ipynb")).unwrap();
+    let notebook: Value = serde_json::from_str(&text).unwrap();
+    let mut program = String::new();
+    for cell in notebook["cells"].as_array().unwrap().iter().filter(|cell| cell["cell_type"] == "code") {
+        assert_eq!(cell["outputs"], serde_json::json!([]), "the notebook is kept without outputs");
+        program.extend(cell["source"].as_array().unwrap().iter().map(|line| line.as_str().unwrap()));
+        program.push('\n');
+    }
+    assert!(program.contains(ADDRESS));
+    let program = program.replace(ADDRESS, &address) + "print([len(plt.figure(n).axes) for n in plt.get_fignums()])";
+    let Some(text) = ran_beside(&["matplotlib", "numpy"], vec!["-c".to_owned(), program]).await else { return };
+    assert_eq!(text.trim(), "[5, 1]");
     service.stop().await;
 }

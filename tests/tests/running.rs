@@ -16,15 +16,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// The service on its own port, for concurrent clients.
-async fn listening(service: &Service) -> String {
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let address = listener.local_addr().unwrap().to_string();
-    let router = service.router();
-    tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
-    address
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn health_answers_while_eight_requests_compute() {
     let folder = tempfile::tempdir().unwrap();
@@ -40,7 +31,7 @@ async fn health_answers_while_eight_requests_compute() {
         large::fill_to(&database, study, 390).await;
     }
     let service = Service::start(&database, Analytic::default(), 1).await;
-    let address = listening(&service).await;
+    let address = service.listening().await;
     let begun = Instant::now();
     let slow: Vec<_> = (0..8)
         .map(|_| {

@@ -10,8 +10,11 @@ use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::skipped::skipped;
 use serde_json::{Value, json};
 use std::collections::HashMap;
+use std::path::Path;
+use std::process::Command;
 use tempfile::TempDir;
 
 async fn service() -> (TempDir, Service) {
@@ -58,6 +61,26 @@ async fn a_script_asks_and_tells_until_the_study_is_finished_and_twice_gives_the
     assert_eq!(run(&service, second, "rig", 8).await, done, "the same seed and results give the same suggestions");
     let late = service.post(&format!("/api/v1/studies/{second}/ask"), &json!({})).await;
     assert_eq!(late.status, StatusCode::CONFLICT, "{}", late.text);
+    service.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_octave_script_runs_a_study_to_its_end() {
+    let (_folder, service) = service().await;
+    if Command::new("curl").arg("--version").output().is_err() {
+        return skipped("there is no curl");
+    }
+    let command = format!("ask_tell('http://{}')", service.listening().await);
+    #[allow(clippy::disallowed_methods)] // a test waits for a process or a thread
+    let ran = tokio::task::spawn_blocking(move || {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/clients/matlab");
+        Command::new("octave-cli").args(["--no-init-file", "--eval", &command]).current_dir(folder).output()
+    });
+    let Ok(output) = ran.await.unwrap() else { return skipped("there is no octave-cli") };
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(text.lines().filter(|line| line.starts_with("trial ")).count(), 10, "{text}");
+    assert!(text.lines().last().unwrap().starts_with("best: trial "), "{text}");
     service.stop().await;
 }
 

@@ -1,0 +1,253 @@
+"""Operations with the tag `access`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    Invitation,
+    Invited,
+    Link,
+    MadeToken,
+    Me,
+    Member,
+    MemberId,
+    NewMember,
+    NewRole,
+    NewToken,
+    NewUser,
+    Session,
+    SessionId,
+    StudyAccess,
+    StudyId,
+    Token,
+    TokenId,
+    User,
+    UserId,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class AccessMethods(Transport):
+    """Operations with the tag `access`."""
+
+    def get_caller(self) -> Me:
+        """Get the caller.
+
+        Name, role and rights of the caller.
+        """
+        return cast(Me, self.request_json("GET", "/api/v1/me"))
+
+    def list_sessions(self, *, page_size: Optional[int] = None) -> Pages[Session]:
+        """List sessions.
+
+        Active sessions of the caller, or of all users for an administrator, newest first.
+        """
+        return Pages(self, "/api/v1/sessions", query={"limit": page_size})
+
+    def end_session(self, session_id: SessionId, *, idempotency_key: Optional[str] = None) -> Session:
+        """End a session.
+
+        Ends a session of the caller or, for an administrator, of any user.
+        """
+        return cast(
+            Session,
+            self.request_json(
+                "POST",
+                "/api/v1/sessions/{id}/end",
+                {"id": session_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def get_study_access(self, study_id: StudyId) -> StudyAccess:
+        """Get the access restriction of a study."""
+        return cast(StudyAccess, self.request_json("GET", "/api/v1/studies/{id}/access", {"id": study_id}))
+
+    def set_study_access(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[StudyAccess],
+    ) -> StudyAccess:
+        """Restrict or open a study.
+
+        Restricts the study to members and administrators, or opens it to all staff. The caller who restricts it becomes
+        a member.
+
+        Fields: restricted.
+        """
+        return cast(
+            StudyAccess,
+            self.request_json(
+                "PUT",
+                "/api/v1/studies/{id}/access",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def invite_rater(self, study_id: StudyId, **body: Unpack[Invitation]) -> Invited:
+        """Invite a rater.
+
+        Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
+
+        Fields: name.
+        """
+        return cast(
+            Invited,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/invitations",
+                {"id": study_id},
+                body=body,
+                repeatable=False,
+            ),
+        )
+
+    def list_study_members(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Member]:
+        """List members of a study.
+
+        Raters can access studies of which they are members. Clinicians, and tokens with more scopes than `rate`, can
+        access every unrestricted study, and restricted studies as members. A request for any other study is answered
+        with 404.
+        """
+        return Pages(self, "/api/v1/studies/{id}/members", {"id": study_id}, query={"limit": page_size})
+
+    def add_study_member(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewMember],
+    ) -> Member:
+        """Add a member to a study.
+
+        Assigns a rater, or adds a clinician or a token.
+
+        Fields: kind, name.
+        """
+        return cast(
+            Member,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/members",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_study_member(self, study_member_id: MemberId) -> Member:
+        """Get a study member.
+
+        Includes memberships that have ended.
+        """
+        return cast(Member, self.request_json("GET", "/api/v1/study-members/{id}", {"id": study_member_id}))
+
+    def remove_study_member(self, study_member_id: MemberId, *, idempotency_key: Optional[str] = None) -> Member:
+        """Remove a study member."""
+        return cast(
+            Member,
+            self.request_json(
+                "POST",
+                "/api/v1/study-members/{id}/remove",
+                {"id": study_member_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def list_tokens(self, *, page_size: Optional[int] = None) -> Pages[Token]:
+        """List tokens.
+
+        Oldest first.
+        """
+        return Pages(self, "/api/v1/tokens", query={"limit": page_size})
+
+    def create_token(self, **body: Unpack[NewToken]) -> MadeToken:
+        """Create a token.
+
+        Does not accept an Idempotency-Key, because the secret is not stored.
+
+        Fields: name, scopes; optionally days.
+        """
+        return cast(MadeToken, self.request_json("POST", "/api/v1/tokens", body=body, repeatable=False))
+
+    def get_token(self, token_id: TokenId) -> Token:
+        """Get a token."""
+        return cast(Token, self.request_json("GET", "/api/v1/tokens/{id}", {"id": token_id}))
+
+    def revoke_token(self, token_id: TokenId, *, idempotency_key: Optional[str] = None) -> Token:
+        """Revoke a token."""
+        return cast(
+            Token,
+            self.request_json(
+                "POST",
+                "/api/v1/tokens/{id}/revoke",
+                {"id": token_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def list_users(self, *, page_size: Optional[int] = None) -> Pages[User]:
+        """List users.
+
+        Oldest first.
+        """
+        return Pages(self, "/api/v1/users", query={"limit": page_size})
+
+    def create_user(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewUser]) -> User:
+        """Add a user.
+
+        Fields: name, role.
+        """
+        return cast(User, self.request_json("POST", "/api/v1/users", body=body, key=idempotency_key))
+
+    def get_user(self, user_id: UserId) -> User:
+        """Get a user."""
+        return cast(User, self.request_json("GET", "/api/v1/users/{id}", {"id": user_id}))
+
+    def disable_user(self, user_id: UserId, *, idempotency_key: Optional[str] = None) -> User:
+        """Disable a user.
+
+        Ends the sessions, links and tokens of the user.
+        """
+        return cast(User, self.request_json("POST", "/api/v1/users/{id}/disable", {"id": user_id}, key=idempotency_key))
+
+    def enable_user(self, user_id: UserId, *, idempotency_key: Optional[str] = None) -> User:
+        """Enable a user."""
+        return cast(User, self.request_json("POST", "/api/v1/users/{id}/enable", {"id": user_id}, key=idempotency_key))
+
+    def create_sign_in_link(self, user_id: UserId) -> Link:
+        """Create a sign-in link for a user.
+
+        The link works once, within a day. Does not accept an Idempotency-Key.
+        """
+        return cast(Link, self.request_json("POST", "/api/v1/users/{id}/link", {"id": user_id}, repeatable=False))
+
+    def set_user_role(self, user_id: UserId, *, idempotency_key: Optional[str] = None, **body: Unpack[NewRole]) -> User:
+        """Change the role of a user.
+
+        Tokens that a former administrator created are revoked.
+
+        Fields: role.
+        """
+        return cast(
+            User,
+            self.request_json(
+                "PUT",
+                "/api/v1/users/{id}/role",
+                {"id": user_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )

@@ -1,0 +1,111 @@
+"""Operations with the tag `blind`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    Answered,
+    BlindMotion,
+    NextPair,
+    RaterAnswer,
+    RaterFigures,
+    StudyId,
+    Unblind,
+    UnblindedRater,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class BlindMethods(Transport):
+    """Operations with the tag `blind`."""
+
+    def answer_blind_pair(
+        self,
+        token: str,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[RaterAnswer],
+    ) -> Answered:
+        """Answer a blind pair.
+
+        Fields: answer; optionally note, response_ms.
+        """
+        return cast(
+            Answered,
+            self.request_json(
+                "POST",
+                "/api/v1/blind-pairs/{token}/answer",
+                {"token": token},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_blind_motion(self, token: str, side: Literal["first", "second"]) -> BlindMotion:
+        """Get a motion of a blind pair.
+
+        The phase at which motions start differs between pairs, and is the same for both motions of a pair.
+        """
+        return cast(
+            BlindMotion,
+            self.request_json(
+                "GET",
+                "/api/v1/blind-pairs/{token}/motions/{side}",
+                {"token": token, "side": side},
+            ),
+        )
+
+    def draw_blind_pair(self, study_id: StudyId, *, idempotency_key: Optional[str] = None) -> NextPair:
+        """Get the next pair for a rater.
+
+        Returns the same pair until it is answered.
+        """
+        return cast(
+            NextPair,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/blind-pairs/next",
+                {"id": study_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def get_rater_agreement(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[RaterFigures]:
+        """Get the reliability of raters.
+
+        Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.
+        """
+        return Pages(self, "/api/v1/studies/{id}/raters", {"id": study_id}, query={"limit": page_size})
+
+    def unblind_rater(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Unblind],
+    ) -> UnblindedRater:
+        """Unblind a rater.
+
+        Reveals which gait the rater saw on which side. The audit trail records it, and later answers of the rater do
+        not count as blind.
+
+        Fields: rater, reason.
+        """
+        return cast(
+            UnblindedRater,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/unblind",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )

@@ -1,0 +1,86 @@
+"""Operations with the tag `figures`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, Optional
+
+from ..schemas import (
+    LabSessionId,
+    ReferenceGaitId,
+    StudyId,
+    TrialId,
+)
+from ..transport import Transport
+
+
+class FiguresMethods(Transport):
+    """Operations with the tag `figures`."""
+
+    def get_lab_session_figure(self, lab_session_id: LabSessionId, file: str) -> bytes:
+        """Download a figure of a lab session.
+
+        Muscle activity and limit cycles.
+        """
+        return self.request_bytes(
+            "GET",
+            "/api/v1/lab-sessions/{id}/figures/{file}",
+            {"id": lab_session_id, "file": file},
+        )
+
+    def get_reference_gait_figure(self, reference_gait_id: ReferenceGaitId, file: str) -> bytes:
+        """Download a figure of a reference gait."""
+        return self.request_bytes(
+            "GET",
+            "/api/v1/reference-gaits/{id}/figures/{file}",
+            {"id": reference_gait_id, "file": file},
+        )
+
+    def get_belief_figure(
+        self,
+        study_id: StudyId,
+        file: str,
+        *,
+        right: Optional[Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]] = None,
+        down: Optional[Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]] = None,
+    ) -> bytes:
+        """Download a figure of the posterior.
+
+        right: Bound on the horizontal axis of maps. The first one by default.
+
+        down: Bound on the vertical axis of maps. The second one by default.
+        """
+        return self.request_bytes(
+            "GET",
+            "/api/v1/studies/{id}/belief/figures/{file}",
+            {"id": study_id, "file": file},
+            query={"right": right, "down": down},
+        )
+
+    def get_study_figure(self, study_id: StudyId, file: str, *, other: Optional[StudyId] = None) -> bytes:
+        """Download a figure of a study.
+
+        other: Study for comparison.
+        """
+        return self.request_bytes(
+            "GET",
+            "/api/v1/studies/{id}/figures/{file}",
+            {"id": study_id, "file": file},
+            query={"other": other},
+        )
+
+    def get_trial_figure(self, trial_id: TrialId, file: str, *, other: Optional[TrialId] = None) -> bytes:
+        """Download a figure of a trial.
+
+        While the solve is running, shows its progress. With another trial, shows the joint angles of both.
+
+        other: Converged trial of the same study for comparison.
+        """
+        return self.request_bytes(
+            "GET",
+            "/api/v1/trials/{id}/figures/{file}",
+            {"id": trial_id, "file": file},
+            query={"other": other},
+        )

@@ -1,0 +1,25 @@
+"""Operations with the tag `health`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from ..schemas import (
+    Health,
+)
+from ..transport import Transport
+
+
+class HealthMethods(Transport):
+    """Operations with the tag `health`."""
+
+    def get_health(self) -> Health:
+        """Check that the service is healthy.
+
+        Succeeds if the database responds. Needs no sign-in, and therefore reveals nothing about solves, from which a
+        rater could infer the effect of an answer. Fails if the database does not respond.
+        """
+        return cast(Health, self.request_json("GET", "/api/v1/health"))

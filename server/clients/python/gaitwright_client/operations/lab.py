@@ -1,0 +1,344 @@
+"""Operations with the tag `lab`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    Closing,
+    ControllerFile,
+    EmgView,
+    InTheLab,
+    LabSessionId,
+    LimitCycles,
+    MeasurementFile,
+    MeasurementFileId,
+    NewEmg,
+    NewLabAnswer,
+    NewMotion,
+    NewSession,
+    Processing,
+    RecordedWalk,
+    SessionView,
+    StudyId,
+    UnblindSession,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class LabMethods(Transport):
+    """Operations with the tag `lab`."""
+
+    def get_lab_session(self, lab_session_id: LabSessionId) -> SessionView:
+        """Get a lab session.
+
+        The response omits blinded data.
+        """
+        return cast(SessionView, self.request_json("GET", "/api/v1/lab-sessions/{id}", {"id": lab_session_id}))
+
+    def answer_lab_session(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewLabAnswer],
+    ) -> InTheLab:
+        """Record the answer of the subject.
+
+        States which walk was better. The answer reaches the learner at unblinding.
+
+        Fields: answer, number; optionally note.
+        """
+        return cast(
+            InTheLab,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/answers",
+                {"id": lab_session_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def close_lab_session(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Closing],
+    ) -> SessionView:
+        """Close a lab session.
+
+        A closed session accepts no more data.
+
+        Fields: optionally note.
+        """
+        return cast(
+            SessionView,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/close",
+                {"id": lab_session_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_walk_controller_file(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        walk: int,
+        rate_hz: Optional[float] = None,
+    ) -> ControllerFile:
+        """Download the controller file of a lab walk.
+
+        The file does not name the trial, but comparing it with the controller files of both gaits reveals the
+        allocation. It is meant for the device, which uses a token with the scope `device` only. If anybody else fetches
+        it, the session and the audit trail record it, and later answers of that caller do not count as blind.
+
+        walk: 2 or 3. Walk 1 is without the device.
+
+        rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
+        """
+        return cast(
+            ControllerFile,
+            self.request_json(
+                "GET",
+                "/api/v1/lab-sessions/{id}/controller.json",
+                {"id": lab_session_id},
+                query={"walk": walk, "rate_hz": rate_hz},
+            ),
+        )
+
+    def get_emg_results(self, lab_session_id: LabSessionId) -> Optional[EmgView]:
+        """Get the processed EMG.
+
+        The newest result. After unblinding, includes the muscle activity of the model.
+        """
+        return cast(
+            "Optional[EmgView]",
+            self.request_json(
+                "GET",
+                "/api/v1/lab-sessions/{id}/emg-results",
+                {"id": lab_session_id},
+            ),
+        )
+
+    def process_emg(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Processing],
+    ) -> EmgView:
+        """Process EMG recordings.
+
+        Filters, segments and normalises the newest EMG recordings. Can be repeated with other settings.
+
+        Fields: optionally settings.
+        """
+        return cast(
+            EmgView,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/emg-results",
+                {"id": lab_session_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_limit_cycles(self, lab_session_id: LabSessionId, *, page_size: Optional[int] = None) -> Pages[LimitCycles]:
+        """Get limit cycles.
+
+        Angle and velocity of every recorded joint, from the newest joint angles of each walk.
+        """
+        return Pages(self, "/api/v1/lab-sessions/{id}/limit-cycles", {"id": lab_session_id}, query={"limit": page_size})
+
+    def list_measurement_files(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        page_size: Optional[int] = None,
+    ) -> Pages[MeasurementFile]:
+        """List measurement files of a lab session.
+
+        Oldest first. The newest file of each kind and walk is used.
+        """
+        return Pages(
+            self,
+            "/api/v1/lab-sessions/{id}/measurement-files",
+            {"id": lab_session_id},
+            query={"limit": page_size},
+        )
+
+    def add_emg_file(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewEmg],
+    ) -> MeasurementFile:
+        """Upload an EMG recording of a walk.
+
+        An incomplete file, or one without a complete stride, is refused.
+
+        Fields: recording, walk; optionally reading.
+        """
+        return cast(
+            MeasurementFile,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/measurement-files/emg",
+                {"id": lab_session_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def add_motion_file(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewMotion],
+    ) -> MeasurementFile:
+        """Upload joint angles of a walk.
+
+        Limit cycles are computed from the file.
+
+        Fields: recording, walk; optionally reading.
+        """
+        return cast(
+            MeasurementFile,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/measurement-files/motion",
+                {"id": lab_session_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_next_walk(self, lab_session_id: LabSessionId) -> InTheLab:
+        """Get the next walk of a lab session.
+
+        The view for the lab, without anything that reveals a gait.
+        """
+        return cast(InTheLab, self.request_json("GET", "/api/v1/lab-sessions/{id}/next-walk", {"id": lab_session_id}))
+
+    def retract_lab_answer(self, lab_session_id: LabSessionId, *, idempotency_key: Optional[str] = None) -> InTheLab:
+        """Retract the answer of the subject."""
+        return cast(
+            InTheLab,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/retract-answer",
+                {"id": lab_session_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def unblind_lab_session(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[UnblindSession],
+    ) -> SessionView:
+        """Unblind a lab session.
+
+        Reveals which gait each walk used, to all readers. The audit trail records it, later walks are marked, and the
+        answer of the subject becomes a preference of the study.
+
+        Fields: reason.
+        """
+        return cast(
+            SessionView,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/unblind",
+                {"id": lab_session_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def record_walk(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[RecordedWalk],
+    ) -> InTheLab:
+        """Record a walk.
+
+        Fields: walk; optionally note.
+        """
+        return cast(
+            InTheLab,
+            self.request_json(
+                "POST",
+                "/api/v1/lab-sessions/{id}/walks",
+                {"id": lab_session_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_measurement_file(self, measurement_file_id: MeasurementFileId) -> MeasurementFile:
+        """Get a measurement file."""
+        return cast(
+            MeasurementFile,
+            self.request_json(
+                "GET",
+                "/api/v1/measurement-files/{id}",
+                {"id": measurement_file_id},
+            ),
+        )
+
+    def get_measurement_file_content(self, measurement_file_id: MeasurementFileId) -> str:
+        """Download a measurement file.
+
+        The file as uploaded, byte for byte. Its ETag is its SHA-256.
+        """
+        return self.request_text("GET", "/api/v1/measurement-files/{id}/content", {"id": measurement_file_id})
+
+    def list_lab_sessions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[SessionView]:
+        """List lab sessions of a study.
+
+        The response omits blinded data.
+        """
+        return Pages(self, "/api/v1/studies/{id}/lab-sessions", {"id": study_id}, query={"limit": page_size})
+
+    def plan_lab_session(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewSession],
+    ) -> SessionView:
+        """Plan a lab session.
+
+        A walk without the device, then one with each gait, in an order that is drawn now and concealed.
+
+        Fields: gait_one, gait_two; optionally notes.
+        """
+        return cast(
+            SessionView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/lab-sessions",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )

@@ -1,0 +1,106 @@
+"""Operations with the tag `operation`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    AccessRow,
+    AuditRow,
+    Backup,
+    BackupId,
+    Job,
+    JobKind,
+    StudyId,
+    SubjectId,
+    Workers,
+)
+from ..transport import Transport
+
+
+class OperationMethods(Transport):
+    """Operations with the tag `operation`."""
+
+    def list_access_log(
+        self,
+        *,
+        contains: Optional[str] = None,
+        subject_id: Optional[SubjectId] = None,
+        page_size: Optional[int] = None,
+    ) -> Pages[AccessRow]:
+        """List the access log.
+
+        Views and exports of subjects' data, and refusals, newest first.
+
+        contains: Text in kind, actor, address, object, study or pseudonym.
+
+        subject_id: Rows of this subject.
+        """
+        return Pages(
+            self,
+            "/api/v1/access-log",
+            query={"contains": contains, "subject_id": subject_id, "limit": page_size},
+        )
+
+    def list_audit_trail(self, *, contains: Optional[str] = None, page_size: Optional[int] = None) -> Pages[AuditRow]:
+        """List the audit trail.
+
+        Every change by a user or a program, newest first.
+
+        contains: Text in actor, action or object.
+        """
+        return Pages(self, "/api/v1/audit", query={"contains": contains, "limit": page_size})
+
+    def create_backup(self, *, idempotency_key: Optional[str] = None) -> Job:
+        """Back up the record.
+
+        Writes a backup next to the database and verifies it. The backup is completed even if the caller disconnects.
+        """
+        return cast(Job, self.request_json("POST", "/api/v1/backups", key=idempotency_key))
+
+    def get_backup(self, backup_id: BackupId) -> Backup:
+        """Get a backup."""
+        return cast(Backup, self.request_json("GET", "/api/v1/backups/{id}", {"id": backup_id}))
+
+    def list_jobs(
+        self,
+        *,
+        kind: Optional[JobKind] = None,
+        study_id: Optional[StudyId] = None,
+        page_size: Optional[int] = None,
+    ) -> Pages[Job]:
+        """List jobs.
+
+        Jobs that have not ended: backups, and those of studies that the caller can access.
+
+        kind: Jobs of this kind.
+
+        study_id: Jobs of this study.
+        """
+        return Pages(self, "/api/v1/jobs", query={"kind": kind, "study_id": study_id, "limit": page_size})
+
+    def get_job(self, job_id: str) -> Job:
+        """Get a job.
+
+        Includes jobs that have ended.
+        """
+        return cast(Job, self.request_json("GET", "/api/v1/jobs/{id}", {"id": job_id}))
+
+    def cancel_job(self, job_id: str, *, idempotency_key: Optional[str] = None) -> Job:
+        """Cancel a job.
+
+        A solve stops within one iteration, and its trial is cancelled. The cancellation of a backup needs the right
+        `administer`.
+        """
+        return cast(Job, self.request_json("POST", "/api/v1/jobs/{id}/cancel", {"id": job_id}, key=idempotency_key))
+
+    def get_workers(self) -> Workers:
+        """List workers.
+
+        A remote worker is known only while it has a solve.
+        """
+        return cast(Workers, self.request_json("GET", "/api/v1/workers"))

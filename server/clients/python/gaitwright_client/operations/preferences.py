@@ -1,0 +1,249 @@
+"""Operations with the tag `preferences`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    Assessment,
+    AssessmentId,
+    FeedbackId,
+    FeedbackRow,
+    NewAssessment,
+    NewPreference,
+    NewSafetyReport,
+    Recorded,
+    Retract,
+    SafetyReport,
+    SafetyReview,
+    SafetyReviewToMake,
+    StudyId,
+    Suggestion,
+    TrialId,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class PreferencesMethods(Transport):
+    """Operations with the tag `preferences`."""
+
+    def get_assessment(self, assessment_id: AssessmentId) -> Assessment:
+        """Get an assessment."""
+        return cast(Assessment, self.request_json("GET", "/api/v1/assessments/{id}", {"id": assessment_id}))
+
+    def retract_assessment(
+        self,
+        assessment_id: AssessmentId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Retract],
+    ) -> Assessment:
+        """Retract an assessment.
+
+        The assessment stays on record. The learner no longer uses the preference derived from it.
+
+        Fields: reason; optionally author.
+        """
+        return cast(
+            Assessment,
+            self.request_json(
+                "POST",
+                "/api/v1/assessments/{id}/retract",
+                {"id": assessment_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_preference(self, preference_id: FeedbackId) -> FeedbackRow:
+        """Get a preference."""
+        return cast(FeedbackRow, self.request_json("GET", "/api/v1/preferences/{id}", {"id": preference_id}))
+
+    def retract_preference(
+        self,
+        preference_id: FeedbackId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Retract],
+    ) -> FeedbackRow:
+        """Retract a preference.
+
+        The preference stays on record, but the learner no longer uses it.
+
+        Fields: reason; optionally author.
+        """
+        return cast(
+            FeedbackRow,
+            self.request_json(
+                "POST",
+                "/api/v1/preferences/{id}/retract",
+                {"id": preference_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def list_assessments(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Assessment]:
+        """List assessments of a study.
+
+        Answers about two gaits that state no preference, retracted ones included, oldest first.
+        """
+        return Pages(self, "/api/v1/studies/{id}/assessments", {"id": study_id}, query={"limit": page_size})
+
+    def create_assessment(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewAssessment],
+    ) -> Assessment:
+        """Record an assessment of two gaits.
+
+        States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is no longer
+        recommended, compared or planned for lab sessions, until staff have reviewed the report.
+
+        Fields: answer, first, second; optionally author, note, source.
+        """
+        return cast(
+            Assessment,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/assessments",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def list_preferences(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[FeedbackRow]:
+        """List preferences of a study.
+
+        Retracted ones included, oldest first.
+        """
+        return Pages(self, "/api/v1/studies/{id}/preferences", {"id": study_id}, query={"limit": page_size})
+
+    def create_preference(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewPreference],
+    ) -> Recorded:
+        """Record a preference.
+
+        Fields: answer, trial_a, trial_b; optionally author, note, source.
+        """
+        return cast(
+            Recorded,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/preferences",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def list_preferences_csv(self, study_id: StudyId) -> str:
+        """Download preferences as CSV.
+
+        In a preference, `trial_a` is the winner.
+        """
+        return self.request_text("GET", "/api/v1/studies/{id}/preferences.csv", {"id": study_id})
+
+    def list_safety_reports(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[SafetyReport]:
+        """List safety reports of a study.
+
+        Includes safety reports from raters, assessments and lab sessions, and reports about a single gait, even if the
+        gait was cleared for walking. Omits retracted reports. A report from a blinded lab session is listed for both of
+        its gaits.
+        """
+        return Pages(self, "/api/v1/studies/{id}/safety-reports", {"id": study_id}, query={"limit": page_size})
+
+    def list_suggestions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[FeedbackRow]:
+        """List suggestions of a study.
+
+        Retracted ones included, oldest first.
+        """
+        return Pages(self, "/api/v1/studies/{id}/suggestions", {"id": study_id}, query={"limit": page_size})
+
+    def create_suggestion(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Suggestion],
+    ) -> FeedbackRow:
+        """Record a suggestion.
+
+        The learner uses it like a preference. Retract it with `POST /preferences/{id}/retract`.
+
+        Fields: bounds, over; optionally author, note, source.
+        """
+        return cast(
+            FeedbackRow,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/suggestions",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def create_safety_report(
+        self,
+        trial_id: TrialId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewSafetyReport],
+    ) -> SafetyReport:
+        """Report a gait as unsafe.
+
+        The gait, and every trial of the subject with the same motion, is not recommended, compared or walked until
+        staff have reviewed the report. The report does not reach the learner.
+
+        Fields: optionally author, note, source.
+        """
+        return cast(
+            SafetyReport,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/safety-reports",
+                {"id": trial_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def create_safety_review(
+        self,
+        trial_id: TrialId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[SafetyReviewToMake],
+    ) -> SafetyReview:
+        """Review the safety reports of a gait.
+
+        If the gait may be walked again, it can be recommended, compared and planned again, and the preferences derived
+        from the reports are retracted. When a lab session is unblinded later, its report makes the gait unsafe again.
+
+        Fields: decision, reason; optionally author, reports.
+        """
+        return cast(
+            SafetyReview,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/safety-reviews",
+                {"id": trial_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )

@@ -1,0 +1,50 @@
+"""Operations with the tag `reference-gaits`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    NewReferenceGait,
+    ReferenceGait,
+    ReferenceGaitId,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class ReferenceGaitsMethods(Transport):
+    """Operations with the tag `reference-gaits`."""
+
+    def list_reference_gaits(self, *, page_size: Optional[int] = None) -> Pages[ReferenceGait]:
+        """List reference gaits.
+
+        Newest first.
+        """
+        return Pages(self, "/api/v1/reference-gaits", query={"limit": page_size})
+
+    def create_reference_gait(
+        self,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewReferenceGait],
+    ) -> ReferenceGait:
+        """Import a reference gait from a recording.
+
+        Segments the recording at right heel strikes and averages its strides. An identical recording returns the
+        existing reference gait.
+
+        Fields: name, recording; optionally body_mass_kg, force_column, forces, form, heel_strikes_s, height_m, strikes,
+        unit.
+        """
+        return cast(ReferenceGait, self.request_json("POST", "/api/v1/reference-gaits", body=body, key=idempotency_key))
+
+    def get_reference_gait(self, reference_gait_id: ReferenceGaitId) -> ReferenceGait:
+        """Get a reference gait."""
+        return cast(ReferenceGait, self.request_json("GET", "/api/v1/reference-gaits/{id}", {"id": reference_gait_id}))

@@ -1,0 +1,60 @@
+"""Operations with the tag `scripts`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Optional, cast
+
+from ..schemas import (
+    Ask,
+    StudyId,
+    Tell,
+    Trial,
+    TrialId,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class ScriptsMethods(Transport):
+    """Operations with the tag `scripts`."""
+
+    def ask_for_trial(self, study_id: StudyId, *, idempotency_key: Optional[str] = None, **body: Unpack[Ask]) -> Trial:
+        """Ask for a trial to evaluate.
+
+        Returns the same trial until its outcome is reported.
+
+        Fields: optionally worker.
+        """
+        return cast(
+            Trial,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/ask",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def tell_outcome(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None, **body: Unpack[Tell]) -> Trial:
+        """Report the outcome of a trial.
+
+        An outcome without a gait is also a result. If the script fails, cancel the trial instead.
+
+        Fields: outcome; optionally cost_of_transport, gait_rmse_rad, reason.
+        """
+        return cast(
+            Trial,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/tell",
+                {"id": trial_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )

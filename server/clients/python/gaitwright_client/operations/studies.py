@@ -1,0 +1,308 @@
+"""Operations with the tag `studies`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Optional, cast
+
+from ..events import Event, follow
+from ..paging import Pages
+from ..schemas import (
+    Change,
+    Compared,
+    Extend,
+    Fork,
+    Import,
+    Milestone,
+    NewStudy,
+    Recommendation,
+    StudyId,
+    StudyState,
+    StudyView,
+    SubjectId,
+    Why,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class StudiesMethods(Transport):
+    """Operations with the tag `studies`."""
+
+    def list_studies(
+        self,
+        *,
+        subject_id: Optional[SubjectId] = None,
+        state: Optional[StudyState] = None,
+        page_size: Optional[int] = None,
+    ) -> Pages[StudyView]:
+        """List studies.
+
+        Newest first.
+
+        subject_id: Studies of this subject.
+
+        state: Studies in this state.
+        """
+        return Pages(self, "/api/v1/studies", query={"subject_id": subject_id, "state": state, "limit": page_size})
+
+    def create_study(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewStudy]) -> StudyView:
+        """Create a study.
+
+        Starts the study, unless `start` is false.
+
+        Fields: subject_id; optionally base_bounds, device_id, evaluation, feedback_mode, gait_settings, learner,
+        muscles, name, parallel_trials, priority, reference_gait_id, restricted, search_space, seed, solve_options,
+        solve_seconds_budget, start, trial_budget, unchanged_limit.
+        """
+        return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
+
+    def get_study(self, study_id: StudyId) -> StudyView:
+        """Get a study.
+
+        The ETag is the revision of the study.
+        """
+        return cast(StudyView, self.request_json("GET", "/api/v1/studies/{id}", {"id": study_id}))
+
+    def update_study(
+        self,
+        study_id: StudyId,
+        *,
+        revision: Optional[int] = None,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Change],
+    ) -> StudyView:
+        """Update a study.
+
+        Changes the name, priority or number of parallel trials.
+
+        Fields: optionally name, parallel_trials, priority.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "PATCH",
+                "/api/v1/studies/{id}",
+                {"id": study_id},
+                revision=revision,
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_study_archive(self, study_id: StudyId) -> bytes:
+        """Export a study as an archive.
+
+        The archive has every row of the study, without blinded allocations, as `gaitwright export` writes it.
+        """
+        return self.request_bytes("GET", "/api/v1/studies/{id}/archive", {"id": study_id})
+
+    def follow_study_events(self, study_id: StudyId, *, after: Optional[int] = None) -> Iterator[Event]:
+        """Follow the events of a study.
+
+        Sends `study_state` with the current state, then recorded events with an id, which are replayed after `Last-
+        Event-ID`, and `progress` of running solves. The stream stays open after the end of the study, because the study
+        can be extended.
+
+        after: Start after this event.
+        """
+        return follow(self, "/api/v1/studies/{id}/events", {"id": study_id}, query={"after": after})
+
+    def extend_study(
+        self,
+        study_id: StudyId,
+        *,
+        revision: Optional[int] = None,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Extend],
+    ) -> StudyView:
+        """Raise the trial budget of a study.
+
+        A study that has ended resumes.
+
+        Fields: trial_budget.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/extend",
+                {"id": study_id},
+                revision=revision,
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def fork_study(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Fork],
+    ) -> StudyView:
+        """Fork a study.
+
+        Creates a study with the same set-up, without the trials.
+
+        Fields: optionally feedback_mode, muscles, name, seed, start, trial_budget.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/fork",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_study_history(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Milestone]:
+        """Get the history of the recommendation.
+
+        The best trial after each iteration.
+        """
+        return Pages(self, "/api/v1/studies/{id}/history", {"id": study_id}, query={"limit": page_size})
+
+    def get_study_history_csv(self, study_id: StudyId) -> str:
+        """Download the history as CSV.
+
+        The best trial after each iteration.
+        """
+        return self.request_text("GET", "/api/v1/studies/{id}/history.csv", {"id": study_id})
+
+    def list_study_imports(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Import]:
+        """List the imports of a study.
+
+        One import for each record that the study passed through; empty for a study that was created here.
+        """
+        return Pages(self, "/api/v1/studies/{id}/imports", {"id": study_id}, query={"limit": page_size})
+
+    def pause_study(
+        self,
+        study_id: StudyId,
+        *,
+        revision: Optional[int] = None,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Why],
+    ) -> StudyView:
+        """Pause a study.
+
+        Running solves finish, and no new one starts.
+
+        Fields: optionally reason.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/pause",
+                {"id": study_id},
+                revision=revision,
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_recommendation(self, study_id: StudyId) -> Recommendation:
+        """Get the recommendation of a study.
+
+        The tried action that the learner believes to be the best.
+        """
+        return cast(Recommendation, self.request_json("GET", "/api/v1/studies/{id}/recommendation", {"id": study_id}))
+
+    def get_recommendation_csv(self, study_id: StudyId) -> str:
+        """Download the recommended bounds as CSV.
+
+        Each bound with its unit and what it limits.
+        """
+        return self.request_text("GET", "/api/v1/studies/{id}/recommendation.csv", {"id": study_id})
+
+    def resume_study(
+        self,
+        study_id: StudyId,
+        *,
+        revision: Optional[int] = None,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Why],
+    ) -> StudyView:
+        """Resume a study.
+
+        Fields: optionally reason.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/resume",
+                {"id": study_id},
+                revision=revision,
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def start_study(
+        self,
+        study_id: StudyId,
+        *,
+        revision: Optional[int] = None,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Why],
+    ) -> StudyView:
+        """Start a study.
+
+        Fields: optionally reason.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/start",
+                {"id": study_id},
+                revision=revision,
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def stop_study(
+        self,
+        study_id: StudyId,
+        *,
+        revision: Optional[int] = None,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Why],
+    ) -> StudyView:
+        """Stop a study.
+
+        Cancels open trials.
+
+        Fields: optionally reason.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/stop",
+                {"id": study_id},
+                revision=revision,
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def compare_studies(self, *, ids: str, page_size: Optional[int] = None) -> Pages[Compared]:
+        """Compare several studies.
+
+        Results keep the order of `ids`.
+
+        ids: 2 to 20 comma-separated identifiers of studies.
+        """
+        return Pages(self, "/api/v1/study-comparison", query={"ids": ids, "limit": page_size})

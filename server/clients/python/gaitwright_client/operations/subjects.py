@@ -1,0 +1,170 @@
+"""Operations with the tag `subjects`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    Consent,
+    Correction,
+    Match,
+    MuscleParameters,
+    NewConsent,
+    NewCorrection,
+    NewSubject,
+    Subject,
+    SubjectId,
+    Withdrawal,
+)
+from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class SubjectsMethods(Transport):
+    """Operations with the tag `subjects`."""
+
+    def list_subjects(self, *, page_size: Optional[int] = None) -> Pages[Subject]:
+        """List subjects.
+
+        Newest first.
+        """
+        return Pages(self, "/api/v1/subjects", query={"limit": page_size})
+
+    def create_subject(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewSubject]) -> Subject:
+        """Add a subject.
+
+        Fields: body_mass_kg, height_m, pseudonym; optionally notes.
+        """
+        return cast(Subject, self.request_json("POST", "/api/v1/subjects", body=body, key=idempotency_key))
+
+    def get_subject(self, subject_id: SubjectId) -> Subject:
+        """Get a subject."""
+        return cast(Subject, self.request_json("GET", "/api/v1/subjects/{id}", {"id": subject_id}))
+
+    def list_consents(self, subject_id: SubjectId, *, page_size: Optional[int] = None) -> Pages[Consent]:
+        """List consents of a subject.
+
+        Consents and withdrawals, oldest first. The last entry applies.
+        """
+        return Pages(self, "/api/v1/subjects/{id}/consents", {"id": subject_id}, query={"limit": page_size})
+
+    def record_consent(
+        self,
+        subject_id: SubjectId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewConsent],
+    ) -> Consent:
+        """Record consent.
+
+        Fields: form.
+        """
+        return cast(
+            Consent,
+            self.request_json(
+                "POST",
+                "/api/v1/subjects/{id}/consents",
+                {"id": subject_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def list_subject_corrections(self, subject_id: SubjectId, *, page_size: Optional[int] = None) -> Pages[Correction]:
+        """List corrections of a subject.
+
+        Corrections of height and mass, oldest first. The last entry applies.
+        """
+        return Pages(self, "/api/v1/subjects/{id}/corrections", {"id": subject_id}, query={"limit": page_size})
+
+    def correct_subject(
+        self,
+        subject_id: SubjectId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewCorrection],
+    ) -> Correction:
+        """Correct height and mass of a subject.
+
+        New studies use the corrected values. Existing studies keep theirs.
+
+        Fields: body_mass_kg, height_m, reason.
+        """
+        return cast(
+            Correction,
+            self.request_json(
+                "POST",
+                "/api/v1/subjects/{id}/corrections",
+                {"id": subject_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_subject_muscles(self, subject_id: SubjectId) -> MuscleParameters:
+        """Get measured muscle values of a subject.
+
+        Values that override the published table.
+        """
+        return cast(MuscleParameters, self.request_json("GET", "/api/v1/subjects/{id}/muscles", {"id": subject_id}))
+
+    def set_subject_muscles(
+        self,
+        subject_id: SubjectId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[MuscleParameters],
+    ) -> MuscleParameters:
+        """Set measured muscle values of a subject.
+
+        New studies use them.
+
+        Fields: optionally gas, glu, ham, hfl, scaled_to_body, sol, ta, vas.
+        """
+        return cast(
+            MuscleParameters,
+            self.request_json(
+                "PUT",
+                "/api/v1/subjects/{id}/muscles",
+                {"id": subject_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def list_nearest_reference_gaits(self, subject_id: SubjectId, *, page_size: Optional[int] = None) -> Pages[Match]:
+        """Rank reference gaits for a subject.
+
+        The nearest in height and body mass first. Those without height and mass come last.
+        """
+        return Pages(self, "/api/v1/subjects/{id}/reference-gaits", {"id": subject_id}, query={"limit": page_size})
+
+    def withdraw_consent(
+        self,
+        subject_id: SubjectId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[Withdrawal],
+    ) -> Consent:
+        """Withdraw consent.
+
+        Stops every study of the subject. The record is kept, but nothing can be added, shown or exported.
+
+        Fields: reason.
+        """
+        return cast(
+            Consent,
+            self.request_json(
+                "POST",
+                "/api/v1/subjects/{id}/withdraw",
+                {"id": subject_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )

@@ -1,0 +1,205 @@
+"""Operations with the tag `trials`.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, Optional, cast
+
+from ..paging import Pages
+from ..schemas import (
+    AttemptResult,
+    Certificate,
+    ControllerFile,
+    GaitDocument,
+    Iteration,
+    Job,
+    Motion,
+    SolveProblem,
+    StudyId,
+    Trial,
+    TrialExplanation,
+    TrialId,
+    TrialState,
+)
+from ..transport import Transport
+
+ListTrialsSort = Literal[
+    "number", "-number", "state", "-state", "gait_rmse_rad", "-gait_rmse_rad", "cost_of_transport",
+    "-cost_of_transport", "iterations", "-iterations", "seconds_total", "-seconds_total", "a1", "-a1", "a2", "-a2",
+    "a3", "-a3", "a4", "-a4", "a5", "-a5", "a6", "-a6", "a7", "-a7", "a8", "-a8",
+]
+
+
+class TrialsMethods(Transport):
+    """Operations with the tag `trials`."""
+
+    def list_trials(
+        self,
+        study_id: StudyId,
+        *,
+        state: Optional[TrialState] = None,
+        sort: Optional[ListTrialsSort] = None,
+        page_size: Optional[int] = None,
+    ) -> Pages[Trial]:
+        """List trials of a study.
+
+        By number, unless `sort` names another column.
+
+        state: Trials in this state.
+
+        sort: Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a
+        value come last.
+        """
+        return Pages(
+            self,
+            "/api/v1/studies/{id}/trials",
+            {"id": study_id},
+            query={"state": state, "sort": sort, "limit": page_size},
+        )
+
+    def list_trials_csv(self, study_id: StudyId) -> str:
+        """Download trials as CSV."""
+        return self.request_text("GET", "/api/v1/studies/{id}/trials.csv", {"id": study_id})
+
+    def get_trial(self, trial_id: TrialId) -> Trial:
+        """Get a trial."""
+        return cast(Trial, self.request_json("GET", "/api/v1/trials/{id}", {"id": trial_id}))
+
+    def list_attempts(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[AttemptResult]:
+        """List attempts at a trial.
+
+        Results delivered by workers, including results that arrived too late to count.
+        """
+        return Pages(self, "/api/v1/trials/{id}/attempts", {"id": trial_id}, query={"limit": page_size})
+
+    def cancel_trial(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Trial:
+        """Cancel a trial.
+
+        The solve stops within one iteration.
+        """
+        return cast(
+            Trial,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/cancel",
+                {"id": trial_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def get_certificate(self, trial_id: TrialId) -> Certificate:
+        """Get the certificate of a trial.
+
+        The result of checking the gait independently of the optimiser.
+        """
+        return cast(Certificate, self.request_json("GET", "/api/v1/trials/{id}/certificate", {"id": trial_id}))
+
+    def request_certificate(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Job:
+        """Request the certificate of a trial.
+
+        The gait of the trial must have converged.
+        """
+        return cast(
+            Job,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/certificate",
+                {"id": trial_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def get_controller_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> ControllerFile:
+        """Download the controller file of a trial.
+
+        The gait must be walkable: converged, with a certificate, without an open safety report.
+
+        rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
+        """
+        return cast(
+            ControllerFile,
+            self.request_json(
+                "GET",
+                "/api/v1/trials/{id}/controller.json",
+                {"id": trial_id},
+                query={"rate_hz": rate_hz},
+            ),
+        )
+
+    def get_explanation(self, trial_id: TrialId) -> TrialExplanation:
+        """Get the infeasibility explanation of a trial.
+
+        Names the bounds that conflict, and relaxations that give a gait.
+        """
+        return cast(TrialExplanation, self.request_json("GET", "/api/v1/trials/{id}/explanation", {"id": trial_id}))
+
+    def request_explanation(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Job:
+        """Request the explanation of a trial.
+
+        The trial must have been solved by the service and not have converged.
+        """
+        return cast(
+            Job,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/explanation",
+                {"id": trial_id},
+                key=idempotency_key,
+            ),
+        )
+
+    def get_gait(self, trial_id: TrialId) -> GaitDocument:
+        """Get the gait of a trial.
+
+        The trajectory in the format of the optimiser.
+        """
+        return cast(GaitDocument, self.request_json("GET", "/api/v1/trials/{id}/gait", {"id": trial_id}))
+
+    def get_gait_csv(self, trial_id: TrialId) -> str:
+        """Download the gait of a trial as CSV."""
+        return self.request_text("GET", "/api/v1/trials/{id}/gait.csv", {"id": trial_id})
+
+    def get_gait_motion_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> str:
+        """Download the gait as an OpenSim motion.
+
+        rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
+        """
+        return self.request_text("GET", "/api/v1/trials/{id}/gait.mot", {"id": trial_id}, query={"rate_hz": rate_hz})
+
+    def list_iterations(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[Iteration]:
+        """List iterations of a solve.
+
+        The iterations of the running solve so far, or the recorded ones of a solve that has ended.
+        """
+        return Pages(self, "/api/v1/trials/{id}/iterations", {"id": trial_id}, query={"limit": page_size})
+
+    def get_gait_motion(self, trial_id: TrialId) -> Motion:
+        """Get the motion of a gait.
+
+        Stick figures over one stride, for an animation.
+        """
+        return cast(Motion, self.request_json("GET", "/api/v1/trials/{id}/motion", {"id": trial_id}))
+
+    def get_solve_problem(self, trial_id: TrialId) -> SolveProblem:
+        """Download the problem file of a trial.
+
+        Everything that the solve depends on: subject, device, bounds, settings, reference gait, limits and warm start.
+        """
+        return cast(SolveProblem, self.request_json("GET", "/api/v1/trials/{id}/problem.json", {"id": trial_id}))
+
+    def retry_trial(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Trial:
+        """Retry a trial.
+
+        Requeues a trial that ended without a result.
+        """
+        return cast(
+            Trial,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/retry",
+                {"id": trial_id},
+                key=idempotency_key,
+            ),
+        )

@@ -1,0 +1,2571 @@
+"""The objects of the REST interface, as typed dictionaries.
+
+Made by generate.py from server/openapi.json.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Optional, TypedDict, Union
+
+# Kind of an access.
+AccessKind = Literal["view", "export", "refused"]
+
+AssessmentId = str
+
+# What exactly was changed; its fields depend on the action.
+AuditDetail = dict[str, Any]
+
+BackupId = str
+
+# Bytes that are not text, such as a picture or an archive.
+Binary = bytes
+
+# State of the certificate of a gait.
+CertificateState = Literal["passed", "failed", "being_certified", "not_certified"]
+
+# Condition of a walk.
+Condition = Literal["normal", "gait_one", "gait_two"]
+
+# Kind of an entry.
+ConsentKind = Literal["given", "withdrawn"]
+
+# The file that the controller of a device reads. It describes its own fields.
+ControllerFile = dict[str, Any]
+
+DeviceId = str
+
+# Who evaluates trials.
+Evaluation = Literal["optimizer", "script"]
+
+FeedbackId = str
+
+# Who answers comparisons.
+FeedbackMode = Literal["automatic", "human", "mixed"]
+
+# Format of a measurement file.
+FileForm = Literal["csv", "opensim"]
+
+# File format of a recording.
+Form = Literal["opensim", "camargo", "csv"]
+
+# A gait as the optimiser writes it. `format_version` is the version of its layout.
+GaitDocument = dict[str, Any]
+
+# A time in the record.
+Instant = str
+
+# Kind of a job.
+JobKind = Literal["backup", "certificate", "explanation", "solve"]
+
+# State of a job.
+JobState = Literal["queued", "running", "done", "failed", "cancelled"]
+
+# Content of an assessment.
+Judgement = Literal[
+    "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "withdrawn",
+]
+
+LabSessionId = str
+
+MeasurementFileId = str
+
+# Kind of a measurement file.
+MeasurementKind = Literal["electromyogram", "motion"]
+
+MemberId = str
+
+# Kind of a member.
+MemberKind = Literal["user", "token"]
+
+# Outcome of a trial.
+Outcome = Literal["converged", "not_converged"]
+
+# Which of two gaits is better.
+PairAnswer = Literal["a", "b", "no_difference"]
+
+# Who answers
+PersonSource = Literal["subject", "clinician", "script"]
+
+PresentationId = str
+
+# Why a pair is shown.
+PresentationKind = Literal["new", "repeat", "null"]
+
+# A reference gait: joint angles over the gait cycle, the measured person, and the processing.
+ReferenceGaitDocument = dict[str, Any]
+
+ReferenceGaitId = str
+
+# A right. The scopes of a token are rights.
+Right = Literal["read", "run", "answer", "rate", "device", "administer"]
+
+# Role of a user.
+Role = Literal["admin", "clinician", "rater"]
+
+# Decision of a review.
+SafetyDecision = Literal["walkable", "unsafe"]
+
+SafetyReportId = str
+
+SafetyReviewId = str
+
+SessionId = str
+
+# State of a session.
+SessionState = Literal["planned", "under_way", "closed"]
+
+# What `gaitwright solve --problem` reads: subject, device, bounds, settings, reference gait, limits, start.
+SolveProblem = dict[str, Any]
+
+# How a solve ended.
+SolveStatus = Literal["converged", "infeasible", "stalled", "iteration_limit", "time_limit", "cancelled"]
+
+# Source of an entry.
+Source = Literal["convergence", "gait_rmse", "subject", "clinician", "script"]
+
+# What a solve started from.
+StartedFrom = Literal["cold", "warm", "cold_after_warm"]
+
+# How to find right heel strikes.
+Strikes = Literal["force", "kinematics", "ends"]
+
+StudyId = str
+
+# State of a study.
+StudyState = Literal["draft", "running", "waiting", "paused", "finished", "stopped"]
+
+SubjectId = str
+
+TokenId = str
+
+TrialId = str
+
+# State of a trial.
+TrialState = Literal["queued", "running", "converged", "not_converged", "failed", "lost", "cancelled"]
+
+# Unit of angles.
+Unit = Literal["degrees", "radians"]
+
+UserId = str
+
+
+class _AccessRowRequired(TypedDict):
+    # Who made the request.
+    actor: str
+    # Client address; empty for the command line.
+    address: str
+    # Time of the first access.
+    created_at: Instant
+    # Kind of the access.
+    kind: AccessKind
+    # Time of the last access.
+    last_at: Instant
+    # HTTP method; empty for the command line.
+    method: str
+    # Requested address, without secrets.
+    object: str
+    # Route, or command.
+    route: str
+    # Sequence number.
+    seq: int
+    # HTTP status; 0 for the command line.
+    status: int
+    # Number of identical accesses within a minute.
+    times: int
+
+
+class AccessRow(_AccessRowRequired, total=False):
+    """Row of the access log."""
+
+    # Study of the request, if any.
+    study_id: Optional[StudyId]
+    # Subject of the request, if any.
+    subject_id: Optional[SubjectId]
+
+
+class Answered(TypedDict):
+    """Confirmation of a rater's answer. It has neither gaits nor the answer: the copy that is kept for repeated
+    requests would otherwise reveal the sides to readers of the study.
+    """
+
+    # Number of the pair for this rater.
+    number: int
+
+
+class Ask(TypedDict, total=False):
+    """A request for a trial."""
+
+    # Name of the evaluator, which has at most one open trial. Defaults to the caller's name.
+    worker: Optional[str]
+
+
+class _AssessmentRequired(TypedDict):
+    # `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
+    answer: Judgement
+    # Author.
+    author: str
+    # Time of recording.
+    created_at: Instant
+    # Trial of one gait.
+    first: TrialId
+    # Identifier.
+    id: AssessmentId
+    # Free text.
+    note: str
+    # Trial of the other gait.
+    second: TrialId
+    # Source.
+    source: Source
+    # The study.
+    study_id: StudyId
+
+
+class Assessment(_AssessmentRequired, total=False):
+    """An assessment of the record."""
+
+    # Preference that was derived from it, if any.
+    feedback_id: Optional[FeedbackId]
+    # Retraction, if it was retracted.
+    retraction: Optional[Retraction]
+
+
+class _AttemptResultRequired(TypedDict):
+    # Number of the attempt, from 1.
+    attempt: int
+    # Time of arrival.
+    received_at: Instant
+    # How the solve ended.
+    status: SolveStatus
+    # Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
+    taken: bool
+    # Name of the worker.
+    worker: str
+
+
+class AttemptResult(_AttemptResultRequired, total=False):
+    """Result of an attempt."""
+
+    # All figures of the solve, where they are finite.
+    report: Optional[SolveReport]
+
+
+class AuditRow(TypedDict):
+    """Row of the audit trail."""
+
+    # Action, such as `subject.add` or `study.pause`.
+    action: str
+    # Who made the change.
+    actor: str
+    # Time of the change.
+    at: Instant
+    # Details of the change, with the reason if there is one.
+    detail: AuditDetail
+    # Hash of this row and the previous hash.
+    hash: str
+    # Object of the action, such as `study 0190...`.
+    object: str
+    # Hash of the previous row.
+    previous: str
+    # Sequence number.
+    seq: int
+
+
+class Backup(TypedDict):
+    """A complete backup."""
+
+    # Time of completion.
+    at: Instant
+    # Size in bytes.
+    bytes: int
+    # File name, in the folder of the database.
+    file: str
+    # Identifier.
+    id: BackupId
+
+
+class BaseBounds(TypedDict, total=False):
+    """Values of bounds. Absent bounds have their defaults."""
+
+    # Maximum coordinate velocity, rad/s.
+    a1: float
+    # Maximum coordinate acceleration, rad/s².
+    a2: float
+    # Minimum hip velocity, m/s.
+    a3: float
+    # Maximum hip velocity, m/s.
+    a4: float
+    # Minimum swing-foot clearance, m.
+    a5: float
+    # Maximum torso lean, rad.
+    a6: float
+    # Maximum hip angle, °.
+    a7: float
+    # Maximum ankle angle, °.
+    a8: float
+
+
+class BlindMotion(TypedDict):
+    """Motion to compare."""
+
+    # 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
+    # and of the right leg) as forward and upward coordinates, m.
+    figures: list[list[list[float]]]
+
+
+class Body(TypedDict):
+    """Height and mass of a subject."""
+
+    # Body mass, kg.
+    body_mass_kg: float
+    # Body height, m.
+    height_m: float
+
+
+class BoundAtLimit(TypedDict):
+    """A tuned bound that is active at the last iterate of a solve."""
+
+    # Name of the bound.
+    bound: str
+    # Domains in which it is active, or `stride`.
+    domains: list[str]
+    # What it limits, with its unit.
+    meaning: str
+    # Given value.
+    value: float
+
+
+class Bounds(TypedDict):
+    """The tuned bounds of one action."""
+
+    # Maximum coordinate velocity, rad/s.
+    a1: float
+    # Maximum coordinate acceleration, rad/s².
+    a2: float
+    # Minimum hip velocity, m/s.
+    a3: float
+    # Maximum hip velocity, m/s.
+    a4: float
+    # Minimum swing-foot clearance, m.
+    a5: float
+    # Maximum torso lean, rad.
+    a6: float
+    # Maximum hip angle, °.
+    a7: float
+    # Maximum ankle angle, °.
+    a8: float
+
+
+class _CertificateRequired(TypedDict):
+    # Every quantity with its worst value and its limit.
+    checks: list[CertificateCheck]
+    # Version of this layout and of its checks.
+    format_version: int
+    # Reasons if it failed; otherwise empty.
+    objections: list[str]
+    # Whether every check is within its limit, the walker does not fall, and the gait is stable.
+    passed: bool
+
+
+class Certificate(_CertificateRequired, total=False):
+    """A certificate: what an independent simulation of a gait found."""
+
+    # How the simulation ended early; null if it did not.
+    fall: Optional[str]
+    # The stride-to-stride map with a free hip velocity (zero dynamics).
+    free_hip_return_map: Optional[ReturnMap]
+    # Largest pushes from which the walker recovers. Null if the gait is not stable.
+    pushes: Optional[Pushes]
+    # The stride-to-stride map.
+    return_map: Optional[ReturnMap]
+
+
+class _CertificateCheckRequired(TypedDict):
+    # What was measured.
+    name: str
+    # Domain and time of the worst value.
+    place: str
+    # Unit of value and limit; empty: dimensionless.
+    unit: str
+
+
+class CertificateCheck(_CertificateCheckRequired, total=False):
+    """The worst value of a quantity."""
+
+    # Largest allowed value. Null if the value is only reported.
+    limit: Optional[float]
+    # Worst value; null if it could not be determined, which counts as failed.
+    value: Optional[float]
+
+
+class Change(TypedDict, total=False):
+    """Changes of a study. Absent fields keep their values."""
+
+    # Name shown to people.
+    name: Optional[str]
+    # Number of trials that run in parallel.
+    parallel_trials: Optional[int]
+    # Priority, -10 to 10. Higher values run first.
+    priority: Optional[int]
+
+
+class Closing(TypedDict, total=False):
+    """Closing of a session."""
+
+    # Note, at most 2000 characters.
+    note: str
+
+
+class _ComparedRequired(TypedDict):
+    id: StudyId
+    muscles: bool
+    name: str
+    seed: int
+    # Total time of all solves, s.
+    solve_seconds: float
+    state: StudyState
+    trials: TrialCounts
+
+
+class Compared(_ComparedRequired, total=False):
+    """Study in a comparison."""
+
+    # Action of the recommended trial.
+    best_action: Optional[Bounds]
+    # Cost of transport of the recommended trial.
+    best_cost_of_transport: Optional[float]
+    # Gait RMSE of the recommended trial, rad.
+    best_gait_rmse_rad: Optional[float]
+    # Number of the recommended trial.
+    best_trial: Optional[int]
+
+
+class _ConflictRequired(TypedDict):
+    # The bounds. Empty if the fixed constraints conflict with each other.
+    bounds: list[GivenBound]
+    # Number of starting points of the search.
+    starts: int
+    # Whether a solve gave up, so that infeasibility is not certain.
+    undecided: bool
+    # Violations of the nearest motion that the search found, with all other tuned bounds at their loosest, worst first.
+    violations: list[Violation]
+
+
+class Conflict(_ConflictRequired, total=False):
+    """Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait was found with all of these,
+    but relaxing any one of them gave a gait.
+    """
+
+    # Naturalness terms that take part, if fixed constraints conflict; absent: none.
+    naturalness_terms: Optional[list[str]]
+    # Bounds of other conflicts that were relaxed when this one was found.
+    without: Optional[list[str]]
+
+
+class Consent(TypedDict):
+    """Consent or withdrawal of a subject. The newest entry applies."""
+
+    # Who recorded it.
+    actor: str
+    # Time of recording.
+    created_at: Instant
+    # Consent or withdrawal.
+    kind: ConsentKind
+    # For a consent, name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
+    note: str
+    # Sequence number.
+    seq: int
+
+
+class Correction(TypedDict):
+    """Correction of height and mass."""
+
+    # Who corrected it.
+    actor: str
+    # Corrected body mass, kg.
+    body_mass_kg: float
+    # Time of the correction.
+    created_at: Instant
+    # Corrected body height, m.
+    height_m: float
+    # Reason.
+    reason: str
+    # Sequence number.
+    seq: int
+
+
+class CycleActivity(TypedDict):
+    """Activity of a channel at 0, 1, ..., 100 % of the gait cycle, mean over strides."""
+
+    # Name of the channel.
+    channel: str
+    # Mean.
+    mean: list[float]
+    # Standard deviation over strides; zero for one stride.
+    standard_deviation: list[float]
+    # Number of strides.
+    strides: int
+
+
+class Device(TypedDict):
+    """Device. A changed definition is a new device, so that studies keep theirs."""
+
+    # Time of creation.
+    created_at: Instant
+    # Definition of the device.
+    definition: DeviceDefinition
+    # Identifier.
+    id: DeviceId
+    # Name shown to people.
+    name: str
+
+
+class _DeviceDefinitionRequired(TypedDict):
+    # radius of gyration of the adapter
+    adapter_gyration_radius_m: float
+    # mass of the adapter, midway between human and prosthetic knee
+    adapter_mass_kg: float
+    # height of the ankle above the sole
+    ankle_height_m: float
+    # dorsiflexion stop
+    ankle_max_rad: float
+    # plantarflexion stop (dorsiflexion positive)
+    ankle_min_rad: float
+    # largest ankle torque
+    ankle_torque_limit_n_m: float
+    carried_limb: bool
+    # centre of mass of the foot below the ankle
+    foot_com_down_m: float
+    # centre of mass of the foot ahead of the ankle
+    foot_com_forward_m: float
+    # moment of inertia of the foot about its centre of mass
+    foot_inertia_kg_m2: float
+    # mass of the prosthetic foot with shoe
+    foot_mass_kg: float
+    # heel contact behind the ankle
+    heel_behind_m: float
+    # largest knee and ankle speed
+    joint_speed_limit_rad_s: float
+    # moment of inertia of this mass about its own centre
+    knee_housing_inertia_kg_m2: float
+    # mass at the prosthetic knee that moves with the thigh
+    knee_housing_mass_kg: float
+    # largest knee torque
+    knee_torque_limit_n_m: float
+    name: str
+    # centre of mass of the shank below the knee, in shank lengths
+    shank_com_fraction: float
+    # radius of gyration of the shank about its centre of mass, in shank lengths
+    shank_gyration_fraction: float
+    # distance from knee to ankle
+    shank_length_m: float
+    # mass of the prosthetic shank
+    shank_mass_kg: float
+    # toe contact ahead of the ankle
+    toe_ahead_m: float
+
+
+class DeviceDefinition(_DeviceDefinitionRequired, total=False):
+    """A device: measurements of the prosthesis, each with its range."""
+
+    sources: dict[str, str]
+
+
+class DeviceFile(TypedDict):
+    """Release of the controller file of a walk."""
+
+    # Who fetched it.
+    actor: str
+    # Time.
+    at: Instant
+    # Whether the device itself fetched the file. Otherwise the caller could know which gait the walk uses.
+    to_device: bool
+    # Number of the walk, 2 or 3.
+    walk: int
+
+
+class Dimension(TypedDict):
+    """One tuned bound of a search space."""
+
+    # Difference between values up to which gaits of similar utility are expected.
+    lengthscale: float
+    # Name of the bound.
+    name: Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]
+    # Its values, ascending.
+    values: list[float]
+
+
+class Done(TypedDict):
+    """Completed step of a session."""
+
+    # Who did it.
+    actor: str
+    # Time.
+    at: Instant
+    # Reason or note.
+    note: str
+
+
+class EmgReading(TypedDict, total=False):
+    """How to read an EMG recording."""
+
+    # Column of each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R). By default the columns have the names of the
+    # channels.
+    channels: dict[str, str]
+    # File format.
+    form: FileForm
+    # Column of a switch under the right heel, or of the vertical force under the right foot.
+    heel_strike_column: Optional[str]
+    # Value of that column above which the foot is on the ground.
+    heel_strike_threshold: float
+    # Times of right heel strikes, s, on the time axis of the file. Empty: detect them in `heel_strike_column`.
+    heel_strikes_s: list[float]
+    # Sampling rate of a CSV file without a column `time_s`, Hz.
+    rate_hz: Optional[float]
+
+
+class EmgResult(TypedDict):
+    """Processed EMG recordings of a session."""
+
+    # Settings of the filters.
+    settings: EmgSettings
+    # Walks with an EMG recording.
+    walks: list[WalkActivity]
+
+
+class _EmgRmseRequired(TypedDict):
+    # RMS difference of each channel, in the order of the channels of the walk without the device.
+    parts: list[float]
+    # Sum of the parts.
+    total: float
+
+
+class EmgRmse(_EmgRmseRequired, total=False):
+    """EMG RMSE of a walk and its parts, relative to the peak of the walk without the device."""
+
+    # Reasons to doubt the comparison. Absent if there are none.
+    warnings: Optional[list[str]]
+
+
+class EmgSettings(TypedDict, total=False):
+    """Filters for EMG recordings. Absent settings have their defaults."""
+
+    # Upper cut-off frequency of the band-pass filter, Hz; below half the sampling rate.
+    band_high_hz: float
+    # Lower cut-off frequency of the band-pass filter, Hz.
+    band_low_hz: float
+    # Cut-off frequency of the low-pass filter for the envelope, Hz.
+    envelope_hz: float
+    # Order of both filters: 2, 4, 6 or 8.
+    order: Literal[2, 4, 6, 8]
+
+
+class EmgView(TypedDict):
+    """Processed EMG of a session, with the model's muscle activity."""
+
+    # Muscle activity of the model. Empty while the session is blinded, and for gaits without muscles.
+    model: list[WalkModel]
+    # Measured activity.
+    result: EmgResult
+
+
+class Extend(TypedDict):
+    """A larger trial budget."""
+
+    # Total number of trials. Must exceed the current budget.
+    trial_budget: int
+
+
+class FeedbackContentLabel(TypedDict):
+    """Label of a trial."""
+
+    # Category: 0 for not converged, 1 for converged.
+    category: int
+    kind: Literal["label"]
+    # The trial.
+    trial: TrialId
+
+
+class FeedbackContentPreference(TypedDict):
+    """One trial is better than another."""
+
+    kind: Literal["preference"]
+    # Other trial.
+    loser: TrialId
+    # Better trial.
+    winner: TrialId
+
+
+class FeedbackContentTie(TypedDict):
+    """Two trials are equally good."""
+
+    # One trial.
+    a: TrialId
+    # The other trial.
+    b: TrialId
+    kind: Literal["tie"]
+
+
+class FeedbackContentSuggestion(TypedDict):
+    """An action would have been better than a trial."""
+
+    kind: Literal["suggestion"]
+    # Trial.
+    over: TrialId
+    # Index of the suggested action.
+    suggested: int
+
+
+class _FeedbackRowRequired(TypedDict):
+    # Author.
+    author: str
+    # Whether it comes from a rater's blind comparison.
+    by_rater: bool
+    # Content of the entry.
+    content: FeedbackContent
+    # Time of recording.
+    created_at: Instant
+    # Identifier.
+    id: FeedbackId
+    # Free text.
+    note: str
+    # Sequence number.
+    seq: int
+    # Source.
+    source: Source
+    # The study.
+    study_id: StudyId
+    # Whether that rater could have known the allocation, so that it does not count as blind.
+    unblinded: bool
+
+
+class FeedbackRow(_FeedbackRowRequired, total=False):
+    """Entry of the feedback log."""
+
+    # Retraction, if it was retracted.
+    retraction: Optional[Retraction]
+
+
+class Fork(TypedDict, total=False):
+    """A new study with the set-up of another one. Absent fields are copied."""
+
+    # Who answers comparisons.
+    feedback_mode: Optional[FeedbackMode]
+    # Whether to solve with muscles.
+    muscles: Optional[bool]
+    # Name shown to people.
+    name: Optional[str]
+    # Seed of every random draw except allocations.
+    seed: Optional[int]
+    # Whether to start the study immediately.
+    start: bool
+    # Number of trials.
+    trial_budget: Optional[int]
+
+
+class StickFigure(TypedDict):
+    """Positions of the body at an instant: forward and up, m."""
+
+    # Hip.
+    hip: list[float]
+    # Left (intact) leg.
+    left: LegPoints
+    # Right (prosthetic) leg.
+    right: LegPoints
+    # Shoulder.
+    shoulder: list[float]
+    # Time from the start of the stride, s.
+    time_s: float
+
+
+class _FrameRequired(StickFigure):
+    # Name of the domain.
+    domain: str
+    # Ground forces on left heel, left toe, right heel and right toe, forward and up, N.
+    forces_n: list[list[float]]
+
+
+class Frame(_FrameRequired, total=False):
+    """Node of a motion."""
+
+    # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
+    # muscles.
+    activations: Optional[list[float]]
+
+
+class GaitSettingsLimitsDurationMaxS(TypedDict):
+    ds2: float
+    ds3: float
+    ss1: float
+    ss2: float
+
+
+class GaitSettingsLimitsDurationMinS(TypedDict):
+    ds2: float
+    ds3: float
+    ss1: float
+    ss2: float
+
+
+class GaitSettingsLimits(TypedDict, total=False):
+    ankle_dorsiflexion_torque_n_m: float
+    ankle_plantarflexion_torque_n_m: float
+    clearance_min_m: float
+    contact_force_max_n: float
+    duration_max_s: GaitSettingsLimitsDurationMaxS
+    duration_min_s: GaitSettingsLimitsDurationMinS
+    fibre_length_max: float
+    fibre_length_min: float
+    friction: float
+    heel_touchdown_m_s: float
+    hip_max_rad: float
+    hip_torque_n_m: float
+    impact_friction: float
+    impulse_max_n_s: float
+    knee_max_rad: float
+    knee_min_rad: float
+    knee_torque_n_m: float
+    liftoff_force_n: float
+    phase_rate_min_m_s: float
+    speed_max_m_s: float
+    speed_min_m_s: float
+    step_max_m: float
+    step_min_m: float
+    toe_touchdown_m_s: float
+    torso_tolerance_rad: float
+
+
+class GaitSettingsMesh(TypedDict, total=False):
+    ds2: int
+    ds3: int
+    ss1: int
+    ss2: int
+
+
+class GaitSettingsRegularisation(TypedDict, total=False):
+    acceleration: float
+    activation: float
+    activation_bend: float
+    contact_force: float
+    fibre_velocity: float
+    power_smoothing_w: float
+    torque: float
+
+
+class GaitSettings(TypedDict, total=False):
+    """Settings of the gait problem."""
+
+    limits: GaitSettingsLimits
+    mesh: GaitSettingsMesh
+    regularisation: GaitSettingsRegularisation
+
+
+class GivenBound(TypedDict):
+    """A tuned bound with its given value."""
+
+    # Name of the bound.
+    bound: str
+    # What it limits, with its unit.
+    meaning: str
+    # Given value.
+    value: float
+
+
+class Health(TypedDict):
+    """Health of the service."""
+
+    # `ready`, or `short_of_space` if less disk space is free than the reserve.
+    status: str
+    # Version of the program.
+    version: str
+
+
+class _ImportRequired(TypedDict):
+    # Who imported it.
+    actor: str
+    # SHA-256 of the archive.
+    file_sha256: str
+    # Time of the import.
+    imported_at: Instant
+    # Whether the import required a signature by that key.
+    trusted: bool
+    # Number of trials whose Gait RMSE could not be checked, because the archive does not have their gaits.
+    unchecked_rmse: int
+
+
+class Import(_ImportRequired, total=False):
+    """Import of a study."""
+
+    # Public key of the signer. Absent for an unsigned archive.
+    signed_by: Optional[str]
+
+
+class _InTheLabRequired(TypedDict):
+    # Whether that answer can be retracted here.
+    can_be_retracted: bool
+    # Whether the session is closed.
+    closed: bool
+    # Identifier of the session.
+    session: LabSessionId
+    # Number of walks.
+    walks: int
+
+
+class InTheLab(_InTheLabRequired, total=False):
+    """Session as shown in the lab, without anything that reveals a gait."""
+
+    # Current answer of the subject.
+    answer: Optional[LabAnswer]
+    # Number to send with the answer. Absent before the last walk and after an answer.
+    asks: Optional[int]
+    # Time at which the last walk was recorded.
+    last_recorded: Optional[Instant]
+    # Number to send with a report of an unsafe walk. Absent until the subject may have walked with the device.
+    reports: Optional[int]
+    # Next walk, 1 to 3. Absent after the last walk and in a closed session.
+    walk: Optional[int]
+
+
+class Invitation(TypedDict):
+    """Rater to invite."""
+
+    # Name or code of the rater, 1 to 80 characters. A new name adds a rater.
+    name: str
+
+
+class Invited(TypedDict):
+    """Invited rater."""
+
+    # The membership.
+    member: Member
+    # Path of the one-time sign-in link, which is shown once and valid for a day.
+    path: str
+
+
+class Iteration(TypedDict):
+    """One iteration of a solve."""
+
+    # Barrier parameter.
+    barrier: float
+    # Largest violation of a scaled row.
+    constraint_violation: float
+    # Largest entry of the dual infeasibility.
+    dual_infeasibility: float
+    # Initial guess it belongs to.
+    guess: int
+    # Number of the iteration over all phases.
+    iteration: int
+    # Objective of the phase.
+    objective: float
+    # Phase of the solve.
+    phase: str
+    # Primal step length.
+    step: float
+
+
+class _JobRequired(TypedDict):
+    # Identifier.
+    id: str
+    # Kind of the job.
+    kind: JobKind
+    # State of the job.
+    state: JobState
+
+
+class Job(_JobRequired, total=False):
+    """Background work of the service."""
+
+    # Reason if it failed. Null otherwise.
+    reason: Optional[str]
+    # Address of the result. Null until the job is done.
+    result: Optional[str]
+    # Attempts and worker of an open solve. Null otherwise.
+    solve: Optional[OpenSolve]
+    # Study of the trial. Null for a backup.
+    study_id: Optional[StudyId]
+    # Trial of the job. Null for a backup.
+    trial_id: Optional[TrialId]
+
+
+class JointRelaxation(TypedDict):
+    """Effect of relaxing several tuned bounds together, each by the same fraction of the way to its loosest value.
+    Computed if no single relaxation gives a gait.
+    """
+
+    # The bounds, one of each conflict.
+    bounds: list[RelaxedBound]
+    # Number of solves.
+    solves: int
+    # Number of starting points of the search with `not_with`.
+    starts: int
+    # Whether a solve with `not_with` gave up, so that infeasibility is not certain.
+    undecided: bool
+
+
+class LabAnswer(TypedDict):
+    """Answer of the subject, in terms of walks."""
+
+    # Who recorded it.
+    actor: str
+    # The answer. First is walk 2, second is walk 3.
+    answer: Judgement
+    # Time of recording.
+    at: Instant
+    # Whether the answer is not blind: it was recorded after unblinding, or by a user who had fetched a controller file.
+    could_have_known: bool
+    # Free text.
+    note: str
+    # Number of the answer, from 1. It increases by one when an answer is retracted.
+    number: int
+
+
+class LearnerSettings(TypedDict, total=False):
+    """Settings of the learner."""
+
+    additive_share: float
+    avoidance: Optional[float]
+    broad_lengthscale: float
+    buffer: int
+    coactive_noise: float
+    feasibility_additive_share: float
+    feasibility_lengthscale_factor: float
+    inference: Literal["laplace", "expectation_propagation"]
+    labels: Literal["in_utility", "separate"]
+    learn_every: Optional[int]
+    lengthscale_factor: float
+    line_trials: int
+    lines: int
+    link: Literal["logistic", "probit"]
+    method: Literal["linecospar", "eubo", "thompson", "information_gain", "random"]
+    nugget: float
+    ordinal_noise: float
+    ordinal_thresholds: list[float]
+    pairwise_share: float
+    partner: Literal["previous", "incumbent", "every"]
+    preference_noise: float
+    repeats: bool
+    samples_per_iteration: int
+    signal_variance: float
+    start: Literal["random", "centre"]
+    tie_noise: float
+    tie_width: float
+
+
+class LegPoints(TypedDict):
+    """Joint positions of one leg: forward and up, m."""
+
+    # Ankle.
+    ankle: list[float]
+    # Heel.
+    heel: list[float]
+    # Knee.
+    knee: list[float]
+    # Toe.
+    toe: list[float]
+
+
+class LimitCycles(TypedDict):
+    """Limit cycles of a walk."""
+
+    # Cut-off frequency of the zero-phase low-pass filter before central differences, Hz.
+    cutoff_hz: float
+    # Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
+    joints: list[PhasePortrait]
+    # Measurement file of the walk.
+    recording_id: MeasurementFileId
+    # Number of the walk, 1 to 3.
+    walk: int
+
+
+class LinearAlgebra(TypedDict):
+    """Operations and times of the linear algebra of a solve."""
+
+    # Numerical factorisations.
+    factorisations: int
+    # Number of times that the fallback method was used.
+    fallbacks: int
+    # Analysing the structure of matrices, s.
+    seconds_analysis: float
+    # Assembling and factorising, s.
+    seconds_factorisation: float
+    # Substitutions, residuals and refinement, s.
+    seconds_solves: float
+    # Forward-backward substitutions.
+    substitutions: int
+
+
+class Link(TypedDict):
+    """One-time sign-in link."""
+
+    # Path of the link, which is shown once and valid for a day.
+    path: str
+
+
+class _TokenRequired(TypedDict):
+    # Time of creation.
+    created_at: Instant
+    # Who created it. The token is revoked when this user is disabled or is no longer an administrator.
+    created_by: str
+    # Identifier.
+    id: TokenId
+    # Unique name that states its purpose.
+    name: str
+    # Scopes.
+    scopes: list[Right]
+
+
+class Token(_TokenRequired, total=False):
+    """Token of a program, without its secret."""
+
+    # Time of expiry. Absent if it does not expire.
+    expires_at: Optional[Instant]
+    # Time of revocation, if it was revoked.
+    revoked_at: Optional[Instant]
+
+
+class MadeToken(Token):
+    """New token."""
+
+    # Secret, shown once. Send it as `Authorization: Bearer SECRET`.
+    secret: str
+
+
+class _MatchRequired(TypedDict):
+    # The reference gait.
+    reference_gait: ReferenceGait
+
+
+class Match(_MatchRequired, total=False):
+    """A reference gait and the distance between the recorded person and a subject."""
+
+    # `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
+    distance: Optional[float]
+
+
+class _MeRequired(TypedDict):
+    # Name of the user or the token.
+    name: str
+    # Rights of the caller.
+    rights: list[Right]
+
+
+class Me(_MeRequired, total=False):
+    """Caller of the request."""
+
+    # Role of the user. Null for tokens.
+    role: Optional[Role]
+
+
+class MeasurementFile(TypedDict):
+    """Measurement file, without its content."""
+
+    # Who uploaded it.
+    actor: str
+    # Time of the upload.
+    created_at: Instant
+    # Identifier.
+    id: MeasurementFileId
+    # Kind of measurement.
+    kind: MeasurementKind
+    # SHA-256 of the file.
+    raw_sha256: str
+    # The session.
+    session_id: LabSessionId
+    # Number of the walk, 1 to 3.
+    walk: int
+
+
+class _MemberRequired(TypedDict):
+    # Who added the member.
+    added_by: str
+    # Time of addition.
+    created_at: Instant
+    # Identifier of the membership.
+    id: MemberId
+    # Whether it is a user or a token.
+    kind: MemberKind
+    # Name of the user or the token.
+    name: str
+    # The study.
+    study_id: StudyId
+
+
+class Member(_MemberRequired, total=False):
+    """Member of a study."""
+
+    # Role of a user. Absent for a token.
+    role: Optional[Role]
+
+
+class _MilestoneRequired(TypedDict):
+    # Number of results so far, from 1.
+    iteration: int
+    # Number of that trial.
+    number: int
+    # Best trial at that time.
+    trial_id: TrialId
+
+
+class Milestone(_MilestoneRequired, total=False):
+    """The recommendation after an iteration."""
+
+    # Cost of transport of that trial.
+    cost_of_transport: Optional[float]
+    # Gait RMSE of that trial, rad. Absent if it did not converge.
+    gait_rmse_rad: Optional[float]
+
+
+class _ModelActivityRequired(TypedDict):
+    # Activation at 0, 1, ..., 100 % of the cycle, 0 to 1.
+    activation: list[float]
+    # Name of the channel.
+    channel: str
+    # Name of the muscle.
+    muscle: str
+    # RMS difference of activation and measured activity.
+    rms_difference: float
+
+
+class ModelActivity(_ModelActivityRequired, total=False):
+    """The activation of the muscle of a channel over the gait cycle."""
+
+    # Correlation of both activities over the cycle; null if one of them is constant.
+    correlation: Optional[float]
+
+
+class Motion(TypedDict):
+    """Motion of a gait over one stride from right heel strike."""
+
+    # Nodes by time. Interpolate linearly between them.
+    frames: list[Frame]
+    # Stride length, m.
+    stride_length_m: float
+    # Stride time, s.
+    stride_time_s: float
+
+
+class MotionReading(TypedDict, total=False):
+    """How to read a file with joint angles."""
+
+    # Cut-off frequency of the low-pass filter before differentiation, Hz.
+    cutoff_hz: float
+    # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
+    # knee_R_rad, ankle_R_rad.
+    form: FileForm
+    # Unit of angles, if the header of an OpenSim file does not state it.
+    unit: Optional[Unit]
+
+
+class Multiplier(TypedDict):
+    """A multiplier of the stride-to-stride map."""
+
+    # Imaginary part.
+    imaginary: float
+    # Real part.
+    real: float
+
+
+class MuscleParametersGas(TypedDict, total=False):
+    # largest moment arm at the ankle, m
+    ankle_lever_m: Optional[float]
+    # largest moment arm at the knee, m
+    knee_lever_m: Optional[float]
+    # maximum isometric force, N
+    max_force_n: Optional[float]
+    # maximum shortening speed, optimal lengths per second
+    max_speed: Optional[float]
+    # optimal fibre length, m
+    optimal_length_m: Optional[float]
+    # tendon slack length, m
+    slack_length_m: Optional[float]
+
+
+class MuscleParametersGlu(TypedDict, total=False):
+    # largest moment arm at the hip, m
+    hip_lever_m: Optional[float]
+    # maximum isometric force, N
+    max_force_n: Optional[float]
+    # maximum shortening speed, optimal lengths per second
+    max_speed: Optional[float]
+    # optimal fibre length, m
+    optimal_length_m: Optional[float]
+    # tendon slack length, m
+    slack_length_m: Optional[float]
+
+
+class MuscleParametersHam(TypedDict, total=False):
+    # largest moment arm at the hip, m
+    hip_lever_m: Optional[float]
+    # largest moment arm at the knee, m
+    knee_lever_m: Optional[float]
+    # maximum isometric force, N
+    max_force_n: Optional[float]
+    # maximum shortening speed, optimal lengths per second
+    max_speed: Optional[float]
+    # optimal fibre length, m
+    optimal_length_m: Optional[float]
+    # tendon slack length, m
+    slack_length_m: Optional[float]
+
+
+class MuscleParametersHfl(TypedDict, total=False):
+    # largest moment arm at the hip, m
+    hip_lever_m: Optional[float]
+    # maximum isometric force, N
+    max_force_n: Optional[float]
+    # maximum shortening speed, optimal lengths per second
+    max_speed: Optional[float]
+    # optimal fibre length, m
+    optimal_length_m: Optional[float]
+    # tendon slack length, m
+    slack_length_m: Optional[float]
+
+
+class MuscleParametersSol(TypedDict, total=False):
+    # largest moment arm at the ankle, m
+    ankle_lever_m: Optional[float]
+    # maximum isometric force, N
+    max_force_n: Optional[float]
+    # maximum shortening speed, optimal lengths per second
+    max_speed: Optional[float]
+    # optimal fibre length, m
+    optimal_length_m: Optional[float]
+    # tendon slack length, m
+    slack_length_m: Optional[float]
+
+
+class MuscleParametersTa(TypedDict, total=False):
+    # largest moment arm at the ankle, m
+    ankle_lever_m: Optional[float]
+    # maximum isometric force, N
+    max_force_n: Optional[float]
+    # maximum shortening speed, optimal lengths per second
+    max_speed: Optional[float]
+    # optimal fibre length, m
+    optimal_length_m: Optional[float]
+    # tendon slack length, m
+    slack_length_m: Optional[float]
+
+
+class MuscleParametersVas(TypedDict, total=False):
+    # largest moment arm at the knee, m
+    knee_lever_m: Optional[float]
+    # maximum isometric force, N
+    max_force_n: Optional[float]
+    # maximum shortening speed, optimal lengths per second
+    max_speed: Optional[float]
+    # optimal fibre length, m
+    optimal_length_m: Optional[float]
+    # tendon slack length, m
+    slack_length_m: Optional[float]
+
+
+class MuscleParameters(TypedDict, total=False):
+    """How muscles differ from the published table."""
+
+    gas: MuscleParametersGas
+    glu: MuscleParametersGlu
+    ham: MuscleParametersHam
+    hfl: MuscleParametersHfl
+    scaled_to_body: bool
+    sol: MuscleParametersSol
+    ta: MuscleParametersTa
+    vas: MuscleParametersVas
+
+
+class _NewAssessmentRequired(TypedDict):
+    # `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. Which gait is better is a preference.
+    answer: Literal["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
+    # Trial of one gait.
+    first: TrialId
+    # Trial of the other gait.
+    second: TrialId
+
+
+class NewAssessment(_NewAssessmentRequired, total=False):
+    """An assessment."""
+
+    # Name or pseudonym of the author. Defaults to the caller's name.
+    author: Optional[str]
+    # Free text.
+    note: str
+    # Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    source: Optional[PersonSource]
+
+
+class NewConsent(TypedDict):
+    """A consent that a subject signed."""
+
+    # Name and version of the consent form.
+    form: str
+
+
+class NewCorrection(TypedDict):
+    """A correction of height and mass."""
+
+    # Body mass, kg.
+    body_mass_kg: float
+    # Body height, m.
+    height_m: float
+    # Reason for the correction.
+    reason: str
+
+
+class _NewEmgRequired(TypedDict):
+    # Content of the file.
+    recording: str
+    # Number of the walk.
+    walk: int
+
+
+class NewEmg(_NewEmgRequired, total=False):
+    """EMG recording of a walk."""
+
+    # How to read the file.
+    reading: EmgReading
+
+
+class _NewLabAnswerRequired(TypedDict):
+    # The answer. First is walk 2, second is walk 3. `withdrawn` is reserved for the service.
+    answer: Literal["first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
+    # Number of the answer: `asks` or, for a report of an unsafe walk, `reports` of the session. An answer that is sent
+    # twice counts once.
+    number: int
+
+
+class NewLabAnswer(_NewLabAnswerRequired, total=False):
+    """Answer of the subject."""
+
+    # Free text, at most 2000 characters.
+    note: str
+
+
+class NewMember(TypedDict):
+    """A user or token to add to a study."""
+
+    # Whether it is a user or a token.
+    kind: MemberKind
+    # Name of an enabled user or a valid token.
+    name: str
+
+
+class _NewMotionRequired(TypedDict):
+    # Content of the file.
+    recording: str
+    # Number of the walk.
+    walk: int
+
+
+class NewMotion(_NewMotionRequired, total=False):
+    """Joint angles of a walk."""
+
+    # How to read the file.
+    reading: MotionReading
+
+
+class _NewPreferenceRequired(TypedDict):
+    # Which gait is better.
+    answer: PairAnswer
+    # The first gait.
+    trial_a: TrialId
+    # The second gait.
+    trial_b: TrialId
+
+
+class NewPreference(_NewPreferenceRequired, total=False):
+    """A preference to give."""
+
+    # Name or pseudonym of the author. Defaults to the caller's name.
+    author: Optional[str]
+    # Free text.
+    note: str
+    # Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    source: Optional[PersonSource]
+
+
+class _NewReferenceGaitRequired(TypedDict):
+    # Name shown to people.
+    name: str
+    # Content of the file.
+    recording: str
+
+
+class NewReferenceGait(_NewReferenceGaitRequired, total=False):
+    """A recording that becomes a reference gait."""
+
+    # Body mass of the recorded person, kg.
+    body_mass_kg: Optional[float]
+    # Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
+    # `Treadmill_R_vy` for Camargo 2021.
+    force_column: Optional[str]
+    # Content of a separate file with the force column: an OpenSim file, or the `fp` table that belongs to an `ik` table
+    # of Camargo 2021. Both files must have the same time axis.
+    forces: Optional[str]
+    # File format of the recording.
+    form: Form
+    # Times of right heel strikes, s. Empty: detect them.
+    heel_strikes_s: list[float]
+    # Height of the recorded person, m.
+    height_m: Optional[float]
+    # How to find right heel strikes if `heel_strikes_s` is empty.
+    strikes: Strikes
+    # Unit of angles, if the header of an OpenSim file does not state it.
+    unit: Optional[Unit]
+
+
+class NewRole(TypedDict):
+    """New role of a user."""
+
+    # Role.
+    role: Role
+
+
+class NewSafetyReport(TypedDict, total=False):
+    """A report that a gait is unsafe."""
+
+    # Name or pseudonym of the author. Defaults to the caller's name.
+    author: Optional[str]
+    # What happened, at most 2000 characters.
+    note: str
+    # Who reports: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    source: Optional[PersonSource]
+
+
+class _NewSessionRequired(TypedDict):
+    # Converged trial of one gait.
+    gait_one: TrialId
+    # Converged trial of the other gait.
+    gait_two: TrialId
+
+
+class NewSession(_NewSessionRequired, total=False):
+    """Lab session to plan."""
+
+    # Free text, at most 2000 characters.
+    notes: str
+
+
+class _NewStudyRequired(TypedDict):
+    # Subject of the study.
+    subject_id: SubjectId
+
+
+class NewStudy(_NewStudyRequired, total=False):
+    """A study to create. Every field except the subject has a default."""
+
+    # Values of the bounds that are not tuned.
+    base_bounds: BaseBounds
+    # Device. The built-in one by default.
+    device_id: Optional[DeviceId]
+    # Who evaluates trials.
+    evaluation: Evaluation
+    # Who answers comparisons.
+    feedback_mode: FeedbackMode
+    # Settings of the gait problem. Unless they set muscles, the measured muscle values of the subject apply.
+    gait_settings: GaitSettings
+    # Settings of the learner. Absent settings have the recommended values of the method.
+    learner: LearnerSettings
+    # Whether to solve with muscles (C1-C12) or without (C1-C4).
+    muscles: bool
+    # Name shown to people. Made from subject and variant by default.
+    name: Optional[str]
+    # Number of trials that run in parallel.
+    parallel_trials: int
+    # Priority, -10 to 10. Higher values run first.
+    priority: int
+    # Reference gait for Gait RMSE. By default the one nearest to the subject in height and body mass, or the built-in
+    # one if no reference gait states height and mass.
+    reference_gait_id: Optional[ReferenceGaitId]
+    # Whether only members and administrators can access the study. The creator becomes a member.
+    restricted: bool
+    # Tuned bounds and their values. Table I of the paper by default.
+    search_space: Optional[SearchSpace]
+    # Seed of every random draw except allocations.
+    seed: int
+    # Limits of one solve.
+    solve_options: SolveOptions
+    # Total solve time, s, after which no new trial starts.
+    solve_seconds_budget: Optional[float]
+    # Whether to start the study immediately.
+    start: bool
+    # Number of trials.
+    trial_budget: int
+    # The study finishes when the best action has not changed over this many results.
+    unchanged_limit: Optional[int]
+
+
+class _NewSubjectRequired(TypedDict):
+    # Body mass, kg.
+    body_mass_kg: float
+    # Body height, m.
+    height_m: float
+    # Pseudonym assigned by the site, never a name.
+    pseudonym: str
+
+
+class NewSubject(_NewSubjectRequired, total=False):
+    """A subject to add."""
+
+    # Free text.
+    notes: str
+
+
+class _NewTokenRequired(TypedDict):
+    # Purpose of the token, 1 to 80 characters.
+    name: str
+    # Scopes: at least one of `read`, `run`, `answer`, `rate`, `device`.
+    scopes: list[Literal["read", "run", "answer", "rate", "device"]]
+
+
+class NewToken(_NewTokenRequired, total=False):
+    """A token to create."""
+
+    # Validity in days. Unlimited if absent.
+    days: Optional[int]
+
+
+class NewUser(TypedDict):
+    """A user to add."""
+
+    # Name or code, 1 to 80 characters.
+    name: str
+    # Role of the user.
+    role: Role
+
+
+class NextPair(TypedDict, total=False):
+    """Next pair of a rater."""
+
+    # The pair. Null if no comparison is pending.
+    pair: Optional[Pair]
+
+
+class _OpenSolveRequired(TypedDict):
+    # Number of times that it was given to a worker.
+    attempts: int
+    # Time of queueing.
+    created_at: Instant
+    # Attempts that ended with a panic or an error.
+    failures: int
+    # Attempts whose worker stopped responding.
+    losses: int
+
+
+class OpenSolve(_OpenSolveRequired, total=False):
+    """A solve that has not ended."""
+
+    # End of the lease, unless it is renewed.
+    lease_until: Optional[Instant]
+    # Worker that has it. Null while it is queued.
+    worker: Optional[str]
+
+
+class Optimality(TypedDict):
+    """First-order conditions of a local optimum."""
+
+    # Last barrier parameter.
+    barrier: float
+    # Largest product of a distance to a bound and its multiplier.
+    complementarity: float
+    # Largest entry of the Lagrangian's gradient.
+    dual_infeasibility: float
+
+
+class Pair(TypedDict):
+    """Pair to compare, as shown to a rater."""
+
+    # Address of the motion that is shown first.
+    first: str
+    # Number of the pair for this rater.
+    number: int
+    # Address of the motion that is shown second.
+    second: str
+    # Token of the pair.
+    token: str
+
+
+class PhasePortrait(TypedDict):
+    """Angle and velocity of a joint, sample after sample."""
+
+    # Angle, rad.
+    angle_rad: list[float]
+    # Name of the joint.
+    joint: str
+    # Velocity, rad/s.
+    velocity_rad_s: list[float]
+
+
+class _PresentationRequired(TypedDict):
+    # Time of the draw.
+    created_at: Instant
+    # Identifier.
+    id: PresentationId
+    # Why it was shown.
+    kind: PresentationKind
+    # Number of the pair for this rater in this study, from 1.
+    number: int
+    # Name of the rater.
+    rater: str
+    # Trial shown first.
+    shown_first: TrialId
+    # Trial shown second.
+    shown_second: TrialId
+    # The study.
+    study_id: StudyId
+    # Whether the rater could have known the allocation.
+    unblinded: bool
+
+
+class Presentation(_PresentationRequired, total=False):
+    """Pair of an unblinded rater, with its sides."""
+
+    # Answer in terms of what was shown. Absent if there is none yet.
+    answer: Optional[Judgement]
+    # Time of the answer.
+    answered_at: Optional[Instant]
+    # Earlier presentation that it repeats.
+    repeats: Optional[PresentationId]
+
+
+class _ProblemRequired(TypedDict):
+    # What went wrong in this request.
+    detail: str
+    # The HTTP status.
+    status: int
+    # Name of the kind.
+    title: str
+    # Kind of problem, stable across versions. The address serves a page that explains the kind.
+    type: str
+
+
+class Problem(_ProblemRequired, total=False):
+    """A problem document."""
+
+    # Values that are accepted.
+    allowed: Optional[str]
+    # Name of the field that was refused.
+    field: Optional[str]
+    # Identifier of the request, as in the `X-Request-Id` header and the log.
+    request_id: Optional[str]
+    # Value that was given.
+    value: Any
+
+
+class Processing(TypedDict, total=False):
+    """Settings of EMG processing."""
+
+    # band_low_hz, band_high_hz, envelope_hz and order. Absent settings have their defaults.
+    settings: EmgSettings
+
+
+class _ProportionRequired(TypedDict):
+    # Number of successes.
+    count: int
+    # Number of cases.
+    of: int
+
+
+class Proportion(_ProportionRequired, total=False):
+    """A proportion with its 95 % confidence interval (Wilson)."""
+
+    # Upper bound of the interval.
+    high: Optional[float]
+    # Lower bound of the interval.
+    low: Optional[float]
+    # `count / of`.
+    share: Optional[float]
+
+
+class Pushes(TypedDict):
+    """Largest changes of the hip's forward velocity that are recovered, m/s."""
+
+    # Backwards.
+    backwards_m_s: float
+    # Forwards.
+    forwards_m_s: float
+
+
+class _RaterAnswerRequired(TypedDict):
+    # The answer. `withdrawn` is reserved for the service.
+    answer: Literal["first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
+
+
+class RaterAnswer(_RaterAnswerRequired, total=False):
+    """Answer of a rater."""
+
+    # Free text, at most 2000 characters.
+    note: str
+    # Response time of the rater, ms.
+    response_ms: Optional[int]
+
+
+class _RaterFiguresRequired(TypedDict):
+    # Number of answers.
+    answered: int
+    # Number of "cannot tell" answers.
+    cannot_tell: int
+    # Name of the rater.
+    rater: str
+    # Share of repeated pairs with the same answer as before, among blind answers.
+    repeats_agree: Proportion
+    # Number of presentations.
+    shown: int
+    # Number of presentations in which the rater could have known the allocation. The shares exclude them.
+    unblinded: int
+    # Number of answers that reported a gait as unsafe.
+    unsafe_gaits: int
+
+
+class RaterFigures(_RaterFiguresRequired, total=False):
+    """Reliability of a rater in a study."""
+
+    # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Absent
+    # until the rater is unblinded, because it would reveal allocations.
+    first_preferred: Optional[Proportion]
+
+
+class _RecommendedRequired(TypedDict):
+    # Action as bounds.
+    bounds: Bounds
+    # Number of the trial.
+    number: int
+    # Trial of the action.
+    trial_id: TrialId
+
+
+class Recommended(_RecommendedRequired, total=False):
+    """Recommended action."""
+
+    # Cost of transport of the trial.
+    cost_of_transport: Optional[float]
+    # Gait RMSE of the trial, rad.
+    gait_rmse_rad: Optional[float]
+
+
+class _RecommendationRequired(Recommended):
+    # State of the certificate of its gait.
+    certificate: CertificateState
+    # Whether gaits of the study are being certified, so that the recommendation may change.
+    certifying: bool
+    # Reasons if it failed.
+    objections: list[str]
+    study: str
+    study_id: StudyId
+
+
+class Recommendation(_RecommendationRequired, total=False):
+    """Best action of a study."""
+
+    # If it failed, the best action whose gait passed.
+    passing: Optional[Recommended]
+
+
+class Recorded(FeedbackRow):
+    """Recorded preference."""
+
+    # Answers of other people to the same comparison, at most the newest twenty.
+    other_answers: list[FeedbackId]
+
+
+class _RecordedWalkRequired(TypedDict):
+    # Number of the walk. Walks are recorded in order.
+    walk: int
+
+
+class RecordedWalk(_RecordedWalkRequired, total=False):
+    """Walk to record."""
+
+    # Free text, at most 2000 characters.
+    note: str
+
+
+class ReferenceGait(TypedDict):
+    """Reference gait. A changed definition is a new reference gait, so that studies keep theirs."""
+
+    # Time of creation.
+    created_at: Instant
+    # Definition of the reference gait.
+    definition: ReferenceGaitDocument
+    # Identifier.
+    id: ReferenceGaitId
+    # Name shown to people.
+    name: str
+
+
+_RelaxationRequired = TypedDict(
+    "_RelaxationRequired",
+    {
+        # Name of the bound.
+        "bound": "str",
+        # Given value.
+        "from": "float",
+        # What it limits, with its unit.
+        "meaning": "str",
+        # The loosest tried value that does not give a gait.
+        "not_with": "float",
+        # Number of solves.
+        "solves": "int",
+        # Number of starting points of the search with `not_with`. 0 if unknown.
+        "starts": "int",
+        # Whether a solve with that value gave up, so that infeasibility is not certain.
+        "undecided": "bool",
+    },
+)
+
+
+class Relaxation(_RelaxationRequired, total=False):
+    """Effect of relaxing one tuned bound alone."""
+
+    # The value nearest to the given one that was found to give a gait. Null if not even the loosest value does.
+    to: Optional[float]
+
+
+_RelaxedBoundRequired = TypedDict(
+    "_RelaxedBoundRequired",
+    {
+        # Name of the bound.
+        "bound": "str",
+        # Given value.
+        "from": "float",
+        # What it limits, with its unit.
+        "meaning": "str",
+        # The loosest value that does not give a gait together with the others.
+        "not_with": "float",
+    },
+)
+
+
+class RelaxedBound(_RelaxedBoundRequired, total=False):
+    """Relaxation of one of several bounds."""
+
+    # The value nearest to the given one that gives a gait together with the others. Null if not even the loosest value
+    # does.
+    to: Optional[float]
+
+
+class _RetractRequired(TypedDict):
+    reason: str
+
+
+class Retract(_RetractRequired, total=False):
+    """Retraction of a preference or an assessment."""
+
+    # Author of the retraction. Defaults to the caller's name.
+    author: Optional[str]
+
+
+class Retraction(TypedDict):
+    """Retraction of an answer."""
+
+    # Who retracted it.
+    author: str
+    # Time of the retraction.
+    created_at: Instant
+    # Reason, never empty.
+    reason: str
+
+
+class ReturnMap(TypedDict):
+    """Stability of a gait, from the stride-to-stride map."""
+
+    # Resolution of the finite differences.
+    differences_resolve: float
+    # Largest distance from the gait's first state to the fixed point, rad and rad/s.
+    fixed_point_distance: float
+    # Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
+    fixed_point_residual: float
+    # Largest change of the state over one stride from the gait's own first state, rad and rad/s.
+    gait_residual: float
+    # Largest modulus of the multipliers.
+    largest: float
+    # Largest modulus of the multipliers from differences of simulated domains.
+    largest_by_differences: float
+    # Multipliers from variational equations and saltation, largest first.
+    multipliers: list[Multiplier]
+    # Fraction of a proportional change of all velocities that remains after one stride.
+    speed_kept: float
+    # Change in other coordinates that such a change causes within one stride, relative to its size.
+    speed_leak: float
+
+
+class _SafetyReportRequired(TypedDict):
+    # Time of the report.
+    at: Instant
+    # Who reported it.
+    by: str
+    # Identifier of the report. A report from a blinded pair, an assessment or a lab session has the identifier of that
+    # object, so reports about both of its gaits share one identifier.
+    id: SafetyReportId
+    # Whether the report is open, so that the gait must not be walked.
+    stands: bool
+    # Trial of the gait.
+    trial_id: TrialId
+
+
+class SafetyReport(_SafetyReportRequired, total=False):
+    """Safety report about a gait."""
+
+    # Newest review. Null while the report awaits review.
+    review: Optional[SafetyReview]
+
+
+class SafetyReview(TypedDict):
+    """Safety review."""
+
+    # Reviewer.
+    author: str
+    # Time of the review.
+    created_at: Instant
+    # Decision.
+    decision: SafetyDecision
+    # Identifier.
+    id: SafetyReviewId
+    # Reason.
+    reason: str
+    # The reports that the review covers. Another report about the same gait needs another review.
+    reports: list[SafetyReportId]
+    # Trial of the reviewed gait.
+    trial_id: TrialId
+
+
+class _SafetyReviewToMakeRequired(TypedDict):
+    # `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
+    decision: SafetyDecision
+    # Reason, 1 to 2000 characters.
+    reason: str
+
+
+class SafetyReviewToMake(_SafetyReviewToMakeRequired, total=False):
+    """A decision about the safety reports of a gait."""
+
+    # Name or pseudonym of the reviewer. Defaults to the caller's name.
+    author: Optional[str]
+    # The open safety reports that the reviewer has seen. The decision is refused if there is another one. By default,
+    # all open reports count as seen.
+    reports: Optional[list[SafetyReportId]]
+
+
+class SearchSpace(TypedDict):
+    """A grid of actions."""
+
+    # One dimension for each tuned bound.
+    dimensions: list[Dimension]
+
+
+class _SessionRequired(TypedDict):
+    # Whether the user signed in with a one-time link rather than a password.
+    by_link: bool
+    # Time of sign-in.
+    created_at: Instant
+    # Identifier, which is not the secret.
+    id: SessionId
+    # Time of the last activity.
+    seen_at: Instant
+    # Identifier of the user.
+    user_id: UserId
+    # Name of the user.
+    user_name: str
+
+
+class Session(_SessionRequired, total=False):
+    """Session of a user."""
+
+    # Client address at sign-in.
+    address: Optional[str]
+    # User agent of the browser.
+    browser: Optional[str]
+
+
+class _SessionViewRequired(TypedDict):
+    # Time of planning.
+    created_at: Instant
+    # Who fetched controller files of the walks.
+    device_files: list[DeviceFile]
+    # Trial of one gait. Does not imply the order of the walks.
+    gait_one: TrialId
+    # Trial of the other gait.
+    gait_two: TrialId
+    # Identifier.
+    id: LabSessionId
+    # Free text.
+    notes: str
+    # Number of the session in this study, from 1.
+    number: int
+    # Whether the allocation is in this record. A study that was imported while the session was blinded does not have
+    # it.
+    order_included: bool
+    # Who planned the session.
+    planned_by: str
+    # State of the session.
+    state: SessionState
+    # The study.
+    study_id: StudyId
+    # The three walks.
+    walks: list[WalkView]
+
+
+class SessionView(_SessionViewRequired, total=False):
+    """Lab session, without blinded data."""
+
+    # Current answer of the subject. Absent if there is none.
+    answer: Optional[LabAnswer]
+    # Who closed the session, and when.
+    closed: Optional[Done]
+    # Who unblinded the session, when and why. Absent while it is blinded.
+    unblinded: Optional[Done]
+
+
+class _SolveAttemptRequired(TypedDict):
+    # Whether its gait is the result of the solve.
+    chosen: bool
+    # Gait RMSE where it ended, rad.
+    gait_rmse_rad: float
+    # Iterations over its phases.
+    iterations: int
+    # Objective where it ended.
+    objective: float
+    # Reason if it could not be completed; otherwise empty.
+    reason: str
+    # Wall time, s.
+    seconds: float
+    # How it ended.
+    status: SolveStatus
+    # Strategy, in words.
+    strategy: str
+
+
+class SolveAttempt(_SolveAttemptRequired, total=False):
+    """One attempt of a solve."""
+
+    # Which local optimum it ended in, from 1; null if it did not converge.
+    basin: Optional[int]
+
+
+class SolveOptionsBasinChoiceNearestToReference(TypedDict):
+    within_percent: float
+
+
+class SolveOptionsBasinChoice(TypedDict):
+    nearest_to_reference: SolveOptionsBasinChoiceNearestToReference
+
+
+class SolveOptions(TypedDict, total=False):
+    """Limits of one solve."""
+
+    basin_choice: Union[Literal["lowest_objective"], SolveOptionsBasinChoice]
+    initial_guesses: int
+    max_iterations: int
+    retry: bool
+    threads: int
+    tightening_rounds: int
+    time_limit_s: Optional[float]
+    tolerance: float
+
+
+class _SolveReportRequired(TypedDict):
+    # All attempts, in order.
+    attempts: list[SolveAttempt]
+    # Mechanical cost of transport, dimensionless.
+    cost_of_transport: float
+    # Durations of the eight domains, s.
+    durations_s: list[float]
+    # Number of equality rows.
+    equalities: int
+    # Parts of Gait RMSE: torso, `hip_L`, `knee_L`, `ankle_L`, `hip_R`.
+    gait_rmse_parts_rad: list[float]
+    # Gait RMSE: sum over the five human coordinates, rad.
+    gait_rmse_rad: float
+    # Number of inequality rows.
+    inequalities: int
+    # Interior-point iterations over all phases.
+    iterations: int
+    # Largest violation of a constraint row or bound, scaled.
+    max_violation: float
+    # Objective: cost of transport plus regularisation.
+    objective: float
+    # Evaluating functions and derivatives, s.
+    seconds_evaluation: float
+    # Linear algebra, s.
+    seconds_linear_algebra: float
+    # Wall time, s.
+    seconds_total: float
+    # Mean walking speed, m/s.
+    speed_m_s: float
+    # What it started from.
+    started_from: StartedFrom
+    # How it ended.
+    status: SolveStatus
+    # Stride length, m.
+    stride_length_m: float
+    # Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes as well.
+    tightened_bounds: int
+    # Number of variables.
+    variables: int
+    # Hip velocity in the four intervals between impacts, m/s.
+    vhip_m_s: list[float]
+
+
+class SolveReport(_SolveReportRequired, total=False):
+    """The figures of one solve."""
+
+    # Parts of the linear algebra. Null if unknown.
+    linear_algebra: Optional[LinearAlgebra]
+    # How well the conditions of a local optimum are met. Null if unknown.
+    optimality: Optional[Optimality]
+
+
+class _StudyPlanRequired(TypedDict):
+    # Values of bounds that are not tuned.
+    base_bounds: Bounds
+    # Device.
+    device_id: DeviceId
+    # Who evaluates trials.
+    evaluation: Evaluation
+    # Who answers comparisons.
+    feedback_mode: FeedbackMode
+    # Settings of the gait problem.
+    gait_settings: GaitSettings
+    # Settings of the learner.
+    learner: LearnerSettings
+    # Whether to solve with muscles (C1-C12) or without (C1-C4).
+    muscles: bool
+    # Name shown to people.
+    name: str
+    # Number of trials that run in parallel. Only 1 gives the published, reproducible order.
+    parallel_trials: int
+    # Priority, -10 to 10. Higher values run first.
+    priority: int
+    # Reference gait for Gait RMSE.
+    reference_gait_id: ReferenceGaitId
+    # Tuned bounds and their values, with dimensions named as the bounds.
+    search_space: SearchSpace
+    # Seed of every random draw except allocations.
+    seed: int
+    # Limits of one solve.
+    solve_options: SolveOptions
+    # Subject of the study.
+    subject_id: SubjectId
+    # Number of trials.
+    trial_budget: int
+
+
+class StudyPlan(_StudyPlanRequired, total=False):
+    """Set-up of a study."""
+
+    # Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
+    # entered first.
+    body: Optional[Body]
+    # Total solve time, s, after which no new trial starts.
+    solve_seconds_budget: Optional[float]
+    # The study finishes when the best action has not changed over this many results.
+    unchanged_limit: Optional[int]
+
+
+class _StudyRequired(StudyPlan):
+    # Time of creation.
+    created_at: Instant
+    # Identifier.
+    id: StudyId
+    # Revision, which increases with each change.
+    revision: int
+    # State.
+    state: StudyState
+    # Reason for the state; may be empty.
+    state_reason: str
+    # Time of the last change.
+    updated_at: Instant
+
+
+class Study(_StudyRequired, total=False):
+    """Study."""
+
+    # Parent, if the study is a fork.
+    forked_from: Optional[StudyId]
+
+
+class StudyAccess(TypedDict):
+    """Access to a study."""
+
+    # Whether only members and administrators can access the study. Raters must be members in any case.
+    restricted: bool
+
+
+class StudyView(Study):
+    """Study with its possible commands."""
+
+    # Commands that are possible in the current state.
+    possible: list[str]
+    trials: TrialCounts
+
+
+class Subject(TypedDict):
+    """Subject, known by a pseudonym only."""
+
+    # Body mass, kg.
+    body_mass_kg: float
+    # Time of creation.
+    created_at: Instant
+    # Body height, m.
+    height_m: float
+    # Identifier.
+    id: SubjectId
+    # Free text.
+    notes: str
+    # Unique pseudonym assigned by the site.
+    pseudonym: str
+
+
+class _SuggestionRequired(TypedDict):
+    # Suggested values of tuned bounds, such as `{"a5": 0.026}`, each a level of the search space. Other bounds keep the
+    # values of the trial.
+    bounds: dict[str, float]
+    # Trial whose gait could be better.
+    over: TrialId
+
+
+class Suggestion(_SuggestionRequired, total=False):
+    """Bounds with which a gait would have been better than that of a trial."""
+
+    # Name or pseudonym of the author. Defaults to the caller's name.
+    author: Optional[str]
+    # Free text.
+    note: str
+    # Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    source: Optional[PersonSource]
+
+
+class _TellRequired(TypedDict):
+    # Whether the evaluation found a gait.
+    outcome: Outcome
+
+
+class Tell(_TellRequired, total=False):
+    """The outcome of a trial, as a script reports it."""
+
+    # Cost of transport.
+    cost_of_transport: Optional[float]
+    # Gait RMSE, rad. Required for `converged` if Gait RMSE answers the comparisons of the study.
+    gait_rmse_rad: Optional[float]
+    # Why there is no gait, 1 to 2000 characters. Required for `not_converged`.
+    reason: str
+
+
+class _TrialRequired(TypedDict):
+    # Action as bounds.
+    action: Bounds
+    # Index of the action in the search space.
+    action_index: int
+    # Time of proposal.
+    created_at: Instant
+    # Identifier.
+    id: TrialId
+    # Message for people about the end of the trial; may be empty.
+    message: str
+    # Number within the study, from 1, in the order of proposal.
+    number: int
+    # Reason for the trial.
+    reason: str
+    # State.
+    state: TrialState
+    # The study it belongs to.
+    study_id: StudyId
+    # Most violated rows, worst first.
+    violations: list[Violation]
+
+
+class Trial(_TrialRequired, total=False):
+    """Trial of a study."""
+
+    # Script that evaluates the trial. Absent if the service does.
+    asked_by: Optional[str]
+    # Best trial when this one was proposed.
+    best_before: Optional[TrialId]
+    # Cost of transport of a converged gait, dimensionless.
+    cost_of_transport: Optional[float]
+    # Time of its end.
+    finished_at: Optional[Instant]
+    # Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
+    gait_rmse_rad: Optional[float]
+    # Interior-point iterations.
+    iterations: Optional[int]
+    # Largest violation, scaled.
+    max_violation: Optional[float]
+    # Objective of the solve.
+    objective: Optional[float]
+    # All figures of the solve.
+    report: Optional[SolveReport]
+    # Wall time of the solve, s.
+    seconds_total: Optional[float]
+    # Time at which a worker first started it.
+    started_at: Optional[Instant]
+    # How the solve ended.
+    status: Optional[SolveStatus]
+    # Trial that gives the warm start. Absent for a cold start.
+    warm_started_from: Optional[TrialId]
+
+
+class TrialCounts(TypedDict):
+    """Numbers of trials of a study by state."""
+
+    # Converged trials.
+    converged: int
+    # Trials that did not converge.
+    not_converged: int
+    # Queued or running trials.
+    open: int
+    # All trials.
+    total: int
+    # Failed, lost or cancelled trials.
+    without_result: int
+
+
+class TrialExplanation(TypedDict):
+    """Infeasibility explanation of a trial."""
+
+    # Tuned bounds that are active at the last iterate.
+    at_limit: list[BoundAtLimit]
+    # Tuned bounds that conflict, and further conflicts if no single bound resolves the first one. Empty in older
+    # explanations.
+    conflicts: list[Conflict]
+    created_at: Instant
+    # Whether the search for a conflict found a gait with the given bounds, which the solve had missed.
+    gait_found: bool
+    # SHA-256 of the trial's `problem.json`.
+    problem_sha256: str
+    # Version of the program that made it.
+    program: str
+    # Effect of relaxing each bound of the first conflict alone: the smallest relaxation first, ineffective ones last.
+    relaxations: list[Relaxation]
+    # The explanation in sentences.
+    sentences: list[str]
+    # Status of the solve.
+    status: SolveStatus
+    # Effect of relaxing several bounds together, if no single one helps.
+    together: list[JointRelaxation]
+    trial_id: TrialId
+    # Violations of the last iterate, worst first.
+    violations: list[Violation]
+
+
+class Unblind(TypedDict):
+    """Rater to unblind, with the reason."""
+
+    # Name of the rater.
+    rater: str
+    # Reason, 1 to 2000 characters.
+    reason: str
+
+
+class UnblindSession(TypedDict):
+    """Session to unblind, with the reason."""
+
+    # Reason, 1 to 2000 characters.
+    reason: str
+
+
+class UnblindedRater(TypedDict):
+    """Pairs of an unblinded rater."""
+
+    # All pairs of the rater, in order.
+    pairs: list[Presentation]
+
+
+class _UserRequired(TypedDict):
+    # Time of creation.
+    created_at: Instant
+    # Whether the user has a password. Otherwise only one-time links work.
+    has_password: bool
+    # Identifier.
+    id: UserId
+    # Name or code, unique ignoring case.
+    name: str
+    # Role.
+    role: Role
+
+
+class User(_UserRequired, total=False):
+    """User."""
+
+    # Time at which the user was disabled, if disabled.
+    disabled_at: Optional[Instant]
+
+
+class Violation(TypedDict):
+    """A violated row of the gait problem."""
+
+    # Amount of the violation.
+    amount: float
+    # The row in words: domain, node, constraint, component.
+    row: str
+    # Unit of the amount.
+    unit: str
+
+
+class _WalkActivityRequired(TypedDict):
+    # Mean of each channel over the cycle.
+    averages: list[float]
+    # Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
+    # the peak of walk 1.
+    channels: list[CycleActivity]
+    # Measurement file that it was computed from.
+    recording_id: MeasurementFileId
+    # Number of the walk, 1 to 3.
+    walk: int
+
+
+class WalkActivity(_WalkActivityRequired, total=False):
+    """Muscle activity of a walk over the gait cycle."""
+
+    # EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
+    emg_rmse: Optional[EmgRmse]
+
+
+class WalkModel(TypedDict):
+    """Muscle activity of the model for a walk."""
+
+    # Each channel whose muscle the model has.
+    muscles: list[ModelActivity]
+    # Number of the walk, 2 or 3.
+    walk: int
+
+
+class _WalkViewRequired(TypedDict):
+    # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
+    after_unblinding: bool
+    # Number of the walk, 1 to 3.
+    number: int
+
+
+class WalkView(_WalkViewRequired, total=False):
+    """Walk of a session."""
+
+    # Condition of the walk. Absent while it is blinded.
+    condition: Optional[Condition]
+    # Who recorded the walk, and when.
+    recorded: Optional[Done]
+
+
+class Why(TypedDict, total=False):
+    """Reason for a command."""
+
+    # Reason, at most 2000 characters.
+    reason: str
+
+
+class Withdrawal(TypedDict):
+    """A withdrawal of consent."""
+
+    # Reason, if the subject gave one.
+    reason: str
+
+
+class Workers(TypedDict):
+    """Workers of the service."""
+
+    # Number of running solves by worker.
+    at_work: dict[str, int]
+    # Number of solves that can run in parallel.
+    places: int
+
+
+# Content of an entry, in terms of trials.
+FeedbackContent = Union[FeedbackContentLabel, FeedbackContentPreference, FeedbackContentTie, FeedbackContentSuggestion]

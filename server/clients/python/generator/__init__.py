@@ -1,0 +1,1 @@
+"""Writes Python from the description of the REST interface."""
