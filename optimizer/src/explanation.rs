@@ -21,7 +21,7 @@ use conflict::{BoundSet, conflict, remedies};
 use relaxation::alone;
 pub use relaxation::{JointRelaxation, Relaxation, RelaxedBound};
 use solves::{Solves, Stop, Unmet};
-pub use words::verdict;
+pub use words::status_in_words;
 
 /// Largest number of bounds in a joint relaxation.
 const MOST_TOGETHER: usize = 3;

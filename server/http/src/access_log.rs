@@ -195,10 +195,10 @@ async fn append_export(store: &Store, access: &Access, of: Option<&OnlyWhileWalk
 /// Writes pending rows, as a background task of the service.
 async fn keep_writing(app: AppState) {
     let scheduler = app.scheduler.clone();
-    scheduler.keep("writing the access log", |task| write_what_waits(app.clone(), task)).await;
+    scheduler.keep("writing the access log", |task| write_pending_rows(app.clone(), task)).await;
 }
 
-async fn write_what_waits(app: AppState, task: Task) -> Result<(), Error> {
+async fn write_pending_rows(app: AppState, task: Task) -> Result<(), Error> {
     let mut failing = false;
     loop {
         tokio::time::sleep(WITHIN).await;
@@ -244,11 +244,11 @@ pub async fn keep_pruning(store: Store, days: u32, task: Task) -> Result<(), Err
 /// Adds the caller to the response, for [`note`].
 pub(super) async fn say_caller(request: Request, next: Next) -> Response {
     let caller = request.extensions().get::<Caller>().cloned();
-    let mut answer = next.run(request).await;
+    let mut response = next.run(request).await;
     if let Some(caller) = caller {
-        answer.extensions_mut().insert(caller);
+        response.extensions_mut().insert(caller);
     }
-    answer
+    response
 }
 
 /// Logs what a response shows, exports or refuses. An export is sent only after its row is durable.
@@ -271,33 +271,33 @@ pub(super) async fn note(
     let query: Vec<(String, String)> =
         uri.query().and_then(|query| serde_urlencoded::from_str(query).ok()).unwrap_or_default();
     named.extend(query.iter().flat_map(|(_, value)| identifiers(value)));
-    let answer = next.run(request).await;
+    let response = next.run(request).await;
     // The identifier of a new object.
-    if let Some(location) = answer.headers().get(header::LOCATION).and_then(|location| location.to_str().ok()) {
+    if let Some(location) = response.headers().get(header::LOCATION).and_then(|location| location.to_str().ok()) {
         named.extend(identifiers(location));
     }
-    let caller = answer.extensions().get::<Caller>();
+    let caller = response.extensions().get::<Caller>();
     let names_object = named.iter().any(|name| Uuid::try_parse(name).is_ok());
-    let Some(kind) = kind_of(&route, &method, &answer, has_token || caller.is_some(), names_object) else {
-        return Ok(answer);
+    let Some(kind) = kind_of(&route, &method, &response, has_token || caller.is_some(), names_object) else {
+        return Ok(response);
     };
     let actor =
         caller.map_or_else(|| Actor::anonymous().as_str().to_owned(), |caller| caller.actor.as_str().to_owned());
-    let (method, status) = (method.to_string(), answer.status().as_u16());
+    let (method, status) = (method.to_string(), response.status().as_u16());
     let access = Access { kind, actor, address, method, route, object, status, named };
     if kind == Kind::Export {
-        append_export(app.store(), &access, answer.extensions().get()).await?;
+        append_export(app.store(), &access, response.extensions().get()).await?;
     } else if app.access.log.count(access) {
         tokio::spawn(keep_writing(app.clone()));
     }
-    Ok(answer)
+    Ok(response)
 }
 
 /// The kind of access. `None` if the response shows no subject data, or refuses a request without a known caller.
 ///
 /// An object that the caller may not see is not found, so 404 is a refusal where the request names an object.
-fn kind_of(route: &str, method: &Method, answer: &Response, known: bool, names_object: bool) -> Option<Kind> {
-    let status = answer.status();
+fn kind_of(route: &str, method: &Method, response: &Response, known: bool, names_object: bool) -> Option<Kind> {
+    let status = response.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;
     if matches!(status, StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN) && (known || signing_in) {
         return Some(Kind::Refused);
@@ -306,7 +306,7 @@ fn kind_of(route: &str, method: &Method, answer: &Response, known: bool, names_o
         return Some(Kind::Refused);
     }
     let starts = |name, start: &[u8]| {
-        answer.headers().get(name).map(HeaderValue::as_bytes).is_some_and(|v| v.starts_with(start))
+        response.headers().get(name).map(HeaderValue::as_bytes).is_some_and(|v| v.starts_with(start))
     };
     // A refused form is shown again, with the page around it.
     let again = matches!(status, StatusCode::CONFLICT | StatusCode::UNPROCESSABLE_ENTITY)

@@ -5,14 +5,13 @@
 
 pub mod access_log;
 mod accessible;
-mod answers;
 pub mod api;
 mod authorization;
 mod binary;
 mod blind_motion;
 mod client_address;
 pub mod connections;
-mod csv_answer;
+mod csv_response;
 mod event_stream;
 mod extract;
 mod forwarded;
@@ -29,6 +28,7 @@ mod problem;
 mod problem_kinds;
 mod query;
 mod request_body;
+mod responses;
 mod revision;
 mod router;
 mod same_origin;

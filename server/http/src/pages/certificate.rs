@@ -55,7 +55,7 @@ impl InWords {
             figures.push(("Pushes at the hip from which the walker recovers", words));
         }
         let checks = certificate.checks.into_iter().map(CheckInWords::new).collect();
-        Self { passed: certificate.passed, failures: certificate.objections, figures, checks }
+        Self { passed: certificate.passed, failures: certificate.failures, figures, checks }
     }
 }
 

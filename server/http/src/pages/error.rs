@@ -1,7 +1,7 @@
 //! Errors as pages.
 
 use super::refusal;
-use crate::identify::AnsweredTo;
+use crate::identify::RespondedTo;
 use crate::problem::Problem;
 use crate::problem::Refusal;
 use askama::Template;
@@ -25,7 +25,7 @@ impl<E: Into<Error>> From<E> for PageError {
 struct ErrorPage {
     problem: Problem,
     /// The reader's role decides the navigation; `None` shows none.
-    to: Option<AnsweredTo>,
+    to: Option<RespondedTo>,
 }
 
 impl IntoResponse for PageError {
@@ -37,13 +37,13 @@ impl IntoResponse for PageError {
             Error::Invalid(fault) => Error::Invalid(Box::new(refusal::with_label(*fault))),
             other => other,
         };
-        // `answers::complete` renders it with the navigation of the caller.
+        // `responses::complete` renders it with the navigation of the caller.
         Refusal(error).into_response()
     }
 }
 
 /// Renders a problem as a page with the navigation of the caller.
-pub(crate) fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
+pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
     let status = problem.status();
     match (ErrorPage { problem, to }).render() {
         Ok(text) => (status, Html(text)).into_response(),

@@ -54,8 +54,8 @@ struct Saved {
 
 impl Saved {
     /// Whether it was retracted.
-    fn is_withdrawn(&self) -> bool {
-        self.answer == Judgement::Withdrawn
+    fn is_retracted(&self) -> bool {
+        self.answer == Judgement::Retracted
     }
 
     fn words(&self) -> &'static str {
@@ -262,7 +262,7 @@ pub(super) async fn answer(
         Ok(before.is_some() && given.answer.is_about_safety())
     };
     let answered = answered.await;
-    told(&mut app, &authorized.caller, &token, answered).await
+    redirected(&mut app, &authorized.caller, &token, answered).await
 }
 
 /// `POST /rate/pair/{token}/retract`.
@@ -279,12 +279,12 @@ pub(super) async fn retract(
         Ok(false)
     };
     let retracted = retracted.await;
-    told(&mut app, &authorized.caller, &token, retracted).await
+    redirected(&mut app, &authorized.caller, &token, retracted).await
 }
 
 /// Redirects after an action, which may be a safety report about an answered pair; a conflict is shown on the page of
 /// the pair.
-async fn told(
+async fn redirected(
     app: &mut AppState,
     caller: &Caller,
     token: &str,

@@ -151,15 +151,15 @@ struct Best {
 
 impl Best {
     fn failed(&self) -> bool {
-        self.judged.verdict == CertificateState::Failed
+        self.judged.certificate == CertificateState::Failed
     }
 
     fn passed(&self) -> bool {
-        self.judged.verdict == CertificateState::Passed
+        self.judged.certificate == CertificateState::Passed
     }
 
     fn is_being_certified(&self) -> bool {
-        self.judged.verdict == CertificateState::BeingCertified
+        self.judged.certificate == CertificateState::BeingCertified
     }
 }
 
