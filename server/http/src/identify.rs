@@ -2,13 +2,14 @@
 
 use super::{AppState, request_body};
 use crate::problem::Refusal;
+use crate::responded_to::RespondedTo;
 use axum::body::HttpBody;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use gaitwright_service::access::Caller;
 use gaitwright_service::access::sign_in::{self, Recognised};
-use gaitwright_service::access::{Caller, Role};
 use gaitwright_service::error::Error;
 use gaitwright_store::{Instant, commit};
 
@@ -19,10 +20,6 @@ const COOKIE: &str = "gaitwright_session";
 /// in which the user signed in earlier.
 const BROWSER: &str = "gaitwright_browser";
 const BROWSER_SECONDS: u32 = 365 * 24 * 3600;
-
-/// The role of the caller, for error pages.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct RespondedTo(pub(super) Option<Role>);
 
 /// Receives the request, adds its [`Caller`], and the caller's role to the response. Refuses an invalid token; ignores an
 /// invalid session. The caller is looked up again after a body was received, because rights can end while it arrives.

@@ -33,8 +33,8 @@ pub fn router(state: AppState) -> Router {
         .route("/metrics", get(metrics::get))
         .route("/ready", get(api::health::ready))
         .route("/static/{*path}", get(static_files::get))
-        .fallback(pages::error::no_such_page)
-        .method_not_allowed_fallback(pages::error::no_such_method);
+        .fallback(page_error::no_such_page)
+        .method_not_allowed_fallback(page_error::no_such_method);
     with_layers(routes, state)
 }
 

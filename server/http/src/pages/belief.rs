@@ -1,12 +1,12 @@
 //! What the learner believes about the search space of a study.
 
 use super::drawn::Drawn;
-use super::error::{Page, page};
 use super::format::{self, meaning, percent, signed};
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;

@@ -1,10 +1,10 @@
 //! The certificate on the page of a gait, and the button that certifies it.
 
-use super::error::PageError;
 use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};

@@ -1,15 +1,15 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
 use super::drawn::Drawn;
-use super::error::{Page, PageError, page};
 use super::figures;
-use super::refusal;
 use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;

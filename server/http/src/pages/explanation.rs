@@ -1,10 +1,10 @@
 //! The explanation of a trial without a gait, on its page, and the button that requests it.
 
-use super::error::PageError;
 use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::Violation;

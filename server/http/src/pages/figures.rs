@@ -1,13 +1,13 @@
 //! The figures of a study, of a gait, of a lab session: for their pages and as files.
 
 use super::drawn::Drawn;
-use super::error::{Page, page};
 use super::side_by_side::Side;
 use super::{lab_charts, study};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;

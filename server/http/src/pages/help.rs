@@ -1,8 +1,8 @@
 //! The guides of `docs/`, embedded into the binary, so that a lab without internet has them.
 
-use super::error::{Page, page};
-use crate::identify::RespondedTo;
+use crate::page_error::{Page, page};
 use crate::problem::Refusal;
+use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::Extension;
 use axum::extract::Path;

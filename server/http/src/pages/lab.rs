@@ -1,17 +1,17 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
 use super::drawn::Drawn;
-use super::error::{Page, PageError, page};
 use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
 use super::measurement_forms::{Forms, Settings};
-use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;

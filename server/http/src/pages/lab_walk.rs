@@ -1,13 +1,13 @@
 //! The pages in the lab: the next walk, and the answer of the subject. They never name a gait.
 
-use super::error::{Page, PageError, page};
 use super::format::walks_in_words;
-use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};

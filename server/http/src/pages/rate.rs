@@ -1,12 +1,12 @@
 //! The pages of a rater: the studies, and one blinded pair. They never name a trial.
 
-use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use askama::Template;
 use axum::extract::{Path, State};

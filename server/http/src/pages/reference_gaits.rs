@@ -1,13 +1,13 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
 use super::drawn::Drawn;
-use super::error::{Page, PageError, page};
 use super::figures;
-use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form as Submitted, Params};
+use crate::page_error::{Page, PageError, page};
+use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;

@@ -1,13 +1,13 @@
 //! The pages of subjects, with the forms for consent, withdrawal and corrections.
 
-use super::error::{Page, PageError, page};
 use super::format::{variant, words};
-use super::refusal;
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};

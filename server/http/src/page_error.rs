@@ -1,9 +1,8 @@
 //! Errors as pages.
 
-use super::refusal;
-use crate::identify::RespondedTo;
-use crate::problem::Problem;
-use crate::problem::Refusal;
+use crate::problem::{Problem, Refusal};
+use crate::refusal;
+use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::http::{Method, Uri};
 use axum::response::{Html, IntoResponse, Redirect, Response};
@@ -73,7 +72,7 @@ pub(crate) async fn no_such_method(method: Method, uri: Uri) -> Refusal {
 }
 
 /// Whether the address is for programs, which get problem documents instead of pages.
-pub fn is_for_programs(path: &str) -> bool {
+pub(crate) fn is_for_programs(path: &str) -> bool {
     ["/api/", "/static/"].iter().any(|start| path.starts_with(start))
         || ["/health", "/ready", "/metrics"].contains(&path)
 }
