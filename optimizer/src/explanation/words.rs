@@ -1,6 +1,7 @@
 //! Infeasibility explanations as sentences, for the command line, pages and programs.
 
-use super::{BoundAtLimit, Conflict, Explanation, GivenBound, JointRelaxation, Relaxation};
+use super::given_bound::GivenBound;
+use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
 use crate::in_words::figure;
 use crate::solve::{SolveStatus, Violation};
 use crate::walking::CYCLE;
