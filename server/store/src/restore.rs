@@ -1,7 +1,7 @@
 //! Replaces a record with a backup. The old record may be damaged or of a newer version, so it is never opened.
 //!
 //! The backup takes the name of the record in one step, but the log and the anchor of the old record must go as well. A
-//! marker companion the record notes this. If the process is killed, the next owner of the record finishes the restore if the
+//! marker beside the record notes this. If the process is killed, the next owner of the record finishes the restore if the
 //! backup has the name already, and otherwise leaves the old record with its log as it is.
 
 use super::companion::companion;

@@ -1,4 +1,4 @@
-//! The marker companion a record that a restore has begun to replace.
+//! The marker beside a record that a restore has begun to replace.
 
 use super::anchor::Ends;
 use super::companion::companion;
@@ -19,7 +19,7 @@ pub(super) struct Marker {
     pub(super) elsewhere: Option<PathBuf>,
 }
 
-/// The path of the marker companion a record.
+/// The path of the marker beside a record.
 fn marker_of(record: &Path) -> PathBuf {
     companion(record, ".restoring")
 }

@@ -15,7 +15,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
-use gaitwright_service::studies::reference_import::{self, Form, NewReferenceGait, Strikes, Unit};
+use gaitwright_service::studies::reference_import::{self, JointAngleFormat, NewReferenceGait, Strikes, Unit};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::{Connection, ReferenceGaitId, SubjectId, commit};
@@ -27,7 +27,7 @@ use std::str::FromStr;
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Fields {
     name: String,
-    form: Form,
+    form: JointAngleFormat,
     recording: String,
     unit: String,
     force_column: String,
