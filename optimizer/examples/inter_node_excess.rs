@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         solve(problem, warm, &options, &mut |_| {}, &CancelToken::new())
     };
     println!(
-        "bounds,iterations,seconds,objective,rmse,failures,more_iterations,more_seconds,tightened,objective_after,rmse_after,objections_after"
+        "bounds,iterations,seconds,objective,rmse,failures,more_iterations,more_seconds,tightened,objective_after,rmse_after,failures_after"
     );
     let (mut passed, mut passed_after, mut solved) = (0, 0, 0);
     let (mut more_iterations, mut shares, mut costs) = (Vec::new(), Vec::new(), Vec::new());

@@ -70,7 +70,7 @@ pub(super) fn state(document: &mut Value) {
         ] {
             add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
-        for component in ["Tell", "Why"] {
+        for component in ["Tell", "StudyActionReason"] {
             add(schemas, component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["NewSubject", "NewLabSession"] {
