@@ -72,8 +72,8 @@ fn print(certificate: &Certificate, all: bool) {
             pushes.forwards_m_s, pushes.backwards_m_s
         );
     }
-    for objection in &certificate.objections {
-        println!("   objection: {objection}");
+    for failure in &certificate.failures {
+        println!("   failure: {failure}");
     }
     if all {
         for check in &certificate.checks {

@@ -20,8 +20,8 @@ use std::error::Error;
 use tuned_actions::LEVELS;
 
 /// Objections in one cell; empty: passed.
-fn objections(gait: &Gait) -> Result<String, Box<dyn Error>> {
-    Ok(certify(gait)?.objections.join("; ").replace(',', ""))
+fn failures(gait: &Gait) -> Result<String, Box<dyn Error>> {
+    Ok(certify(gait)?.failures.join("; ").replace(',', ""))
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         solve(problem, warm, &options, &mut |_| {}, &CancelToken::new())
     };
     println!(
-        "bounds,iterations,seconds,objective,rmse,objections,more_iterations,more_seconds,tightened,objective_after,rmse_after,objections_after"
+        "bounds,iterations,seconds,objective,rmse,failures,more_iterations,more_seconds,tightened,objective_after,rmse_after,failures_after"
     );
     let (mut passed, mut passed_after, mut solved) = (0, 0, 0);
     let (mut more_iterations, mut shares, mut costs) = (Vec::new(), Vec::new(), Vec::new());
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             continue;
         }
         let after = run(&problem, Some(&before.warm_start), SolveOptions::default().tightening_rounds)?;
-        let (old, new) = (objections(&before.gait)?, objections(&after.gait)?);
+        let (old, new) = (failures(&before.gait)?, failures(&after.gait)?);
         let figures = |o: &SolveOutcome| {
             let r = &o.report;
             format!("{},{:.3},{:.8},{:.4}", r.iterations, r.seconds_total, r.objective, r.gait_rmse_rad)

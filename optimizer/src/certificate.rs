@@ -59,7 +59,9 @@ pub struct Certificate {
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
     /// The reasons for a failed certificate, as text; empty if it passed.
-    pub objections: Vec<String>,
+    // Records can name the field `objections`.
+    #[serde(alias = "objections")]
+    pub failures: Vec<String>,
     /// Each quantity with its worst value and its limit.
     pub checks: Vec<Check>,
     /// The reason for an early end of the simulation: a fall, or a singular motion. There is no return map then.
@@ -77,14 +79,14 @@ pub struct Certificate {
 impl Certificate {
     /// A failed certificate with this reason, for a gait that cannot be checked.
     pub fn failed_because(reason: &str) -> Self {
-        Self { objections: vec![reason.to_owned()], ..Self::empty(Vec::new()) }
+        Self { failures: vec![reason.to_owned()], ..Self::empty(Vec::new()) }
     }
 
     fn empty(checks: Vec<Check>) -> Self {
         Self {
             format_version: FORMAT_VERSION,
             passed: false,
-            objections: Vec::new(),
+            failures: Vec::new(),
             checks,
             fall: None,
             return_map: None,
@@ -105,8 +107,8 @@ pub fn certify(gait: &Gait) -> Result<Certificate, ModelError> {
     if let Err(fall) = simulate(&model, gait, &mut certificate) {
         certificate.fall = Some(fall.to_string());
     }
-    certificate.objections = objections(&certificate);
-    certificate.passed = certificate.objections.is_empty();
+    certificate.failures = failures(&certificate);
+    certificate.passed = certificate.failures.is_empty();
     Ok(certificate)
 }
 
@@ -129,30 +131,30 @@ fn simulate(model: &WalkerModel, gait: &Gait, certificate: &mut Certificate) -> 
 }
 
 /// The reasons for a failed certificate, as text.
-fn objections(certificate: &Certificate) -> Vec<String> {
-    let mut objections: Vec<String> = certificate
+fn failures(certificate: &Certificate) -> Vec<String> {
+    let mut failures: Vec<String> = certificate
         .checks
         .iter()
         .filter(|check| !check.passed())
         .map(|c| format!("{}: {} ({}), limit {}", c.name, c.value_in_words(), c.place, c.limit_in_words()))
         .collect();
     if let Some(fall) = &certificate.fall {
-        objections.push(fall.clone());
+        failures.push(fall.clone());
     }
     if let Some(map) = certificate.return_map.as_ref().filter(|map| !map.is_stable()) {
-        objections.push(format!(
+        failures.push(format!(
             "the gait is unstable: its largest multiplier is {:.4}, which must be less than 1",
             map.largest
         ));
     }
     for map in [&certificate.return_map, &certificate.free_hip_return_map].into_iter().flatten() {
         if !map.methods_agree() {
-            objections.push(format!(
+            failures.push(format!(
                 "two computations of the largest multiplier disagree: {:.6e} by variational equations and {:.6e} by finite differences (resolution \
                  {:.1e})",
                 map.largest, map.largest_by_differences, map.differences_resolve
             ));
         }
     }
-    objections
+    failures
 }

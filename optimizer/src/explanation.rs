@@ -11,17 +11,21 @@ use std::cell::RefCell;
 mod at_limit;
 mod bound;
 mod conflict;
+mod given_bound;
 mod relaxation;
+mod search;
 mod solves;
 mod words;
 
 use at_limit::domains_at_limit;
 use bound::{Level, loosened, loosest, step};
 use conflict::{BoundSet, conflict, remedies};
+pub use given_bound::GivenBound;
 use relaxation::alone;
 pub use relaxation::{JointRelaxation, Relaxation, RelaxedBound};
+use search::Search;
 use solves::{Solves, Stop, Unmet};
-pub use words::verdict;
+pub use words::status_in_words;
 
 /// Largest number of bounds in a joint relaxation.
 const MOST_TOGETHER: usize = 3;
@@ -56,17 +60,6 @@ pub struct BoundAtLimit {
     pub value: f64,
     /// Domains in which it is reached.
     pub domains: Vec<String>,
-}
-
-/// A tuned bound with its given value.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GivenBound {
-    /// Name of the bound.
-    pub bound: String,
-    /// What it limits, with its unit.
-    pub meaning: String,
-    /// Its value.
-    pub value: f64,
 }
 
 /// A conflict of tuned bounds: with the other tuned bounds at their loosest values, no gait was found with all of
@@ -115,14 +108,6 @@ pub struct Explanation {
     /// Warm start of the gait that the solve had missed.
     #[serde(skip)]
     pub missed: Option<WarmStart>,
-}
-
-/// The search for conflicts and relaxations.
-struct Search<'a> {
-    problem: &'a GaitProblem,
-    solves: Solves<'a>,
-    /// Bounds, the most suspected ones first.
-    order: Vec<usize>,
 }
 
 impl Search<'_> {

@@ -105,18 +105,18 @@ fn figures_of_a_gait_that_differ_from_its_motion_are_detected() {
         assert!(hip_is_off > 1e-5, "domain {d}: {hip_is_off}");
     }
     // The certificate compares the others with the motion at the nodes.
-    let objects = |change: fn(&mut Gait), objection: &str| {
-        let objections = certify(&with_figures(gait, change)).unwrap().objections;
-        assert!(objections.iter().any(|words| words.starts_with(objection)), "{objections:?}");
+    let objects = |change: fn(&mut Gait), failure: &str| {
+        let failures = certify(&with_figures(gait, change)).unwrap().failures;
+        assert!(failures.iter().any(|words| words.starts_with(failure)), "{failures:?}");
     };
     objects(|gait| gait.stride_length_m *= 1.0 + 1e-5, "C2 continuity of the stride");
     objects(|gait| gait.hip_velocity_m_s[3] *= 1.0 + 1e-5, "C2 hip velocity, at nodes");
 }
 
-/// The objections of the certificate between the nodes.
-fn objections_between_points(outcome: &SolveOutcome) -> Vec<String> {
+/// The failures of the certificate between the nodes.
+fn failures_between_points(outcome: &SolveOutcome) -> Vec<String> {
     let certificate = certify(&outcome.gait).unwrap();
-    certificate.objections.into_iter().filter(|words| words.contains("between nodes")).collect()
+    certificate.failures.into_iter().filter(|words| words.contains("between nodes")).collect()
 }
 
 #[test]
@@ -130,12 +130,12 @@ fn bounds_hold_between_the_nodes() {
     };
     let at_points = run(None, 0);
     assert_eq!((at_points.report.status, at_points.report.tightened_bounds), (SolveStatus::Converged, 0));
-    assert!(!objections_between_points(&at_points).is_empty(), "nothing to tighten");
+    assert!(!failures_between_points(&at_points).is_empty(), "nothing to tighten");
 
     let kept = run(Some(&at_points.warm_start), 4);
     assert_eq!(kept.report.status, SolveStatus::Converged);
     assert!(kept.report.tightened_bounds > 0 && kept.report.max_violation <= 1e-6);
-    assert_eq!(objections_between_points(&kept), Vec::<String>::new());
+    assert_eq!(failures_between_points(&kept), Vec::<String>::new());
     let last = kept.report.attempts.last().unwrap();
     assert!(last.chosen && last.strategy.contains("tightened"), "{last:?}");
     let dearer = kept.report.objective / at_points.report.objective - 1.0;

@@ -59,7 +59,7 @@ fn gait_beyond_a_tightened_bound_fails_its_certificate() {
     for (bound, name) in TunedBounds::NAMES.into_iter().enumerate() {
         let certificate = certify(&Gait { bounds: tightened(bound), ..gait.clone() }).unwrap();
         let names_it = |words: &&str| words.split(|c: char| !c.is_alphanumeric()).any(|word| word == name);
-        let objections = certificate.objections.iter().map(String::as_str);
-        assert!(objections.clone().any(|words| names_it(&words)), "{name}: {:?}", certificate.objections);
+        let failures = certificate.failures.iter().map(String::as_str);
+        assert!(failures.clone().any(|words| names_it(&words)), "{name}: {:?}", certificate.failures);
     }
 }

@@ -28,6 +28,8 @@ from gaitwright_client.models import (
     Ask,
     Bounds,
     Certificate,
+    CreatedPreference,
+    CreatedToken,
     Dimension,
     DimensionName,
     Evaluation,
@@ -36,7 +38,6 @@ from gaitwright_client.models import (
     FeedbackRowPage,
     Job,
     JobState,
-    MadeToken,
     MilestonePage,
     NewPreference,
     NewStudy,
@@ -47,7 +48,6 @@ from gaitwright_client.models import (
     PairAnswer,
     Problem,
     Recommendation,
-    Recorded,
     SearchSpace,
     StudyState,
     StudyView,
@@ -66,7 +66,7 @@ FIGURE = "course-gait-rmse-of-the-best-action-by-iteration"
 ARCHIVE = b"gaitwright study"
 
 T = TypeVar("T")
-Made = TypeVar("Made", MadeToken, Recorded, StudyView, Subject)
+Made = TypeVar("Made", CreatedToken, CreatedPreference, StudyView, Subject)
 
 
 def given(kind: type[T], reply: object) -> T:
@@ -161,7 +161,7 @@ def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
             answer = PairAnswer.A if trial.gait_rmse_rad < newest.gait_rmse_rad else PairAnswer.B
             body = NewPreference(trial_a=trial.id, trial_b=newest.id, answer=answer)
             reply = create_preference.sync_detailed(study, client=client, body=body)
-            said = created(Recorded, "preferences", reply)
+            said = created(CreatedPreference, "preferences", reply)
             assert given(FeedbackRow, get_preference.sync(said.id, client=client)).seq == said.seq
         compared = len(trials)
     assert len(given(FeedbackRowPage, list_preferences.sync(study, client=client)).items) == 6
@@ -212,7 +212,7 @@ def main() -> None:
     administrator = Client(base_url=sys.argv[1], token="none", auth_header_name="X-Without-Sign-In")
     scopes = [NewTokenScopesItem.READ, NewTokenScopesItem.RUN, NewTokenScopesItem.ANSWER]
     reply = create_token.sync_detailed(client=administrator, body=NewToken(name="python", scopes=scopes))
-    client = Client(base_url=sys.argv[1], token=created(MadeToken, "tokens", reply).secret)
+    client = Client(base_url=sys.argv[1], token=created(CreatedToken, "tokens", reply).secret)
     new = NewSubject(pseudonym="python", height_m=1.75, body_mass_kg=70)
     subject = created(Subject, "subjects", create_subject.sync_detailed(client=client, body=new))
     assert given(Subject, get_subject.sync(subject.id, client=client)) == subject

@@ -11,7 +11,7 @@ pub fn certificate(passed: bool) -> Certificate {
     Certificate {
         format_version: FORMAT_VERSION,
         passed,
-        objections: fall.iter().cloned().collect(),
+        failures: fall.iter().cloned().collect(),
         checks: Vec::new(),
         fall,
         return_map: None,

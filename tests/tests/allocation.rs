@@ -4,7 +4,7 @@
 
 use axum::http::{Method, StatusCode};
 use gaitwright_service::access::{Right, Role};
-use gaitwright_service::studies::lab::{self, NewSession};
+use gaitwright_service::studies::lab::{self, NewLabSession};
 use gaitwright_store::allocations::{self, Lot};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::presentations::{self, Kind, NewPresentation};
@@ -100,8 +100,8 @@ async fn one_service() -> (TempDir, Service) {
     (folder, service)
 }
 
-fn session_of((study, one, two): (StudyId, TrialId, TrialId)) -> (StudyId, NewSession) {
-    (study, NewSession { gait_one: one, gait_two: two, notes: String::new() })
+fn session_of((study, one, two): (StudyId, TrialId, TrialId)) -> (StudyId, NewLabSession) {
+    (study, NewLabSession { gait_one: one, gait_two: two, notes: String::new() })
 }
 
 /// Plans a session of each study, and unblinds it before the next one is planned: the orders.
@@ -725,7 +725,7 @@ async fn file_that_a_token_fetched_leaves_nobody_blind_and_the_devices_own_leave
     let script = gaitwright_service::access::Caller::token(TokenId::fresh(), "script", &[Right::Device, Right::Read]);
     let device = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
     for (fetched_by, could_have_known) in [(&script, true), (&device, false)] {
-        let new = NewSession { gait_one: trials[0].id, gait_two: trials[1].id, notes: String::new() };
+        let new = NewLabSession { gait_one: trials[0].id, gait_two: trials[1].id, notes: String::new() };
         let mut writer = service.store.write().await.unwrap();
         let id = lab::plan(&mut writer, &Actor::program(), study, &new).await.unwrap().id;
         lab::for_device(&mut writer, fetched_by, id, 2).await.unwrap();
@@ -750,7 +750,7 @@ async fn person_who_fetched_a_controller_file_rates_that_study_not_blind() {
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = post(&service, &program, &next, &json!({})).await.json()["pair"].clone();
     let drawn = sides(&service.store, study).await;
-    let plan = NewSession { gait_one: drawn[0].0, gait_two: drawn[0].1, notes: String::new() };
+    let plan = NewLabSession { gait_one: drawn[0].0, gait_two: drawn[0].1, notes: String::new() };
     let mut writer = service.store.write().await.unwrap();
     let session = lab::plan(&mut writer, &Actor::program(), study, &plan).await.unwrap();
     let caller =

@@ -535,7 +535,10 @@ async fn a_review_from_a_clock_that_was_ahead_does_not_cover_later_reports() {
     let listed = format!("/api/v1/studies/{study}/safety-reports");
     let gait = service.fetch(&listed).await.items()[0]["trial_id"].as_str().unwrap().to_owned();
     let review = json!({"decision": "walkable", "reason": "seen again"});
-    assert_eq!(service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status, StatusCode::OK);
+    assert_eq!(
+        service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status,
+        StatusCode::CREATED
+    );
     let mut rows = Rows::of(&exported(&service.store, study).await);
     service.stop().await;
     let ahead = now().plus_seconds(500).to_string();
@@ -550,10 +553,10 @@ async fn a_review_from_a_clock_that_was_ahead_does_not_cover_later_reports() {
     import(&store, &rows.packed()).await.unwrap();
     store.close().await;
     let other = Service::start(&database, Consistent::default(), 1).await;
-    assert_eq!(other.fetch(&listed).await.items()[0]["stands"], json!(false));
+    assert_eq!(other.fetch(&listed).await.items()[0]["open"], json!(false));
     let report = other.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "fell"})).await;
-    assert_eq!((report.status, &report.json()["stands"]), (StatusCode::CREATED, &json!(true)), "{}", report.text);
-    assert!(report.json()["at"].as_str().unwrap() > ahead.as_str(), "times have the order of recording");
+    assert_eq!((report.status, &report.json()["open"]), (StatusCode::CREATED, &json!(true)), "{}", report.text);
+    assert!(report.json()["created_at"].as_str().unwrap() > ahead.as_str(), "times have the order of recording");
     let file = other.fetch(&format!("/api/v1/trials/{gait}/controller.json")).await;
     assert!(file.status == StatusCode::CONFLICT && file.text.contains("reported as unsafe"), "{}", file.text);
     other.stop().await;

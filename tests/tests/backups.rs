@@ -73,7 +73,7 @@ async fn scheduled_backup_of_a_damaged_record_fails_and_keeps_the_last_good_one(
     forge(&database, "update subjects set notes = 'forged'").await;
     let refused = claimed.add(&store, 1).await;
     assert!(matches!(refused, Err(StoreError::Unverified { .. })), "{refused:?}");
-    assert!(backup::beside_record(&store).await.is_err());
+    assert!(backup::to_record_folder(&store).await.is_err());
     assert_eq!(claimed.backups().unwrap().len(), 1);
     verify::file(&good, &[]).await.unwrap();
 }

@@ -40,7 +40,7 @@ fn a_gait_is_solved_certified_and_converted() {
     let figures: Value = serde_json::from_str(&done(folder, &solve)).unwrap();
     assert_eq!(figures["status"], "converged");
     let certificate = &figures["certificate"];
-    assert_eq!(certificate["passed"].as_bool(), Some(certificate["objections"].as_array().unwrap().is_empty()));
+    assert_eq!(certificate["passed"].as_bool(), Some(certificate["failures"].as_array().unwrap().is_empty()));
     assert!(certificate["return_map"]["largest"].as_f64().unwrap() < 1.0);
 
     // The same gait from a file of `solve --out`, and as downloaded from the service.
@@ -141,7 +141,7 @@ async fn a_trial_gets_its_certificate_once() {
     assert_eq!(made.status, StatusCode::OK, "{}", made.text);
     assert_eq!(made.json()["result"], address, "{}", made.text);
     let certificate = certificate.json();
-    assert_eq!(certificate["passed"].as_bool(), Some(certificate["objections"].as_array().unwrap().is_empty()));
+    assert_eq!(certificate["passed"].as_bool(), Some(certificate["failures"].as_array().unwrap().is_empty()));
     assert_eq!(service.fetch(&address).await.json(), certificate);
     let audit = service.fetch("/api/v1/audit").await.text;
     assert_eq!(["ask_certificate", "trial.certify"].map(|act| audit.matches(act).count()), [1, 1], "{audit}");

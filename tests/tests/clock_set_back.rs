@@ -26,12 +26,12 @@ async fn a_report_after_a_review_closes_the_gait_although_the_clock_was_set_back
     let walkable = json!({"decision": "walkable", "reason": "seen again"});
     set_machine_clock(3600);
     assert_eq!(service.post(&report, &json!({})).await.status, StatusCode::CREATED);
-    assert_eq!(service.post(&review, &walkable).await.status, StatusCode::OK);
+    assert_eq!(service.post(&review, &walkable).await.status, StatusCode::CREATED);
     assert_eq!(service.fetch(&controller).await.status, StatusCode::OK);
     set_machine_clock(0);
     assert_eq!(service.post(&report, &json!({})).await.status, StatusCode::CREATED);
     assert_eq!(service.fetch(&controller).await.status, StatusCode::CONFLICT);
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
-    assert_eq!((&reports[0]["stands"], &reports[1]["stands"]), (&json!(false), &json!(true)), "{reports}");
+    assert_eq!((&reports[0]["open"], &reports[1]["open"]), (&json!(false), &json!(true)), "{reports}");
     service.stop().await;
 }

@@ -226,10 +226,10 @@ async fn heard(service: &Service, study: StudyId) -> Vec<FeedbackRow> {
 async fn subject_preference_reaches_the_learner_after_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let (lab, session) = walked(&service, study, &trials).await;
-    assert_eq!(service.fetch(&format!("{lab}/next-walk")).await.json()["asks"], 1);
+    assert_eq!(service.fetch(&format!("{lab}/next-walk")).await.json()["answer_number"], 1);
     let answers = format!("{lab}/answers");
     for (body, status) in [
-        (json!({"number": 1, "answer": "withdrawn"}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"number": 1, "answer": "retracted"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 0, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 2, "answer": "first"}), StatusCode::UNPROCESSABLE_ENTITY),
         (json!({"number": 1, "answer": "first"}), StatusCode::OK),
@@ -241,7 +241,7 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
         assert_eq!(said.status, status, "{body}: {}", said.text);
     }
     let back = service.post(&format!("{lab}/retract-answer"), &json!({})).await.json();
-    assert_eq!((&back["asks"], &back["answer"]), (&json!(2), &Value::Null));
+    assert_eq!((&back["answer_number"], &back["answer"]), (&json!(2), &Value::Null));
     let said = json!({"number": 2, "answer": "second", "note": "softer"});
     let seen = service.post(&answers, &said).await.json();
     assert_eq!((&seen["answer"]["answer"], &seen["can_be_retracted"]), (&json!("second"), &json!(true)));

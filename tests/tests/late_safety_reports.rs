@@ -29,7 +29,7 @@ async fn converged(service: &Service, study: StudyId) -> Vec<Trial> {
 /// The gaits with an open report.
 async fn closed(service: &Service, study: StudyId) -> BTreeSet<String> {
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
-    let open = reports.as_array().unwrap().iter().filter(|report| report["stands"] == json!(true));
+    let open = reports.as_array().unwrap().iter().filter(|report| report["open"] == json!(true));
     open.map(|report| report["trial_id"].as_str().unwrap().to_owned()).collect()
 }
 
@@ -40,7 +40,7 @@ fn names(trials: &[TrialId]) -> BTreeSet<String> {
 async fn clear(service: &Service, gait: &str) {
     let review = json!({"decision": "walkable", "reason": "seen again"});
     let cleared = service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await;
-    assert_eq!(cleared.status, StatusCode::OK, "{}", cleared.text);
+    assert_eq!(cleared.status, StatusCode::CREATED, "{}", cleared.text);
 }
 
 /// A study that waits for the answer to a pair, and the address of the pair.
@@ -99,7 +99,10 @@ async fn a_report_that_is_repeated_counts_once_until_staff_clear_the_gait() {
     assert_eq!(reports.as_array().unwrap().len(), 1, "{reports}");
     let gait = reports[0]["trial_id"].as_str().unwrap().to_owned();
     let review = json!({"decision": "walkable", "reason": "seen again", "reports": [reports[0]["id"]]});
-    assert_eq!(service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status, StatusCode::OK);
+    assert_eq!(
+        service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status,
+        StatusCode::CREATED
+    );
     assert!(closed(&service, study).await.is_empty());
     assert_eq!(rate(&service, &token, "unsafe_first").await.status, StatusCode::OK);
     assert_eq!(closed(&service, study).await, BTreeSet::from([gait.clone()]));

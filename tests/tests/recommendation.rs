@@ -88,7 +88,7 @@ async fn failed_certificate_is_stated_in_the_recommendation() {
     let failed = recommendation(&service, study).await;
     assert_eq!(failed["trial_id"], json!(best), "the learner's answer is the same");
     assert_eq!(failed["certificate"], "failed");
-    assert_eq!((&failed["objections"], &failed["passing"]), (&json!(["the simulated walker falls"]), &Value::Null));
+    assert_eq!((&failed["failures"], &failed["passing"]), (&json!(["the simulated walker falls"]), &Value::Null));
     let shown = service.fetch(&page).await.text;
     assert!(shown.contains("This gait failed its") && shown.contains("the simulated walker falls"), "{shown}");
     assert!(shown.contains("The next best gait has no certificate"), "{shown}");

@@ -85,7 +85,7 @@ async fn a_report_closes_every_trial_of_the_subject_with_the_same_motion() {
     let review = json!({"decision": "walkable", "reason": "r"});
     let there = service.post(&format!("/api/v1/trials/{}/safety-reviews", best.id), &review).await;
     assert!(there.status == StatusCode::CONFLICT && there.text.contains("Review the report there"), "{}", there.text);
-    assert_eq!(clear(&service, &twin).await, StatusCode::OK);
+    assert_eq!(clear(&service, &twin).await, StatusCode::CREATED);
     assert_eq!(controller(&service, best).await, StatusCode::OK);
     service.stop().await;
 }
@@ -123,7 +123,7 @@ async fn a_report_closes_every_trial_with_equal_bounds_if_a_lab_script_evaluated
     assert!(!is_closed(&others[1]).await, "equal bounds give another gait with another device");
     assert!(is_closed(&others[2]).await, "the gait of the lab may be this one");
     assert!(!is_closed(&different).await);
-    assert_eq!(clear(&service, &reported).await, StatusCode::OK);
+    assert_eq!(clear(&service, &reported).await, StatusCode::CREATED);
     assert!(!is_closed(&others[0]).await && !is_closed(&others[2]).await);
 
     report(&service, &others[2]).await;
@@ -178,7 +178,7 @@ async fn one_gait_is_reported_without_another_to_compare_it_with() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let made = report(&service, &trials[0]).await;
-    assert_eq!((&made["trial_id"], &made["stands"]), (&json!(trials[0].id), &json!(true)));
+    assert_eq!((&made["trial_id"], &made["open"]), (&json!(trials[0].id), &json!(true)));
     assert_eq!(controller(&service, &trials[0]).await, StatusCode::CONFLICT);
     let sent = service.post_text(&format!("/trials/{}/safety-report", trials[1].id), FORM, "author=K1&note=fell").await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
@@ -262,7 +262,7 @@ async fn a_report_that_is_recorded_while_a_file_waits_for_the_access_log_stops_t
         };
         let (refused, ()) = tokio::join!(service.fetch(&path), report);
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}");
-        assert_eq!(clear(&service, &trials[0]).await, StatusCode::OK);
+        assert_eq!(clear(&service, &trials[0]).await, StatusCode::CREATED);
     }
     service.stop().await;
 }
@@ -294,7 +294,7 @@ async fn a_safety_report_in_an_assessment_is_reviewed_and_not_retracted() {
     let refused = service.post(&retract, &json!({"reason": "a slip"})).await;
     assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
     assert_eq!(controller(&service, &trials[0]).await, StatusCode::CONFLICT);
-    assert_eq!(clear(&service, &trials[0]).await, StatusCode::OK);
+    assert_eq!(clear(&service, &trials[0]).await, StatusCode::CREATED);
     assert_eq!(controller(&service, &trials[0]).await, StatusCode::OK);
     service.stop().await;
 }

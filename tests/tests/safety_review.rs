@@ -49,7 +49,7 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
     assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!(said.len(), 1, "{said:?}");
-    assert_eq!((&said[0]["stands"], &said[0]["review"]), (&json!(true), &Value::Null));
+    assert_eq!((&said[0]["open"], &said[0]["review"]), (&json!(true), &Value::Null));
     let gait = said[0]["trial_id"].as_str().unwrap().to_owned();
     let page = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(page.contains("Do not walk with it") && page.contains("Safety review"), "{page}");
@@ -58,7 +58,7 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
     // It stays unsafe: nobody needs to look again, and it can still be lifted.
     let stays =
         decide(&service, &gait, &json!({"decision": "unsafe", "reason": "the knee buckles", "author": "K1"})).await;
-    assert_eq!((stays.status, &stays.json()["decision"]), (StatusCode::OK, &json!("unsafe")));
+    assert_eq!((stays.status, &stays.json()["decision"]), (StatusCode::CREATED, &json!("unsafe")));
     assert!(!waits_at_home(&service).await);
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(
@@ -69,9 +69,9 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
     assert!(heard.iter().all(|row| row.retraction.is_none()));
 
     let walkable = json!({"decision": "walkable", "reason": "the video was cut", "author": "K2"});
-    assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::OK);
+    assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
     let said = safety_reports(&service, study).await;
-    assert_eq!((&said[0]["stands"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
+    assert_eq!((&said[0]["open"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(!shown.contains("Do not walk with it") && shown.contains("cleared the gait for walking"), "{shown}");
     // The answer of the rater is unchanged, and does not imply that the other gait is better.
@@ -161,7 +161,7 @@ async fn lifted_safety_report_of_a_walk_opens_anew_at_unblinding() {
     for gait in &gaits[..2] {
         let lifted =
             decide(&service, gait, &json!({"decision": "walkable", "reason": "he stumbled over a cable"})).await;
-        assert_eq!(lifted.status, StatusCode::OK, "{}", lifted.text);
+        assert_eq!(lifted.status, StatusCode::CREATED, "{}", lifted.text);
     }
     let planned = service.post(&sessions, &plan).await;
     assert_eq!(planned.status, StatusCode::CREATED, "{}", planned.text);
@@ -169,7 +169,7 @@ async fn lifted_safety_report_of_a_walk_opens_anew_at_unblinding() {
     service.post(&format!("/api/v1/lab-sessions/{id}/unblind"), &json!({"reason": "walked"})).await;
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let mut snapshot = safety_reports(&service, study).await;
-    snapshot.retain(|report| report["stands"] == json!(true));
+    snapshot.retain(|report| report["open"] == json!(true));
     assert_eq!(snapshot.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
     service.stop().await;
 }
@@ -181,7 +181,7 @@ async fn order_of_reviews_survives_a_renumbering_of_their_rows() {
     service.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "stumbled"})).await;
     for decision in ["unsafe", "walkable"] {
         let reviewed = decide(&service, gait, &json!({"decision": decision, "reason": "seen"})).await;
-        assert_eq!(reviewed.status, StatusCode::OK, "{}", reviewed.text);
+        assert_eq!(reviewed.status, StatusCode::CREATED, "{}", reviewed.text);
     }
     let path = service.store.path().to_owned();
     service.stop().await;

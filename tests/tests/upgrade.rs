@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_store::{FORM, Store, read_only, verify};
+use gaitwright_store::{SCHEMA_VERSION, Store, read_only, verify};
 use gaitwright_tests::archives::exported;
 use gaitwright_tests::cli;
 use serde_json::{Value, json};
@@ -103,13 +103,13 @@ async fn assert_upgraded(database: &Path, old: &Path) {
         // Rows that the new version adds at start, and the counters of the database.
         assert!(missing.is_empty() || table == "sqlite_sequence", "{table}: {missing:?}");
     }
-    assert_eq!(versions(database).await.last(), Some(&FORM));
+    assert_eq!(versions(database).await.last(), Some(&SCHEMA_VERSION));
     verify::file(database, &[]).await.unwrap();
 }
 
 #[test]
 fn a_record_of_the_present_form_is_kept_for_the_next_upgrade() {
-    assert_eq!(RECORDS.last().unwrap().0, FORM, "write one with the example every_table");
+    assert_eq!(RECORDS.last().unwrap().0, SCHEMA_VERSION, "write one with the example every_table");
 }
 
 #[tokio::test]
@@ -254,7 +254,7 @@ async fn a_row_forged_in_an_old_record_is_not_sealed_by_the_upgrade() {
 #[tokio::test]
 async fn record_with_a_gap_in_its_list_of_migrations_is_refused() {
     let (_, newest) = RECORDS[RECORDS.len() - 1];
-    for missing in 1..=FORM {
+    for missing in 1..=SCHEMA_VERSION {
         let (_folder, database) = unpacked(newest);
         let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(&database)).await.unwrap();
         let forget = "delete from _sqlx_migrations where version = ?";
@@ -271,7 +271,7 @@ async fn record_with_a_gap_in_its_list_of_migrations_is_refused() {
         let refused = Store::open(&database).await.unwrap_err().to_string();
         let found = format!("migration {missing} is missing");
         // Without the first or the last one, it is a record of another program or of an earlier version.
-        assert!(refused.contains(&found) || missing == 1 || missing == FORM, "{missing}: {refused}");
+        assert!(refused.contains(&found) || missing == 1 || missing == SCHEMA_VERSION, "{missing}: {refused}");
         assert_eq!(std::fs::read(&database).unwrap(), before, "{missing}: nothing was changed");
     }
 }

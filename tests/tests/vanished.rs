@@ -207,7 +207,7 @@ async fn an_earlier_state_of_the_record_is_refused_by_each_anchor_until_it_is_re
     std::fs::copy(&early, &database).unwrap();
     let refused = Store::open_anchored(&database, Some(&elsewhere)).await;
     assert!(matches!(refused, Err(StoreError::CutOff { .. })), "{refused:?}");
-    std::fs::remove_file(anchor::beside_record(&database)).unwrap();
+    std::fs::remove_file(anchor::path_of(&database)).unwrap();
     let refused = Store::open_anchored(&database, Some(&elsewhere)).await;
     assert!(matches!(refused, Err(StoreError::CutOff { .. })), "{refused:?}");
     let refused = verify::file(&database, std::slice::from_ref(&elsewhere)).await;
@@ -221,13 +221,13 @@ async fn an_earlier_state_of_the_record_is_refused_by_each_anchor_until_it_is_re
     add("S3").await;
     let other = folder.path().join("other.db");
     std::fs::copy(&database, &other).unwrap();
-    std::fs::copy(&elsewhere, anchor::beside_record(&other)).unwrap();
+    std::fs::copy(&elsewhere, anchor::path_of(&other)).unwrap();
     std::fs::copy(&early, &database).unwrap();
-    for name in [&elsewhere, &anchor::beside_record(&database)] {
+    for name in [&elsewhere, &anchor::path_of(&database)] {
         std::fs::remove_file(name).unwrap();
     }
     add("S4").await;
-    std::fs::copy(&elsewhere, anchor::beside_record(&other)).unwrap();
+    std::fs::copy(&elsewhere, anchor::path_of(&other)).unwrap();
     let refused = Store::open(&other).await;
     assert!(matches!(refused, Err(StoreError::Rewritten { .. })), "{refused:?}");
 }
@@ -251,7 +251,7 @@ async fn an_empty_record_is_not_begun_where_there_was_one() {
     }
     let refused = Store::open(&database).await.unwrap_err().to_string();
     assert!(refused.contains("a.db.anchor"), "{refused}");
-    std::fs::remove_file(anchor::beside_record(&database)).unwrap();
+    std::fs::remove_file(anchor::path_of(&database)).unwrap();
     Store::open(&database).await.unwrap().close().await;
     drop(folder);
 }

@@ -26,7 +26,7 @@ if (form && choice && box) {
     // A focused field keeps its keys, except the choice of an answer.
     const field = /** @type {Element} */ (event.target).closest("input, select, textarea, button");
     if (field && field.getAttribute("name") !== "answer") return;
-    const answer = /** @type {HTMLInputElement} */ (form.querySelectorAll(".verdict input")[place]);
+    const answer = /** @type {HTMLInputElement} */ (form.querySelectorAll(".answer-option input")[place]);
     answer.click();
     answer.focus();
   });

@@ -2,8 +2,9 @@
 
 use super::bound::{Level, least_move, loosened, step};
 use super::conflict::BoundSet;
+use super::given_bound::GivenBound;
+use super::search::Search;
 use super::solves::{Starts, Stop};
-use super::{GivenBound, Search};
 use crate::solve::WarmStart;
 use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};

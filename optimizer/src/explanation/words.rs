@@ -1,12 +1,13 @@
 //! Infeasibility explanations as sentences, for the command line, pages and programs.
 
-use super::{BoundAtLimit, Conflict, Explanation, GivenBound, JointRelaxation, Relaxation};
+use super::given_bound::GivenBound;
+use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
 use crate::in_words::figure;
 use crate::solve::{SolveStatus, Violation};
 use crate::walking::CYCLE;
 
 /// The meaning of the status of a solve for its bounds; `None` if there is a gait.
-pub fn verdict(status: SolveStatus) -> Option<&'static str> {
+pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
     match status {
         SolveStatus::Converged => None,
         SolveStatus::Infeasible => Some(
@@ -212,10 +213,10 @@ impl Explanation {
 
     /// The explanation as sentences.
     pub fn sentences(&self) -> Vec<String> {
-        let verdict = verdict(self.status).map(str::to_owned);
+        let status = status_in_words(self.status).map(str::to_owned);
         let at_limit = self.at_limit.iter().map(BoundAtLimit::in_words);
         let conflicts = self.conflicts_in_words().into_iter();
-        verdict.into_iter().chain(conflicts).chain(self.remedies_in_words()).chain(at_limit).collect()
+        status.into_iter().chain(conflicts).chain(self.remedies_in_words()).chain(at_limit).collect()
     }
 }
 
@@ -390,9 +391,9 @@ mod tests {
             assert!(words.contains("so a gait may exist"), "{words}");
         }
         for status in [SolveStatus::Stalled, SolveStatus::IterationLimit, SolveStatus::TimeLimit] {
-            assert!(verdict(status).unwrap().contains("does not prove"), "{status:?}");
+            assert!(status_in_words(status).unwrap().contains("does not prove"), "{status:?}");
         }
-        assert_eq!(verdict(SolveStatus::Converged), None);
+        assert_eq!(status_in_words(SolveStatus::Converged), None);
     }
 
     #[test]

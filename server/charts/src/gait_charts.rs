@@ -256,7 +256,7 @@ pub fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
 }
 
 /// The human joint angles of gaits and of a reference. Each gait comes with its name.
-pub fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
+pub fn with_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
     let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |&(title, q, column): &(&str, usize, usize)| {
         let mut chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column);

@@ -17,10 +17,8 @@ use gaitwright_service::studies::walkable;
 use gaitwright_service::supervise::Task;
 use gaitwright_store::access_log::{self, Access, Kind, Tally};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::{Store, StoreResult, TrialId, access_spool, commit, now};
-use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use gaitwright_store::{Store, StoreResult, TrialId, commit, now};
+use std::time::Duration;
 use uuid::Uuid;
 
 /// Routes that show no subject data.
@@ -71,108 +69,8 @@ const SECRETS: [&str; 2] = ["{token}", "{link}"];
 
 /// Longest time until a row is written.
 const WITHIN: Duration = Duration::from_secs(1);
-/// Time within which repeated requests share a row.
-const REPEATED_WITHIN: Duration = Duration::from_mins(1);
-/// Number of rows per transaction, so that others do not wait long for the writer.
-const AT_ONCE: usize = 50;
-/// Number of unwritten rows beyond which refusals of unknown callers share a row.
-const MOST_WAITING: usize = 1000;
 /// Maximum length of a logged address.
 const LONGEST_OBJECT: usize = 300;
-
-/// The rows that are not written yet.
-#[derive(Debug, Default)]
-pub struct AccessLog(Mutex<Waiting>);
-
-#[derive(Debug, Default)]
-struct Waiting {
-    rows: HashMap<Access, Tally>,
-    /// When each row was last written.
-    written: HashMap<Access, Instant>,
-    /// A task writes what waits.
-    is_kept: bool,
-}
-
-impl AccessLog {
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        // The rows are consistent between statements, so a poisoned lock is usable.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Counts an access. Returns whether the writing task must be started.
-    fn count(&self, mut access: Access) -> bool {
-        let mut waiting = self.waiting();
-        if waiting.rows.len() >= MOST_WAITING && access.kind == Kind::Refused && !waiting.rows.contains_key(&access) {
-            "several".clone_into(&mut access.address);
-            "several".clone_into(&mut access.object);
-            access.named.clear();
-        }
-        let at = now();
-        let tally = waiting.rows.entry(access).or_insert(Tally { first_at: at, last_at: at, times: 0 });
-        (tally.last_at, tally.times) = (at, tally.times.saturating_add(1));
-        !std::mem::replace(&mut waiting.is_kept, true)
-    }
-
-    /// Takes the rows that are due: all, or those that were not written within the last minute.
-    fn due(&self, all: bool) -> Vec<(Access, Tally)> {
-        let mut waiting = self.waiting();
-        let Waiting { rows, written, .. } = &mut *waiting;
-        written.retain(|_, at| at.elapsed() < REPEATED_WITHIN);
-        let mut due: Vec<_> = rows.extract_if(|access, _| all || !written.contains_key(access)).collect();
-        due.sort_by_key(|(_, tally)| tally.first_at);
-        written.extend(due.iter().map(|(access, _)| (access.clone(), Instant::now())));
-        due
-    }
-
-    /// Puts back rows that could not be written.
-    fn put_back(&self, rows: &[(Access, Tally)]) {
-        let mut waiting = self.waiting();
-        for (access, tally) in rows {
-            waiting.written.remove(access);
-            let there = waiting.rows.entry(access.clone()).or_insert(Tally { times: 0, ..*tally });
-            (there.first_at, there.times) = (tally.first_at, there.times.saturating_add(tally.times));
-        }
-    }
-
-    /// Writes the rows that are due, and those that commands noted next to the record.
-    ///
-    /// # Errors
-    /// Errors of the database. No row is lost then.
-    pub async fn write(&self, store: &Store, all: bool) -> Result<(), Error> {
-        let mut unwritten = Unwritten { log: self, rows: self.due(all) };
-        while !unwritten.rows.is_empty() {
-            let count = unwritten.rows.len().min(AT_ONCE);
-            append(store, &unwritten.rows[..count]).await?;
-            unwritten.rows.drain(..count);
-        }
-        if let Some(mut spool) = access_spool::take(store.path())? {
-            // If this ends early, rows are written twice rather than lost.
-            while let Some(noted) = spool.more()? {
-                append(store, &noted).await?;
-            }
-            spool.clear()?;
-        }
-        Ok(())
-    }
-}
-
-/// Rows that are put back if writing them fails, panics or is cancelled.
-struct Unwritten<'a> {
-    log: &'a AccessLog,
-    rows: Vec<(Access, Tally)>,
-}
-
-impl Drop for Unwritten<'_> {
-    fn drop(&mut self) {
-        self.log.put_back(&self.rows);
-    }
-}
-
-async fn append(store: &Store, rows: &[(Access, Tally)]) -> StoreResult<()> {
-    let mut writer = store.write().await?;
-    access_log::append(&mut writer, rows).await?;
-    commit(writer).await
-}
 
 /// The trials of a response that must not be sent after any of their gaits was reported as unsafe. An extension of the
 /// response.
@@ -195,10 +93,10 @@ async fn append_export(store: &Store, access: &Access, of: Option<&OnlyWhileWalk
 /// Writes pending rows, as a background task of the service.
 async fn keep_writing(app: AppState) {
     let scheduler = app.scheduler.clone();
-    scheduler.keep("writing the access log", |task| write_what_waits(app.clone(), task)).await;
+    scheduler.keep("writing the access log", |task| write_pending_rows(app.clone(), task)).await;
 }
 
-async fn write_what_waits(app: AppState, task: Task) -> Result<(), Error> {
+async fn write_pending_rows(app: AppState, task: Task) -> Result<(), Error> {
     let mut failing = false;
     loop {
         tokio::time::sleep(WITHIN).await;
@@ -244,11 +142,11 @@ pub async fn keep_pruning(store: Store, days: u32, task: Task) -> Result<(), Err
 /// Adds the caller to the response, for [`note`].
 pub(super) async fn say_caller(request: Request, next: Next) -> Response {
     let caller = request.extensions().get::<Caller>().cloned();
-    let mut answer = next.run(request).await;
+    let mut response = next.run(request).await;
     if let Some(caller) = caller {
-        answer.extensions_mut().insert(caller);
+        response.extensions_mut().insert(caller);
     }
-    answer
+    response
 }
 
 /// Logs what a response shows, exports or refuses. An export is sent only after its row is durable.
@@ -271,33 +169,33 @@ pub(super) async fn note(
     let query: Vec<(String, String)> =
         uri.query().and_then(|query| serde_urlencoded::from_str(query).ok()).unwrap_or_default();
     named.extend(query.iter().flat_map(|(_, value)| identifiers(value)));
-    let answer = next.run(request).await;
+    let response = next.run(request).await;
     // The identifier of a new object.
-    if let Some(location) = answer.headers().get(header::LOCATION).and_then(|location| location.to_str().ok()) {
+    if let Some(location) = response.headers().get(header::LOCATION).and_then(|location| location.to_str().ok()) {
         named.extend(identifiers(location));
     }
-    let caller = answer.extensions().get::<Caller>();
+    let caller = response.extensions().get::<Caller>();
     let names_object = named.iter().any(|name| Uuid::try_parse(name).is_ok());
-    let Some(kind) = kind_of(&route, &method, &answer, has_token || caller.is_some(), names_object) else {
-        return Ok(answer);
+    let Some(kind) = kind_of(&route, &method, &response, has_token || caller.is_some(), names_object) else {
+        return Ok(response);
     };
     let actor =
         caller.map_or_else(|| Actor::anonymous().as_str().to_owned(), |caller| caller.actor.as_str().to_owned());
-    let (method, status) = (method.to_string(), answer.status().as_u16());
+    let (method, status) = (method.to_string(), response.status().as_u16());
     let access = Access { kind, actor, address, method, route, object, status, named };
     if kind == Kind::Export {
-        append_export(app.store(), &access, answer.extensions().get()).await?;
+        append_export(app.store(), &access, response.extensions().get()).await?;
     } else if app.access.log.count(access) {
         tokio::spawn(keep_writing(app.clone()));
     }
-    Ok(answer)
+    Ok(response)
 }
 
 /// The kind of access. `None` if the response shows no subject data, or refuses a request without a known caller.
 ///
 /// An object that the caller may not see is not found, so 404 is a refusal where the request names an object.
-fn kind_of(route: &str, method: &Method, answer: &Response, known: bool, names_object: bool) -> Option<Kind> {
-    let status = answer.status();
+fn kind_of(route: &str, method: &Method, response: &Response, known: bool, names_object: bool) -> Option<Kind> {
+    let status = response.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;
     if matches!(status, StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN) && (known || signing_in) {
         return Some(Kind::Refused);
@@ -306,7 +204,7 @@ fn kind_of(route: &str, method: &Method, answer: &Response, known: bool, names_o
         return Some(Kind::Refused);
     }
     let starts = |name, start: &[u8]| {
-        answer.headers().get(name).map(HeaderValue::as_bytes).is_some_and(|v| v.starts_with(start))
+        response.headers().get(name).map(HeaderValue::as_bytes).is_some_and(|v| v.starts_with(start))
     };
     // A refused form is shown again, with the page around it.
     let again = matches!(status, StatusCode::CONFLICT | StatusCode::UNPROCESSABLE_ENTITY)

@@ -1,6 +1,6 @@
 //! Authorisation as a handler's argument: a handler gets its caller only together with a right.
 
-use crate::pages::error::{PageError, is_for_programs};
+use crate::page_error::{PageError, is_for_programs};
 use crate::problem::Refusal;
 use axum::extract::{FromRequestParts, OriginalUri};
 use axum::http::Extensions;

@@ -102,10 +102,10 @@ pub(super) async fn note(State(app): State<AppState>, mut request: Request, next
     }
     request.extensions_mut().insert(ClientAddress::new(believed.client));
     request.extensions_mut().insert(secure);
-    let mut answer = next.run(request).await;
+    let mut response = next.run(request).await;
     if secure.0 {
-        answer.headers_mut().insert(header::STRICT_TRANSPORT_SECURITY, ONLY_SECURELY);
-        for (name, cookie) in answer.headers_mut().iter_mut() {
+        response.headers_mut().insert(header::STRICT_TRANSPORT_SECURITY, ONLY_SECURELY);
+        for (name, cookie) in response.headers_mut().iter_mut() {
             if name == header::SET_COOKIE
                 && let Ok(text) = cookie.to_str()
                 && !text.split(';').any(|part| part.trim().eq_ignore_ascii_case("secure"))
@@ -115,7 +115,7 @@ pub(super) async fn note(State(app): State<AppState>, mut request: Request, next
             }
         }
     }
-    Ok(answer)
+    Ok(response)
 }
 
 impl<S: Send + Sync> FromRequestParts<S> for ClientAddress {

@@ -54,10 +54,10 @@ impl<P: Permission> Idempotent<P> {
                 if let Some(study) = self.study {
                     consents::may_be_shown(&mut writer, study).await?;
                 }
-                let mut answer = response(&kept);
-                answer.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
-                answer.extensions_mut().insert(KeptBody(kept.body));
-                Ok(Err(answer))
+                let mut repeated = response(&kept);
+                repeated.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
+                repeated.extensions_mut().insert(KeptBody(kept.body));
+                Ok(Err(repeated))
             }
             Some(_) => {
                 Err(Error::conflict("This Idempotency-Key was already used for another request. Use a new key."))
@@ -66,7 +66,7 @@ impl<P: Permission> Idempotent<P> {
     }
 
     /// The stored response of an earlier request with the key, if any.
-    pub(crate) async fn answered_before(&self, app: &AppState) -> Result<Option<Response>, Error> {
+    pub(crate) async fn earlier_response(&self, app: &AppState) -> Result<Option<Response>, Error> {
         if self.key.is_none() {
             return Ok(None);
         }
@@ -154,11 +154,11 @@ fn key_in(headers: &HeaderMap) -> Result<Option<String>, Error> {
 
 fn response(kept: &Kept) -> Response {
     let status = StatusCode::from_u16(kept.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-    let mut answer = (status, [(header::CONTENT_TYPE, "application/json")], kept.body.clone()).into_response();
+    let mut response = (status, [(header::CONTENT_TYPE, "application/json")], kept.body.clone()).into_response();
     if let Some(location) = kept.location.as_ref().and_then(|l| HeaderValue::from_str(l).ok()) {
-        answer.headers_mut().insert(header::LOCATION, location);
+        response.headers_mut().insert(header::LOCATION, location);
     }
-    answer
+    response
 }
 
 async fn read<P: Permission, S: Send + Sync>(

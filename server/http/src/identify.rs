@@ -2,13 +2,14 @@
 
 use super::{AppState, request_body};
 use crate::problem::Refusal;
+use crate::responded_to::RespondedTo;
 use axum::body::HttpBody;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use gaitwright_service::access::Caller;
 use gaitwright_service::access::sign_in::{self, Recognised};
-use gaitwright_service::access::{Caller, Role};
 use gaitwright_service::error::Error;
 use gaitwright_store::{Instant, commit};
 
@@ -19,10 +20,6 @@ const COOKIE: &str = "gaitwright_session";
 /// in which the user signed in earlier.
 const BROWSER: &str = "gaitwright_browser";
 const BROWSER_SECONDS: u32 = 365 * 24 * 3600;
-
-/// The role of the caller, for error pages.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct AnsweredTo(pub(super) Option<Role>);
 
 /// Receives the request, adds its [`Caller`], and the caller's role to the response. Refuses an invalid token; ignores an
 /// invalid session. The caller is looked up again after a body was received, because rights can end while it arrives.
@@ -35,8 +32,8 @@ pub(super) async fn identify(State(app): State<AppState>, request: Request, next
     if has_body {
         found = caller(&app, &path, &headers).await?;
     }
-    let to = found.as_ref().map(|caller| AnsweredTo(caller.role));
-    let mut answer = match received {
+    let to = found.as_ref().map(|caller| RespondedTo(caller.role));
+    let mut response = match received {
         Ok(mut request) => {
             if let Some(caller) = found {
                 request.extensions_mut().insert(caller);
@@ -46,9 +43,9 @@ pub(super) async fn identify(State(app): State<AppState>, request: Request, next
         Err(error) => Refusal(error).into_response(),
     };
     if let Some(to) = to {
-        answer.extensions_mut().insert(to);
+        response.extensions_mut().insert(to);
     }
-    Ok(answer)
+    Ok(response)
 }
 
 async fn caller(app: &AppState, path: &str, headers: &HeaderMap) -> Result<Option<Caller>, Error> {

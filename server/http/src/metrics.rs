@@ -3,56 +3,24 @@
 use super::AppState;
 use super::authorization::Authorized;
 use crate::problem::Refusal;
+use crate::request_counts::{BUCKETS, Requests};
 use axum::extract::{MatchedPath, Request, State};
-use axum::http::{Method, StatusCode, header};
+use axum::http::{Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::Read;
 use gaitwright_store::totals;
-use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
-
-/// Upper bounds of the histogram buckets, s.
-const BUCKETS: [f64; 8] = [0.001, 0.005, 0.025, 0.1, 0.25, 1.0, 5.0, 30.0];
-
-/// Requests by method, route and status class.
-#[derive(Debug, Default)]
-pub struct Requests(Mutex<BTreeMap<(String, String, u16), Timed>>);
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Timed {
-    count: u64,
-    seconds: f64,
-    within: [u64; BUCKETS.len()],
-}
-
-impl Requests {
-    fn add(&self, method: String, route: String, status: StatusCode, seconds: f64) {
-        let mut map = self.map();
-        let timed = map.entry((method, route, status.as_u16())).or_default();
-        timed.count += 1;
-        timed.seconds += seconds;
-        for (within, end) in timed.within.iter_mut().zip(BUCKETS) {
-            *within += u64::from(seconds <= end);
-        }
-    }
-
-    fn map(&self) -> MutexGuard<'_, BTreeMap<(String, String, u16), Timed>> {
-        // The map is consistent between statements, so a poisoned lock is usable.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 /// Counts and times a request by its route. Addresses would give unlimited labels.
 pub(super) async fn count(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
     let method = named(request.method()).to_owned();
     let begun = Instant::now();
-    let answer = next.run(request).await;
-    app.requests.add(method, route, answer.status(), begun.elapsed().as_secs_f64());
-    answer
+    let response = next.run(request).await;
+    app.requests.add(method, route, response.status(), begun.elapsed().as_secs_f64());
+    response
 }
 
 /// The label of a method. Unknown methods share one, because clients can invent any number.

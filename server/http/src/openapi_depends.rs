@@ -31,8 +31,8 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewPreference", "trial_b", GAIT),
     ("NewAssessment", "first", GAIT_OF_STUDY),
     ("NewAssessment", "second", GAIT_OF_STUDY),
-    ("NewSession", "gait_one", GAIT),
-    ("NewSession", "gait_two", GAIT),
+    ("NewLabSession", "gait_one", GAIT),
+    ("NewLabSession", "gait_two", GAIT),
     ("Suggestion", "over", "A trial of this study with a walkable gait."),
     (
         "Suggestion",
@@ -51,7 +51,7 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
     ("Invitation", "name", "The name of a rater, or one that is not taken."),
     ("Unblind", "rater", "A rater who was shown a pair of this study."),
-    ("SafetyReviewToMake", "reports", "Includes every open safety report about the gait of this trial."),
+    ("NewSafetyReview", "reports", "Includes every open safety report about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
     (
         "NewEmg",
@@ -67,7 +67,7 @@ const RULES: [(&str, &str, &str); 27] = [
         "`band_high_hz` exceeds `band_low_hz` by 1 or more, and is at most 0.495 times the sampling rate. The other \
          frequencies are at most 0.45 times the sampling rate.",
     ),
-    ("NewLabAnswer", "number", "At most the current `asks` or `reports`."),
+    ("NewLabAnswer", "number", "At most the current `answer_number` or `report_number`."),
 ];
 
 /// Adds the rules to the fields.

@@ -51,10 +51,10 @@ pub(super) fn state(document: &mut Value) {
             let rule = json!({ "minLength": 1, "maxLength": longest, "pattern": one_line });
             add(schemas, component, field, &rule);
         }
-        for component in ["SafetyReviewToMake", "Retract"] {
+        for component in ["NewSafetyReview", "Retract"] {
             add(schemas, component, "author", &json!({ "minLength": 1, "maxLength": 80, "pattern": one_line }));
         }
-        for component in ["SafetyReviewToMake", "Withdrawal", "NewCorrection", "Unblind", "Retract", "UnblindSession"] {
+        for component in ["NewSafetyReview", "Withdrawal", "NewCorrection", "Unblind", "Retract", "UnblindSession"] {
             add(schemas, component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
         }
         add(schemas, "NewConsent", "form", &json!({ "pattern": needed }));
@@ -70,10 +70,10 @@ pub(super) fn state(document: &mut Value) {
         ] {
             add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
-        for component in ["Tell", "Why"] {
+        for component in ["Tell", "StudyActionReason"] {
             add(schemas, component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
         }
-        for component in ["NewSubject", "NewSession"] {
+        for component in ["NewSubject", "NewLabSession"] {
             add(schemas, component, "notes", &json!({ "pattern": optional }));
         }
         // A code assigned by the site, without addresses, dates and long numbers.

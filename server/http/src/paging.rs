@@ -132,7 +132,7 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
                 }
             };
             if given {
-                return Err(Error::Malformed(format!("The query has the parameter {name} twice.")));
+                return Err(Error::Malformed(query::occurs_twice(&name)));
             }
         }
         let filter = query::read(&filter, &["cursor", "limit"])?;

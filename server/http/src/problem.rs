@@ -101,10 +101,10 @@ impl From<&Error> for Problem {
 
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let mut answer = (self.status(), [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(&self)).into_response();
-        // `answers::complete` adds the request id, and renders a page for browsers.
-        answer.extensions_mut().insert(self);
-        answer
+        let mut response = (self.status(), [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(&self)).into_response();
+        // `responses::complete` adds the request id, and renders a page for browsers.
+        response.extensions_mut().insert(self);
+        response
     }
 }
 
@@ -135,8 +135,8 @@ impl IntoResponse for Refusal {
         if !error.is_input() {
             tracing::error!(%error, "a request failed");
         }
-        let mut answer = Problem::from(&error).into_response();
-        let headers = answer.headers_mut();
+        let mut response = Problem::from(&error).into_response();
+        let headers = response.headers_mut();
         match error {
             Error::NotSignedIn(_) => {
                 headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"gaitwright\""));
@@ -146,6 +146,6 @@ impl IntoResponse for Refusal {
             }
             _ => {}
         }
-        answer
+        response
     }
 }

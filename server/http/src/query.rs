@@ -17,20 +17,25 @@ pub(crate) fn pairs(query: &str) -> Result<Pairs, Error> {
     serde_urlencoded::from_str(query).map_err(|e| Error::Malformed(format!("The query cannot be read: {e}.")))
 }
 
-/// Reads the parameters. The caller has taken out those that are known `beside` the fields.
+/// The message about a parameter that occurs twice.
+pub(crate) fn occurs_twice(name: &str) -> String {
+    format!("The query parameter {name} occurs twice.")
+}
+
+/// Reads the parameters. The caller has taken out the `others`, which are known too.
 ///
 /// # Errors
 /// [`Error::Unreadable`] naming the parameter.
-pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs, beside: &[&str]) -> Result<T, Error> {
+pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs, others: &[&str]) -> Result<T, Error> {
     let values = pairs.iter().map(|(name, value)| (name.as_str(), Text(value)));
     let reader = MapDeserializer::<_, Refused>::new(values);
     serde_path_to_error::deserialize(reader).map_err(|error| {
         let path = error.path().to_string();
-        unreadable(&path, &error.into_inner().to_string(), pairs, beside)
+        unreadable(&path, &error.into_inner().to_string(), pairs, others)
     })
 }
 
-fn unreadable(path: &str, message: &str, pairs: &Pairs, beside: &[&str]) -> Error {
+fn unreadable(path: &str, message: &str, pairs: &Pairs, others: &[&str]) -> Error {
     let named = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').next());
     let (missing, twice) = (named("missing field `"), named("duplicate field `"));
     let field = missing.or(twice).or(named("unknown field `")).unwrap_or(path);
@@ -50,10 +55,10 @@ fn unreadable(path: &str, message: &str, pairs: &Pairs, beside: &[&str]) -> Erro
     };
     let message = match (missing, twice) {
         (Some(_), _) => format!("The query parameter {field} is missing."),
-        (_, Some(_)) => format!("The query has the parameter {field} twice."),
+        (_, Some(_)) => occurs_twice(field),
         _ if unknown => {
             let known = allowed.trim_start_matches("one of ").replace(" or ", ", ");
-            let known: Vec<&str> = known.split(", ").chain(beside.iter().copied()).filter(|k| !k.is_empty()).collect();
+            let known: Vec<&str> = known.split(", ").chain(others.iter().copied()).filter(|k| !k.is_empty()).collect();
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
             format!("The query parameter {field} is unknown. Known parameters: {known}.")
         }
@@ -184,7 +189,7 @@ mod tests {
                 "The query parameter order is \"expected up\"; it must be ascending or descending.",
             ),
             ("share=1", "number", "The query parameter number is missing."),
-            ("number=1&number=2", "number", "The query has the parameter number twice."),
+            ("number=1&number=2", "number", "The query parameter number occurs twice."),
             (
                 "number=1&nmber=2",
                 "nmber",

@@ -33,8 +33,8 @@ pub fn router(state: AppState) -> Router {
         .route("/metrics", get(metrics::get))
         .route("/ready", get(api::health::ready))
         .route("/static/{*path}", get(static_files::get))
-        .fallback(pages::error::no_such_page)
-        .method_not_allowed_fallback(pages::error::no_such_method);
+        .fallback(page_error::no_such_page)
+        .method_not_allowed_fallback(page_error::no_such_method);
     with_layers(routes, state)
 }
 
@@ -53,10 +53,10 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, state.slowest_answer))
         // The whole body is in memory before a handler reads it.
         .layer(DefaultBodyLimit::disable())
-        .layer(CatchPanicLayer::custom(answers::after_panic))
+        .layer(CatchPanicLayer::custom(responses::after_panic))
         .layer(TraceLayer::new_for_http().make_span_with(|_: &Request| tracing::Span::current()))
         .layer(middleware::from_fn_with_state(state.clone(), client_address::note))
-        .layer(middleware::from_fn(answers::complete))
+        .layer(middleware::from_fn(responses::complete))
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))
         .layer(header(header::X_CONTENT_TYPE_OPTIONS, "nosniff"))
         .layer(header(header::REFERRER_POLICY, "same-origin"))

@@ -1,9 +1,9 @@
 //! The state that all handlers share.
 
-use super::access_log::AccessLog;
 use super::forwarded::Proxies;
 use super::host::Hosts;
-use super::metrics::Requests;
+use super::request_counts::Requests;
+use super::unwritten_access::AccessLog;
 use gaitwright_compute::{ComputeError, OnPool};
 use gaitwright_service::access::Clock;
 use gaitwright_service::access::secret::Turns;

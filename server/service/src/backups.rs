@@ -168,7 +168,7 @@ impl Requested {
         self.begun = true;
         tokio::spawn(async move {
             let made = tokio::select! {
-                made = backup::beside_record(&store) => made,
+                made = backup::to_record_folder(&store) => made,
                 () = self.cancel.cancelled() => {
                     self.backups.table().remove(&self.id);
                     return;

@@ -35,7 +35,7 @@ impl Certify {
 /// The certificate as text.
 pub(super) fn for_people(certificate: &Certificate) -> String {
     let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
-    lines.extend(certificate.objections.iter().map(|objection| format!("  reason: {objection}")));
+    lines.extend(certificate.failures.iter().map(|failure| format!("  failure: {failure}")));
     for check in &certificate.checks {
         let (value, limit) = (check.value_in_words(), check.limit_in_words());
         lines.push(format!("  {}: {value} (allowed: {limit}; {})", check.name, check.place));

@@ -37,8 +37,8 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gaitwright_service::studies::lab::FileForm;
-    use gaitwright_service::studies::reference_import::{Form, Strikes, Unit};
+    use gaitwright_service::studies::lab::MeasurementFormat;
+    use gaitwright_service::studies::reference_import::{JointAngleFormat, Strikes, Unit};
 
     fn all_are_known<T: DeserializeOwned>(choices: &[Choice]) {
         for (name, _) in choices {
@@ -48,9 +48,9 @@ mod tests {
 
     #[test]
     fn every_choice_is_one_of_the_rest_interface() {
-        all_are_known::<Form>(&JOINT_ANGLE_FORMATS);
+        all_are_known::<JointAngleFormat>(&JOINT_ANGLE_FORMATS);
         all_are_known::<Unit>(&ANGLE_UNITS);
         all_are_known::<Strikes>(&HEEL_STRIKES);
-        all_are_known::<FileForm>(&EMG_FORMATS);
+        all_are_known::<MeasurementFormat>(&EMG_FORMATS);
     }
 }

@@ -5,7 +5,7 @@ use super::output::data;
 use clap::Args;
 use gaitwright_service::error::Error;
 use gaitwright_service::workers::nats;
-use gaitwright_store::{FORM, clock, free_bytes, now, verify};
+use gaitwright_store::{SCHEMA_VERSION, clock, free_bytes, now, verify};
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
@@ -60,7 +60,7 @@ impl Doctor {
 fn program() -> Found {
     let (version, os, architecture) = (env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH);
     let processors = available_parallelism().map_or_else(|_| "unknown".to_owned(), |number| number.to_string());
-    Good(format!("gaitwright {version}, schema {FORM}, {os} {architecture}, processors: {processors}"))
+    Good(format!("gaitwright {version}, schema {SCHEMA_VERSION}, {os} {architecture}, processors: {processors}"))
 }
 
 fn disk(database: &Path, reserve: u64) -> Found {

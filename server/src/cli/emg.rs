@@ -8,7 +8,7 @@ use clap::Args;
 use gait_optimizer::emg::{Activity, CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope};
 use gaitwright_charts::csv_table::{Cell, CsvTable};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{EmgReading, FileForm};
+use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -21,8 +21,8 @@ pub(super) struct Emg {
     #[arg(long, value_name = "FILE")]
     normal: Option<PathBuf>,
     /// Format of both files.
-    #[arg(long, value_parser = one_of::<FileForm>(EMG_FORMATS), default_value = "csv")]
-    form: FileForm,
+    #[arg(long, value_parser = one_of::<MeasurementFormat>(EMG_FORMATS), default_value = "csv")]
+    form: MeasurementFormat,
     /// Sampling rate of a CSV file without a column time_s, 100 to 20000.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,

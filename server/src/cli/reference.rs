@@ -6,7 +6,7 @@ use super::output::{data, tell};
 use super::problem::read;
 use clap::Args;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::reference_import::{Form, NewReferenceGait, Strikes, Unit};
+use gaitwright_service::studies::reference_import::{JointAngleFormat, NewReferenceGait, Strikes, Unit};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -18,8 +18,8 @@ pub(super) struct Reference {
     #[arg(long, value_name = "TEXT")]
     name: String,
     /// Format of the recording.
-    #[arg(long, value_parser = one_of::<Form>(JOINT_ANGLE_FORMATS), default_value = "opensim")]
-    form: Form,
+    #[arg(long, value_parser = one_of::<JointAngleFormat>(JOINT_ANGLE_FORMATS), default_value = "opensim")]
+    form: JointAngleFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     #[arg(long, value_parser = one_of::<Unit>(ANGLE_UNITS))]
     unit: Option<Unit>,

@@ -238,7 +238,7 @@ fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
     };
     vec![
         format!(
-            "  time               evaluation {:.2} s, factorisation {:.2} s, solves {:.2} s, analysis {:.2} s",
+            "  time               evaluation {:.2} s, factorisation {:.2} s, substitutions {:.2} s, analysis {:.2} s",
             report.seconds_evaluation, algebra.seconds_factorisation, algebra.seconds_solves, algebra.seconds_analysis
         ),
         format!(

@@ -123,7 +123,7 @@ impl Tune {
 /// The certificate of the best gait, and the alternative if it failed.
 fn certificate_lines(summary: &Summary) -> Vec<String> {
     let mut lines = vec![format!("  certificate       {}", summary.best_certificate.as_str().replace('_', " "))];
-    lines.extend(summary.best_objections.iter().map(|objection| format!("    {objection}")));
+    lines.extend(summary.best_failures.iter().map(|failure| format!("    {failure}")));
     if summary.best_certificate != CertificateState::Failed {
         return lines;
     }

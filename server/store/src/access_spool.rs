@@ -2,7 +2,8 @@
 //! them to the access log.
 
 use super::access_log::{Access, Tally};
-use super::{Instant, StoreError, StoreResult, beside};
+use super::companion::companion;
+use super::{Instant, StoreError, StoreResult};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -20,7 +21,7 @@ struct Line {
 }
 
 fn path_of(record: &Path) -> PathBuf {
-    beside(record, ".access")
+    companion(record, ".access")
 }
 
 /// Notes an access durably.

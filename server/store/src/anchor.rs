@@ -5,9 +5,13 @@
 //! record. Two places are written in turn, so that one is intact after a power failure.
 
 use super::audit::ORIGIN;
+use super::companion::companion;
+use super::connection::Connection;
+use super::error::{StoreError, StoreResult};
 use super::files::FileId;
+use super::json;
+use super::time::{Instant, now};
 use super::whole_file::{WholeFile, folder_of};
-use super::{Connection, Instant, StoreError, StoreResult, beside, json, now};
 use serde::{Deserialize, Serialize};
 use sqlx::{AssertSqlSafe, Row};
 use std::fs::{File, OpenOptions};
@@ -77,8 +81,8 @@ impl Place {
 }
 
 /// The path of the anchor next to a record.
-pub fn beside_record(record: &Path) -> PathBuf {
-    beside(record, ".anchor")
+pub fn path_of(record: &Path) -> PathBuf {
+    companion(record, ".anchor")
 }
 
 /// Reads the last rows of the chains of an open record.
@@ -150,7 +154,7 @@ pub(super) fn refuse_wrong(elsewhere: Option<&Path>, record: &Path, backup: Opti
     }
     let wrong = |what| Err(StoreError::WrongAnchor { path: anchor.to_owned(), what });
     let place = resolved(anchor);
-    let is_of = |file: &Path| OWN_FILES.iter().any(|ending| resolved(&beside(file, ending)) == place);
+    let is_of = |file: &Path| OWN_FILES.iter().any(|ending| resolved(&companion(file, ending)) == place);
     if is_of(record) {
         return wrong("a file of the record");
     }

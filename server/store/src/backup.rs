@@ -19,7 +19,7 @@ pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
 ///
 /// # Errors
 /// As [`of_store`], and [`StoreError::NearlyFull`].
-pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
+pub async fn to_record_folder(store: &Store) -> StoreResult<(PathBuf, u64)> {
     let _turn = store.copying.lock().await;
     let to = free_name(store.path(), "backup");
     store.room_for_copy(&to)?;
@@ -40,7 +40,7 @@ pub fn room(store: &Store) -> StoreResult<()> {
 ///
 /// # Errors
 /// If the folder cannot be read.
-pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
+pub fn in_record_folder(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
     let own = record.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder_of(record))? {

@@ -1,7 +1,8 @@
 //! The folder of scheduled backups. It belongs to one record, because the oldest backups in it are removed.
 
+use super::companion::companion;
 use super::whole_file::private;
-use super::{Store, StoreError, StoreResult, backup, beside, free_name};
+use super::{Store, StoreError, StoreResult, backup, free_name};
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -31,7 +32,7 @@ impl BackupFolder {
     pub fn claim(store: &Store, folder: &Path) -> StoreResult<Self> {
         let record = store.path();
         let stem = folder.join(record.file_name().unwrap_or_default());
-        let claim = beside(&stem, ".owner");
+        let claim = companion(&stem, ".owner");
         let cannot = |source| StoreError::Open { path: claim.clone(), source };
         let own = record.canonicalize().map_err(cannot)?;
         let own = own.to_string_lossy();

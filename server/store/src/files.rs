@@ -1,8 +1,9 @@
 //! Detects that files of the open record were deleted, replaced or truncated. SQLite would keep writing to a deleted
 //! file, and all acknowledged changes would be lost with the process.
 
+use super::companion::companion;
+use super::error::{StoreError, StoreResult};
 use super::log::Log;
-use super::{StoreError, StoreResult, beside};
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
@@ -54,12 +55,12 @@ impl Files {
             [("the database file", ""), ("its write-ahead log (-wal)", "-wal"), ("its shared memory (-shm)", "-shm")];
         let mut seen = Vec::new();
         for (what, ending) in files {
-            let path = beside(path, ending);
+            let path = companion(path, ending);
             let file = std::fs::metadata(&path).map_err(|source| StoreError::Open { path: path.clone(), source })?;
             let bytes = (ending != "-shm").then_some(file.len());
             seen.push(Seen { what, path, id: FileId::of(&file), bytes });
         }
-        let name = beside(path, "-wal");
+        let name = companion(path, "-wal");
         let log = Log::open(&name).map_err(|source| StoreError::Open { path: name, source })?;
         Ok(Self {
             path: path.to_owned(),

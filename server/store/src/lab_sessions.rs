@@ -49,7 +49,7 @@ impl FromStr for Act {
 
 /// Completed step of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Done {
+pub struct LabSessionStep {
     /// Reason or note.
     pub note: String,
     /// Who did it.
@@ -80,14 +80,14 @@ pub struct LabSession {
     /// Time of planning.
     pub created_at: Instant,
     /// Completed steps, in order.
-    pub acts: Vec<(Act, Done)>,
+    pub acts: Vec<(Act, LabSessionStep)>,
     /// Answers of the subject, in order.
     pub answers: Vec<LabAnswer>,
 }
 
 impl LabSession {
     /// A step, if it is completed.
-    pub fn done(&self, act: Act) -> Option<&Done> {
+    pub fn done(&self, act: Act) -> Option<&LabSessionStep> {
         self.acts.iter().find(|(known, _)| *known == act).map(|(_, done)| done)
     }
 
@@ -214,8 +214,9 @@ async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> 
     let id: LabSessionId = row.try_get("id")?;
     let acts = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id);
     let acts = acts.fetch_all(&mut *db).await?;
-    let act = |row: &SqliteRow| -> StoreResult<(Act, Done)> {
-        let done = Done { note: row.try_get("note")?, actor: row.try_get("actor")?, at: row.try_get("created_at")? };
+    let act = |row: &SqliteRow| -> StoreResult<(Act, LabSessionStep)> {
+        let done =
+            LabSessionStep { note: row.try_get("note")?, actor: row.try_get("actor")?, at: row.try_get("created_at")? };
         Ok((row.try_get::<&str, _>("act")?.parse()?, done))
     };
     Ok(LabSession {

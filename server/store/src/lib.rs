@@ -20,6 +20,8 @@ pub mod backup;
 pub mod backup_folder;
 pub mod certificates;
 pub mod clock;
+mod companion;
+mod connection;
 pub mod consents;
 pub mod devices;
 mod error;
@@ -74,6 +76,7 @@ pub mod verify;
 pub mod whole_file;
 mod writing;
 
+pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
     AssessmentId, BackupId, DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabSessionId, MeasurementFileId,
@@ -82,17 +85,18 @@ pub use id::{
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use packed::{Packed, PackedText};
-pub use schema_versions::FORM;
+pub use schema_versions::SCHEMA_VERSION;
 pub use space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use time::{Instant, now, set_machine_clock};
 pub use writing::Writer;
 
 use anchor::Anchors;
+use companion::companion;
 use files::Files;
 use gaitwright_compute::{ComputeError, OnPool, Pool};
 use ownership::Ownership;
+use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{SqliteConnection, SqlitePool};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -165,7 +169,7 @@ impl Store {
         anchor::refuse_wrong(elsewhere, path, None)?;
         file_kind::check(path)?;
         let anchors: Vec<PathBuf> =
-            [Some(anchor::beside_record(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
+            [Some(anchor::path_of(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
         let mut owner = Ownership::take(path)?;
         let checked = async {
             restore::finish_interrupted(path)?;
@@ -358,9 +362,6 @@ pub fn sha256(bytes: &[u8]) -> String {
     json::sha256(bytes)
 }
 
-/// A plain connection, which a [`Reader`] or a [`Writer`] dereferences to.
-pub type Connection = SqliteConnection;
-
 /// Refuses a file of another program or a newer version, before a writing connection opens it.
 async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     if !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
@@ -384,7 +385,7 @@ fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) -> StoreRes
     if bytes(path) > 0 {
         return Ok(());
     }
-    let log = beside(path, "-wal");
+    let log = companion(path, "-wal");
     if bytes(&log) > 0 {
         return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: log });
     }
@@ -413,22 +414,15 @@ fn refuse_to_begin_anew(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
     Ok(())
 }
 
-/// The path next to the record with this suffix.
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(ending);
-    PathBuf::from(name)
-}
-
 /// `gaitwright.db.WHAT-20260501T101500`, with a number if that name is taken.
 fn free_name(of: &Path, what: &str) -> PathBuf {
     let stamp: String = now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect();
-    let first = beside(of, &format!(".{what}-{stamp}"));
+    let first = companion(of, &format!(".{what}-{stamp}"));
     let mut name = first.clone();
     let mut number = 1_u32;
     while name.exists() {
         number += 1;
-        name = beside(&first, &format!("-{number}"));
+        name = companion(&first, &format!("-{number}"));
     }
     name
 }

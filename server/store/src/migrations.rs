@@ -1,7 +1,8 @@
 //! Migrates a record at start, in one transaction, after a backup.
 
-use super::schema_versions::{FORM, check_version, up_to};
-use super::{StoreError, StoreResult, backup, beside, seals, verify};
+use super::companion::companion;
+use super::schema_versions::{SCHEMA_VERSION, check_version, up_to};
+use super::{StoreError, StoreResult, backup, seals, verify};
 use sqlx::SqlitePool;
 use std::path::{Path, PathBuf};
 
@@ -17,10 +18,10 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     if found > 0 {
         verify::rows(&mut change, found).await?;
     }
-    if found < FORM {
+    if found < SCHEMA_VERSION {
         let before = seals::present(&mut change).await?;
         seals::watch_migrations(&mut change).await?;
-        up_to(FORM).run_direct(None, &mut *change, false).await?;
+        up_to(SCHEMA_VERSION).run_direct(None, &mut *change, false).await?;
         seals::adopt(&mut change, &before).await?;
         seals::end_watch(&mut change).await?;
     }
@@ -29,10 +30,10 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
 
 /// Backs up a file before a migration, as `gaitwright.db.v1`.
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
-    if found == 0 || found == FORM {
+    if found == 0 || found == SCHEMA_VERSION {
         return Ok(());
     }
-    let name = beside(path, &format!(".v{found}"));
+    let name = companion(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
     let copy = backup::whole_copy(pool, path, &name, path).await?;
     match free_name(&name, copy.part()).map_err(cannot_write)? {
@@ -53,7 +54,7 @@ fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
             return Ok(None);
         }
         number += 1;
-        candidate = beside(name, &format!("-{number}"));
+        candidate = companion(name, &format!("-{number}"));
     }
     Ok(Some(candidate))
 }

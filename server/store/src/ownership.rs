@@ -1,9 +1,10 @@
 //! Exclusive ownership of the record by one process, through a lock file and a lock on the database file. The lock file
 //! stays while the database file is created or replaced; the second lock holds even if the lock file is deleted.
 
+use super::companion::companion;
+use super::error::{StoreError, StoreResult};
 use super::files::FileId;
 use super::whole_file::private;
-use super::{StoreError, StoreResult, beside};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,7 @@ pub(super) struct Ownership {
     lock: PathBuf,
     /// Whether the lock file was created by this process.
     made: bool,
-    _beside: File,
+    _lock_file: File,
     /// The locked database file. Closing it while a connection is open would release SQLite's locks.
     database: Option<File>,
 }
@@ -23,13 +24,13 @@ impl Ownership {
     pub(super) fn take(path: &Path) -> StoreResult<Self> {
         refuse_second_name(path)?;
         // Resolve links, so that each file has one lock.
-        let lock = beside(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
+        let lock = companion(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
         let made = !lock.exists();
         let open = private().create(true).truncate(false).write(true).open(&lock);
         let file = open.map_err(|source| StoreError::Open { path: path.to_owned(), source })?;
         locked(path, &file)?;
         let database = if path.exists() { Some(lock_database(path, false)?) } else { None };
-        Ok(Self { lock, made, _beside: file, database })
+        Ok(Self { lock, made, _lock_file: file, database })
     }
 
     /// Creates the database file if it is missing, readable by its owner only.

@@ -64,8 +64,8 @@ pub enum Judgement {
     UnsafeSecond,
     /// Neither gait may be walked.
     UnsafeBoth,
-    /// Withdrawn by the service, because a gait was reported as unsafe in the meantime, or the answer was retracted.
-    Withdrawn,
+    /// Retracted by the service, because a gait was reported as unsafe in the meantime, or retracted by its author.
+    Retracted,
 }
 
 impl Judgement {
@@ -78,7 +78,7 @@ impl Judgement {
         Self::UnsafeFirst,
         Self::UnsafeSecond,
         Self::UnsafeBoth,
-        Self::Withdrawn,
+        Self::Retracted,
     ];
 
     /// The entry for the learner, if any. An unsafe gait loses against the other one.
@@ -91,7 +91,7 @@ impl Judgement {
                 Some(feedback::FeedbackContent::Preference { winner: second, loser: first })
             }
             Self::NoDifference => Some(feedback::FeedbackContent::Tie { a: first, b: second }),
-            Self::CannotTell | Self::UnsafeBoth | Self::Withdrawn => None,
+            Self::CannotTell | Self::UnsafeBoth | Self::Retracted => None,
         }
     }
 
@@ -103,7 +103,7 @@ impl Judgement {
             Self::Second => Self::First,
             Self::UnsafeFirst => Self::UnsafeSecond,
             Self::UnsafeSecond => Self::UnsafeFirst,
-            Self::NoDifference | Self::CannotTell | Self::UnsafeBoth | Self::Withdrawn => self,
+            Self::NoDifference | Self::CannotTell | Self::UnsafeBoth | Self::Retracted => self,
         }
     }
 
@@ -127,7 +127,7 @@ impl Judgement {
         }
     }
 
-    /// The name in the record and in REST.
+    /// The name in the record.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::First => "first",
@@ -137,7 +137,7 @@ impl Judgement {
             Self::UnsafeFirst => "unsafe_first",
             Self::UnsafeSecond => "unsafe_second",
             Self::UnsafeBoth => "unsafe_both",
-            Self::Withdrawn => "withdrawn",
+            Self::Retracted => "withdrawn",
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Opens and checks a record without changing it.
 
-use super::{StoreError, StoreResult, beside, file_kind, quarantine, restore_marker, schema_versions};
+use super::companion::companion;
+use super::{StoreError, StoreResult, file_kind, quarantine, restore_marker, schema_versions};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
 use std::path::{Path, PathBuf};
@@ -32,13 +33,13 @@ pub async fn open(file: &Path) -> StoreResult<SqlitePool> {
     };
     // In a read-only folder SQLite cannot create its shared memory. Without a log it needs none; with one, open a copy
     // of both.
-    let log = beside(file, "-wal");
+    let log = companion(file, "-wal");
     if std::fs::metadata(&log).map_or(0, |log| log.len()) == 0 {
         return connect(options.immutable(true), file).await;
     }
     let Ok(folder) = private_folder() else { return Err(refused) };
     let copy = folder.join("record.db");
-    let copied = std::fs::copy(file, &copy).and_then(|_| std::fs::copy(&log, beside(&copy, "-wal")));
+    let copied = std::fs::copy(file, &copy).and_then(|_| std::fs::copy(&log, companion(&copy, "-wal")));
     let opened = match copied {
         Ok(_) => connect(SqliteConnectOptions::new().filename(&copy), file).await,
         Err(source) => Err(StoreError::Open { path: file.to_owned(), source }),

@@ -4,10 +4,11 @@
 //! marker beside the record notes this. If the process is killed, the next owner of the record finishes the restore if the
 //! backup has the name already, and otherwise leaves the old record with its log as it is.
 
+use super::companion::companion;
 use super::ownership::Ownership;
 use super::restore_marker::{self, Marker, mark, unmark};
 use super::whole_file::{WholeFile, sync_folder};
-use super::{StoreError, StoreResult, anchor, backup, beside, free_name, read_only};
+use super::{StoreError, StoreResult, anchor, backup, free_name, read_only};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -80,9 +81,9 @@ async fn replace(
 fn keep(to: &Path, kept: &Path) -> io::Result<()> {
     let family = to.file_name().unwrap_or_default().to_string_lossy();
     for ending in ["", COMPANIONS[0], ".anchor"] {
-        let present = beside(to, ending);
+        let present = companion(to, ending);
         if present.exists() {
-            let target = beside(kept, ending);
+            let target = companion(kept, ending);
             let mut whole = WholeFile::begin(&target, &family)?;
             io::copy(&mut File::open(&present)?, whole.file())?;
             whole.keep_as(&target)?;
@@ -111,14 +112,14 @@ pub(super) fn finish_interrupted(record: &Path) -> StoreResult<()> {
 
 /// Removes the log of the old record, which must not be used with the backup, and updates the anchors.
 fn finish(record: &Path, marker: &Marker, reached: &dyn Fn(Step)) -> StoreResult<()> {
-    let others = COMPANIONS.map(|ending| beside(record, ending));
+    let others = COMPANIONS.map(|ending| companion(record, ending));
     for path in others.into_iter().filter(|path| path.exists()) {
         std::fs::remove_file(&path).map_err(|source| StoreError::Open { path, source })?;
     }
     sync_folder(record).map_err(|source| StoreError::Open { path: record.to_owned(), source })?;
     reached(Step::LogRemoved);
-    let beside_record = anchor::beside_record(record);
-    for anchor in std::iter::once(&beside_record).chain(&marker.elsewhere) {
+    let own_anchor = anchor::path_of(record);
+    for anchor in std::iter::once(&own_anchor).chain(&marker.elsewhere) {
         anchor::put(anchor, &marker.ends)?;
     }
     reached(Step::Anchored);
@@ -195,9 +196,9 @@ mod tests {
             add(&store, "after").await;
             // As a killed service leaves them: the last change is in the log.
             for ending in ["", "-wal", ".anchor"] {
-                std::fs::copy(beside(&live, ending), beside(&record, ending)).unwrap();
+                std::fs::copy(companion(&live, ending), companion(&record, ending)).unwrap();
             }
-            std::fs::copy(anchor::beside_record(&live), &elsewhere).unwrap();
+            std::fs::copy(anchor::path_of(&live), &elsewhere).unwrap();
             store.close().await;
 
             let [copy, record_text, second] = [&copy, &record, &elsewhere].map(|path| path.to_str().unwrap());

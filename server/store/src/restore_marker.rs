@@ -1,8 +1,9 @@
 //! The marker beside a record that a restore has begun to replace.
 
 use super::anchor::Ends;
+use super::companion::companion;
 use super::whole_file::{WholeFile, sync_folder};
-use super::{StoreError, StoreResult, beside, json};
+use super::{StoreError, StoreResult, json};
 use serde::{Deserialize, Serialize};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ pub(super) struct Marker {
 
 /// The path of the marker beside a record.
 fn marker_of(record: &Path) -> PathBuf {
-    beside(record, ".restoring")
+    companion(record, ".restoring")
 }
 
 /// Writes the marker durably.

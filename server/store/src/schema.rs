@@ -351,7 +351,7 @@ pub struct Certificate {
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
     /// Reasons if it failed; otherwise empty.
-    pub objections: Vec<String>,
+    pub failures: Vec<String>,
     /// Every quantity with its worst value and its limit.
     pub checks: Vec<CertificateCheck>,
     /// How the simulation ended early; null if it did not.

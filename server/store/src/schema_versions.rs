@@ -23,11 +23,11 @@ const FILES: &[(i64, &str, &str)] = &[
 ];
 
 /// Newest schema version.
-pub const FORM: i64 = FILES[FILES.len() - 1].0;
+pub const SCHEMA_VERSION: i64 = FILES[FILES.len() - 1].0;
 
 /// Creates the schema in an empty database.
 pub(super) async fn fresh(db: &mut Connection) -> StoreResult<()> {
-    Ok(up_to(FORM).run_direct(None, db, false).await?)
+    Ok(up_to(SCHEMA_VERSION).run_direct(None, db, false).await?)
 }
 
 /// The migrations up to a version.

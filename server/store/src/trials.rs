@@ -357,15 +357,15 @@ pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> Store
 ///
 /// # Errors
 /// A refusal by a trigger if the trial already has a result; errors of the database.
-pub async fn tell(db: &mut Connection, id: TrialId, told: &ScriptOutcome) -> StoreResult<()> {
+pub async fn tell(db: &mut Connection, id: TrialId, outcome: &ScriptOutcome) -> StoreResult<()> {
     sqlx::query(
         "update trials set state = ?, gait_rmse_rad = ?, cost_of_transport = ?, message = ?, finished_at = ? \
          where id = ?",
     )
-    .bind(told.state.as_str())
-    .bind(told.gait_rmse_rad)
-    .bind(told.cost_of_transport)
-    .bind(&told.message)
+    .bind(outcome.state.as_str())
+    .bind(outcome.gait_rmse_rad)
+    .bind(outcome.cost_of_transport)
+    .bind(&outcome.message)
     .bind(now())
     .bind(id)
     .execute(db)

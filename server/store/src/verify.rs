@@ -1,7 +1,7 @@
 //! Verifies a record: its file, schema, hash chains, every row, and its anchors.
 
 use super::anchor::{self, Ends};
-use super::{Connection, FORM, StoreError, StoreResult, audit, read_only, schema_versions, seals};
+use super::{Connection, SCHEMA_VERSION, StoreError, StoreResult, audit, read_only, schema_versions, seals};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row, SqliteConnection, SqlitePool};
 use std::collections::BTreeSet;
@@ -38,7 +38,7 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
     let mut db = pool.begin().await?;
     let (audit, seals) = rows(&mut db, version).await?;
     let mut seen = Vec::new();
-    for anchor in std::iter::once(anchor::beside_record(record)).chain(anchors.iter().cloned()) {
+    for anchor in std::iter::once(anchor::path_of(record)).chain(anchors.iter().cloned()) {
         match anchor::check(&mut db, record, &anchor).await? {
             Some(ends) => seen.push((anchor, ends)),
             None if anchors.contains(&anchor) => {
@@ -78,7 +78,7 @@ pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chai
 /// Checks that tables, indices, triggers and views match the migrations, because a missing trigger protects nothing.
 async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
     let expected = match version {
-        FORM => PRESENT.get_or_try_init(|| created(FORM)).await?,
+        SCHEMA_VERSION => PRESENT.get_or_try_init(|| created(SCHEMA_VERSION)).await?,
         older => &created(older).await?,
     };
     let found = parts(db).await?;

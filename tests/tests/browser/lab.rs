@@ -46,7 +46,7 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     for (width, height) in [(768, 1024), (1024, 768)] {
         page.resize(width, height).await;
         let bottom =
-            "Math.max(...[...document.querySelectorAll('.verdict')].map(e => e.getBoundingClientRect().bottom))";
+            "Math.max(...[...document.querySelectorAll('.answer-option')].map(e => e.getBoundingClientRect().bottom))";
         let bottom: f64 = page.value(bottom).await.parse().unwrap();
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
     }
@@ -59,7 +59,7 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     page.wait_for(".notice.good button").await;
     assert!(page.text(".notice.good").await.contains("walk 2 was better"));
     page.click(".notice.good button").await;
-    page.wait_for(".verdicts input[value=no_difference]").await;
+    page.wait_for(".answer-options input[value=no_difference]").await;
     page.run("document.querySelector('input[name=answer]').focus()").await;
     page.press("ArrowRight").await;
     page.press("ArrowRight").await;

@@ -65,7 +65,7 @@ async fn browser_rater_sees_everything_on_a_tablet_either_way_up() {
     for (width, height) in [(768, 1024), (1024, 768)] {
         page.resize(width, height).await;
         // Both gaits and the three answers are visible without scrolling.
-        let bottom = "Math.max(...[...document.querySelectorAll('canvas, .verdict')].map(e => e.getBoundingClientRect().bottom))";
+        let bottom = "Math.max(...[...document.querySelectorAll('canvas, .answer-option')].map(e => e.getBoundingClientRect().bottom))";
         let bottom: f64 = page.value(bottom).await.parse().unwrap();
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
     }

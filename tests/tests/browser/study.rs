@@ -124,7 +124,7 @@ async fn browser_shows_what_the_learner_believes_and_where_gaits_grew() {
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.trial_budget = 8).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let page = browser.open(&site.at(&format!("/studies/{study}/belief?right=a5&down=a6"))).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}/belief?x=a5&y=a6"))).await;
     assert_eq!(page.count("#marginals svg.chart .band").await, 8);
     // Four clearances by six leans, twice.
     assert_eq!(page.count("#maps svg.map .cell").await, 48);
@@ -136,7 +136,7 @@ async fn browser_shows_what_the_learner_believes_and_where_gaits_grew() {
     assert_eq!(page.text("#best tr.best a").await, recommended["number"].to_string(), "{recommended}");
     assert!(page.count("#answers tbody tr").await > 0);
     page.is_clean(&site.origin).await;
-    let wrong = site.service.fetch(&format!("/studies/{study}/belief?right=a5&down=a5")).await;
+    let wrong = site.service.fetch(&format!("/studies/{study}/belief?x=a5&y=a5")).await;
     assert!(wrong.status.is_client_error(), "{}", wrong.status);
 
     let other = site.service.study(|new| (new.trial_budget, new.muscles) = (4, false)).await;

@@ -55,7 +55,7 @@ pub(super) async fn next(
     Id(id, _): Id<StudyId, Rate>,
     request: Idempotent<Rate>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = request.answered_before(&app).await? {
+    if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
     }
     let answering = app.clone();
@@ -158,7 +158,7 @@ pub(super) async fn answer(
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",
-    operation_id = "get_rater_agreement",
+    operation_id = "list_rater_agreement",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "One row for each rater", body = Page<RaterFigures>), (status = 409, description = "The subject withdrew consent")),

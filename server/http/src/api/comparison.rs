@@ -32,7 +32,7 @@ pub(super) struct Which {
 
 /// Study in a comparison.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Compared {
+pub(super) struct StudyComparison {
     id: StudyId,
     name: String,
     muscles: bool,
@@ -61,14 +61,14 @@ pub(super) struct Compared {
     operation_id = "compare_studies",
     tag = "studies",
     params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of studies")),
-    responses((status = 200, description = "One row for each study", body = Page<Compared>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
+    responses((status = 200, description = "One row for each study", body = Page<StudyComparison>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     paging: Paging<usize, Which>,
-) -> Result<Json<Page<Compared>>, Refusal> {
+) -> Result<Json<Page<StudyComparison>>, Refusal> {
     let which = &paging.filter;
     let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
     if !(2..=MOST).contains(&named.len()) {
@@ -85,7 +85,7 @@ pub(super) async fn get(
     Ok(Json(paging.cut_by_place(rows)?))
 }
 
-async fn row(app: &mut AppState, id: StudyId) -> Result<Compared, Refusal> {
+async fn row(app: &mut AppState, id: StudyId) -> Result<StudyComparison, Refusal> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     consents::may_be_shown(&mut reader, id).await?;
@@ -99,7 +99,7 @@ async fn row(app: &mut AppState, id: StudyId) -> Result<Compared, Refusal> {
     };
     let (snapshot, best) = app.compute(rank).await?;
     let best = best.map_err(Error::Learner)?.first().and_then(|id| snapshot.trial(*id));
-    Ok(Compared {
+    Ok(StudyComparison {
         id,
         name: snapshot.study.plan.name.clone(),
         muscles: snapshot.study.plan.muscles,

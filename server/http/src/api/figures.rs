@@ -20,7 +20,7 @@ use serde::Deserialize;
 
 /// A second study or trial for comparison.
 #[derive(Debug, Deserialize)]
-pub(super) struct Beside<T> {
+pub(super) struct ComparedWith<T> {
     other: Option<Named<T>>,
 }
 
@@ -43,11 +43,11 @@ pub(super) async fn of_study(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(Beside { other }): Params<Beside<StudyId>>,
+    Params(ComparedWith { other }): Params<ComparedWith<StudyId>>,
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = figures::of_study(&mut app, id, other).await?.into_figures();
-    answer(&mut app, figures, file).await
+    response(&mut app, figures, file).await
 }
 
 /// Download a figure of a trial
@@ -71,14 +71,14 @@ pub(super) async fn of_trial(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(Beside { other }): Params<Beside<TrialId>>,
+    Params(ComparedWith { other }): Params<ComparedWith<TrialId>>,
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = match other {
         None => figures::of_trial(&mut app, id).await?,
         Some(other) => figures::of_pair(&mut app, id, other).await?,
     };
-    answer(&mut app, figures, file).await
+    response(&mut app, figures, file).await
 }
 
 /// Download a figure of a lab session
@@ -103,7 +103,7 @@ pub(super) async fn of_session(
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let figures = figures::of_session(&mut app, id).await?;
-    answer(&mut app, figures, file).await
+    response(&mut app, figures, file).await
 }
 
 /// Download a figure of the posterior
@@ -115,8 +115,8 @@ pub(super) async fn of_session(
     params(
         ("id" = StudyId, Path, description = "The study"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("right" = Option<String>, Query, description = "Bound on the horizontal axis of maps. The first one by default"),
-        ("down" = Option<String>, Query, description = "Bound on the vertical axis of maps. The second one by default")
+        ("x" = Option<String>, Query, description = "Bound on the horizontal axis of maps. The first one by default"),
+        ("y" = Option<String>, Query, description = "Bound on the vertical axis of maps. The second one by default")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -129,7 +129,7 @@ pub(super) async fn of_belief(
     Params(choice): Params<belief::Choice>,
 ) -> Result<Response, Refusal> {
     let figures = belief::figures(&mut app, id, choice).await?;
-    answer(&mut app, figures, file).await
+    response(&mut app, figures, file).await
 }
 
 /// Download a figure of a reference gait
@@ -152,24 +152,24 @@ pub(super) async fn of_reference(
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?.definition;
-    answer(&mut app, figures::of_reference(&reference), file).await
+    response(&mut app, figures::of_reference(&reference), file).await
 }
 
 /// Responds with a figure in the format of the file name.
-async fn answer(app: &mut AppState, figures: Vec<Figure>, file: String) -> Result<Response, Refusal> {
+async fn response(app: &mut AppState, figures: Vec<Figure>, file: String) -> Result<Response, Refusal> {
     let missing = || Error::NotFound { what: "figure".to_owned(), id: file.clone() };
-    let (name, form) = file.rsplit_once('.').ok_or_else(missing)?;
+    let (name, format) = file.rsplit_once('.').ok_or_else(missing)?;
     let figure = figures.into_iter().find(|figure| figure.name == name).ok_or_else(missing)?;
-    let (kind, form) = match form {
-        "svg" => ("image/svg+xml", Form::Svg),
-        "png" => ("image/png", Form::Png),
-        "csv" => ("text/csv; charset=utf-8", Form::Csv),
+    let (kind, format) = match format {
+        "svg" => ("image/svg+xml", FigureFormat::Svg),
+        "png" => ("image/png", FigureFormat::Png),
+        "csv" => ("text/csv; charset=utf-8", FigureFormat::Csv),
         _ => return Err(missing().into()),
     };
-    let draw = move |_: &OnPool| match form {
-        Form::Svg => Ok(figure.svg().into_bytes()),
-        Form::Csv => Ok(figure.csv().into_bytes()),
-        Form::Png => figure.png(),
+    let draw = move |_: &OnPool| match format {
+        FigureFormat::Svg => Ok(figure.svg().into_bytes()),
+        FigureFormat::Csv => Ok(figure.csv().into_bytes()),
+        FigureFormat::Png => figure.png(),
     };
     let bytes = app.compute(draw).await?.map_err(|e| Error::Internal(e.to_string()))?;
     let headers = [
@@ -181,7 +181,7 @@ async fn answer(app: &mut AppState, figures: Vec<Figure>, file: String) -> Resul
 
 /// File format.
 #[derive(Debug, Clone, Copy)]
-enum Form {
+enum FigureFormat {
     Svg,
     Png,
     Csv,

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::csv_answer::csv_file;
+use crate::csv_response::csv_file;
 use crate::problem::Refusal;
 use crate::visible::Visible;
 use axum::extract::State;

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::csv_answer::csv_answer;
+use crate::csv_response::csv_response;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::visible::Visible;
@@ -75,7 +75,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Refusal
 
 async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
     let history = read(app, id).await?;
-    csv_answer(app, &format!("history-{}.csv", id.short()), move || written(&history)).await
+    csv_response(app, &format!("history-{}.csv", id.short()), move || written(&history)).await
 }
 
 fn written(history: &[Milestone]) -> CsvTable {

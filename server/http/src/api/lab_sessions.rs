@@ -15,7 +15,9 @@ use axum::response::Response;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Device, Rate, Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self, GaitOfWalk, InTheLab, NewAnswer, NewSession, RecordedWalk, SessionView};
+use gaitwright_service::studies::lab::{
+    self, GaitOfWalk, LabSessionProgress, LabSessionView, NewAnswer, NewLabSession, RecordedWalk,
+};
 use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, schema, studies};
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -29,7 +31,7 @@ use utoipa::ToSchema;
     operation_id = "list_lab_sessions",
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Lab sessions, by number", body = Page<SessionView>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Lab sessions, by number", body = Page<LabSessionView>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -37,11 +39,11 @@ pub(super) async fn of_study(
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<u32>,
-) -> Result<Json<Page<SessionView>>, Refusal> {
+) -> Result<Json<Page<LabSessionView>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let all = lab_sessions::of_study(&mut reader, id).await?;
-    Ok(Json(paging.cut(all, |session| session.number)?.map(|session| SessionView::from(&session))))
+    Ok(Json(paging.cut(all, |session| session.number)?.map(|session| LabSessionView::from(&session))))
 }
 
 /// Plan a lab session
@@ -53,14 +55,14 @@ pub(super) async fn of_study(
     operation_id = "plan_lab_session",
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
-    request_body = NewSession,
-    responses((status = 201, description = "Lab session", body = SessionView)),
+    request_body = NewLabSession,
+    responses((status = 201, description = "Lab session", body = LabSessionView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    IdempotentWith(request, new): IdempotentWith<Run, NewSession>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewLabSession>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
@@ -68,7 +70,7 @@ pub(super) async fn create(
     };
     let session = lab::plan(&mut writer, &request.actor, id, &new).await?;
     let location = format!("/api/v1/lab-sessions/{}", session.id);
-    request.created(&app, writer, location, &SessionView::from(&session)).await
+    request.created(&app, writer, location, &LabSessionView::from(&session)).await
 }
 
 /// Get a lab session
@@ -80,15 +82,15 @@ pub(super) async fn create(
     operation_id = "get_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "Lab session", body = SessionView), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Lab session", body = LabSessionView), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
-) -> Result<Json<SessionView>, Refusal> {
-    Ok(Json(SessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
+) -> Result<Json<LabSessionView>, Refusal> {
+    Ok(Json(LabSessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
 }
 
 /// Walk and sampling.
@@ -167,7 +169,7 @@ pub(super) struct Closing {
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Closing,
-    responses((status = 200, description = "Closed session", body = SessionView)),
+    responses((status = 200, description = "Closed session", body = LabSessionView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn close(
@@ -180,7 +182,7 @@ pub(super) async fn close(
         Err(before) => return Ok(before),
     };
     let session = lab::close(&mut writer, &request.actor, id, &closing.note).await?;
-    request.done(&app, writer, &SessionView::from(&session)).await
+    request.done(&app, writer, &LabSessionView::from(&session)).await
 }
 
 /// Session to unblind, with the reason.
@@ -203,7 +205,7 @@ pub(super) struct UnblindSession {
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = UnblindSession,
-    responses((status = 200, description = "Session with the condition of each walk", body = SessionView)),
+    responses((status = 200, description = "Session with the condition of each walk", body = LabSessionView)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
@@ -216,7 +218,7 @@ pub(super) async fn unblind(
         Err(before) => return Ok(before),
     };
     let session = lab::unblind(&mut writer, &request.actor, id, &asked.reason).await?;
-    request.done(&app, writer, &SessionView::from(&session)).await
+    request.done(&app, writer, &LabSessionView::from(&session)).await
 }
 
 /// Get the next walk of a lab session
@@ -228,15 +230,15 @@ pub(super) async fn unblind(
     operation_id = "get_next_walk",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "Next walk", body = InTheLab), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Next walk", body = LabSessionProgress), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
-pub(super) async fn in_the_lab(
+pub(super) async fn session_progress(
     _: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
-) -> Result<Json<InTheLab>, Refusal> {
-    Ok(Json(lab::in_the_lab(&mut *app.read().await?, id).await?))
+) -> Result<Json<LabSessionProgress>, Refusal> {
+    Ok(Json(lab::session_progress(&mut *app.read().await?, id).await?))
 }
 
 /// Record a walk
@@ -247,7 +249,7 @@ pub(super) async fn in_the_lab(
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = RecordedWalk,
-    responses((status = 200, description = "Next walk", body = InTheLab)),
+    responses((status = 200, description = "Next walk", body = LabSessionProgress)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn walk(
@@ -273,7 +275,7 @@ pub(super) async fn walk(
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewAnswer,
-    responses((status = 200, description = "Session with the answer", body = InTheLab)),
+    responses((status = 200, description = "Session with the answer", body = LabSessionProgress)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
@@ -296,7 +298,7 @@ pub(super) async fn answer(
     operation_id = "retract_lab_answer",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
-    responses((status = 200, description = "Session without an answer", body = InTheLab)),
+    responses((status = 200, description = "Session without an answer", body = LabSessionProgress)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn retract(

@@ -15,7 +15,9 @@ use axum::response::Response;
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self, Brought, Checked, EmgView, FileForm, LimitCycles, NewEmg, NewMotion};
+use gaitwright_service::studies::lab::{
+    self, Brought, Checked, EmgView, LimitCycles, MeasurementFormat, NewEmg, NewMotion,
+};
 use gaitwright_store::measurement_files::{self, MeasurementFile};
 use gaitwright_store::{LabSessionId, MeasurementFileId, schema};
 use serde::Deserialize;
@@ -81,8 +83,8 @@ pub(super) async fn content(
     let Brought { recording, form, file } = lab::brought(&mut *app.read().await?, id).await?;
     let text = app.compute(move |pool| file.text(pool)).await??;
     let (kind, ending) = match form {
-        FileForm::Csv => ("text/csv; charset=utf-8", "csv"),
-        FileForm::Opensim => ("text/plain; charset=utf-8", "sto"),
+        MeasurementFormat::Csv => ("text/csv; charset=utf-8", "csv"),
+        MeasurementFormat::Opensim => ("text/plain; charset=utf-8", "sto"),
     };
     let name = format!("walk-{}-{}-{}.{ending}", recording.walk, recording.kind.as_str(), id.short());
     let tag = HeaderValue::from_str(&format!("\"{}\"", recording.raw_sha256));
@@ -109,7 +111,7 @@ pub(super) async fn emg(
     Id(id, _): Id<LabSessionId, Run>,
     IdempotentWith(request, new): IdempotentWith<Run, NewEmg>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = request.answered_before(&app).await? {
+    if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
     }
     let checked = new.checked(app.store_mut()).await?;
@@ -134,7 +136,7 @@ pub(super) async fn motion(
     Id(id, _): Id<LabSessionId, Run>,
     IdempotentWith(request, new): IdempotentWith<Run, NewMotion>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = request.answered_before(&app).await? {
+    if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
     }
     let checked = new.checked(app.store_mut()).await?;
@@ -190,11 +192,11 @@ pub(super) async fn process(
     Id(id, _): Id<LabSessionId, Run>,
     IdempotentWith(request, processing): IdempotentWith<Run, Processing>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = request.answered_before(&app).await? {
+    if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
     }
     let result = lab::compute(app.store_mut(), id, processing.settings).await.map_err(of_settings)?;
-    let view = lab::beside_model(app.store_mut(), id, result).await?;
+    let view = lab::with_model(app.store_mut(), id, result).await?;
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),

@@ -178,7 +178,7 @@ pub(super) struct Invitation {
 
 /// Invited rater.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Invited {
+pub(super) struct CreatedInvitation {
     /// The membership.
     member: Member,
     /// Path of the one-time sign-in link, which is shown once and valid for a day.
@@ -195,7 +195,7 @@ pub(super) struct Invited {
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Invitation,
-    responses((status = 201, description = "Invitation; the link is shown once", body = Invited)),
+    responses((status = 201, description = "Invitation; the link is shown once", body = CreatedInvitation)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -206,6 +206,6 @@ pub(super) async fn invite(
 ) -> Result<Response, Refusal> {
     let mut writer = request.begin_secret(&app).await?;
     let (_, member, secret) = membership::invite(&mut writer, &request.actor, id, &whom.name).await?;
-    let invited = Invited { member, path: format!("/sign-in/{secret}") };
+    let invited = CreatedInvitation { member, path: format!("/sign-in/{secret}") };
     request.created(&app, writer, address(invited.member.id), &invited).await
 }

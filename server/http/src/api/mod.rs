@@ -124,7 +124,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(measurement_files::motion))
         .routes(routes!(measurement_files::result, measurement_files::process))
         .routes(routes!(measurement_files::limit_cycles))
-        .routes(routes!(lab_sessions::in_the_lab))
+        .routes(routes!(lab_sessions::session_progress))
         .routes(routes!(lab_sessions::walk))
         .routes(routes!(lab_sessions::answer))
         .routes(routes!(lab_sessions::retract))

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::csv_answer::csv_answer;
+use crate::csv_response::csv_response;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
@@ -64,7 +64,7 @@ pub(super) async fn of_study_csv(
     studies::get(&mut reader, id).await?;
     let rows = feedback::comparisons(&mut reader, id, 0, u32::MAX).await?;
     drop(reader);
-    csv_answer(&mut app, &format!("preferences-{}.csv", id.short()), move || table(&rows)).await
+    csv_response(&mut app, &format!("preferences-{}.csv", id.short()), move || table(&rows)).await
 }
 
 fn table(rows: &[FeedbackRow]) -> CsvTable {
@@ -125,7 +125,7 @@ pub(super) async fn get(
 
 /// Recorded preference.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Recorded {
+pub(super) struct CreatedPreference {
     #[serde(flatten)]
     row: FeedbackRow,
     /// Answers of other people to the same comparison, at most the newest twenty.
@@ -140,7 +140,7 @@ pub(super) struct Recorded {
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Answer,
-    responses((status = 201, description = "Preference", body = Recorded)),
+    responses((status = 201, description = "Preference", body = CreatedPreference)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn create(
@@ -156,7 +156,7 @@ pub(super) async fn create(
     let row = feedback::get(&mut writer, given).await?;
     let other_answers = answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
-    request.created(&app, writer, location, &Recorded { row, other_answers }).await
+    request.created(&app, writer, location, &CreatedPreference { row, other_answers }).await
 }
 
 /// Retraction of a preference or an assessment.

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::csv_answer::csv_answer;
+use crate::csv_response::csv_response;
 use crate::problem::Refusal;
 use crate::visible::Visible;
 use axum::Json;
@@ -34,7 +34,7 @@ pub(super) struct Recommendation {
     /// State of the certificate of its gait.
     certificate: CertificateState,
     /// Reasons if it failed.
-    objections: Vec<String>,
+    failures: Vec<String>,
     /// If it failed, the best action whose gait passed.
     passing: Option<Recommended>,
     /// Whether gaits of the study are being certified, so that the recommendation may change.
@@ -114,7 +114,7 @@ pub(super) async fn of_study_csv(
 ) -> Result<Response, Refusal> {
     let Recommendation { best, certificate, .. } = read(&mut app, id).await?;
     let name = format!("bounds-trial-{}.csv", best.number);
-    csv_answer(&mut app, &name, move || written(&best.bounds, certificate)).await
+    csv_response(&mut app, &name, move || written(&best.bounds, certificate)).await
 }
 
 fn written(bounds: &TunedBounds, certificate: CertificateState) -> CsvTable {
@@ -168,8 +168,8 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         study_id: id,
         study: snapshot.study.plan.name.clone(),
         best: Recommended::of(&gait, trial),
-        certificate: judged.verdict,
-        objections: judged.objections,
+        certificate: judged.certificate,
+        failures: judged.failures,
         certifying,
         passing: judged.passing.and_then(|id| {
             let trial = snapshot.trial(id)?;

@@ -10,7 +10,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
-use gaitwright_service::studies::nearest_reference::{self, Match};
+use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
 use gaitwright_service::studies::reference_import::{self, NewReferenceGait};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::{ReferenceGaitId, SubjectId, subjects};
@@ -56,7 +56,7 @@ pub(super) async fn create(
     State(mut app): State<AppState>,
     IdempotentWith(request, new): IdempotentWith<Run, NewReferenceGait>,
 ) -> Result<Response, Refusal> {
-    if let Some(before) = request.answered_before(&app).await? {
+    if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
     }
     let definition = new.definition_aside(app.store_mut()).await?;
@@ -99,7 +99,7 @@ pub(super) async fn get(
     operation_id = "list_nearest_reference_gaits",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Reference gaits with distances", body = Page<Match>)),
+    responses((status = 200, description = "Reference gaits with distances", body = Page<ReferenceGaitMatch>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_subject(
@@ -107,7 +107,7 @@ pub(super) async fn of_subject(
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
     paging: Paging<usize>,
-) -> Result<Json<Page<Match>>, Refusal> {
+) -> Result<Json<Page<ReferenceGaitMatch>>, Refusal> {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     Ok(Json(paging.cut_by_place(nearest_reference::matches(&mut reader, &subject.body()).await?)?))

@@ -29,11 +29,11 @@ pub(super) struct SafetyReport {
     /// Trial of the gait.
     trial_id: TrialId,
     /// Who reported it.
-    by: String,
+    author: String,
     /// Time of the report.
-    at: Instant,
+    created_at: Instant,
     /// Whether the report is open, so that the gait must not be walked.
-    stands: bool,
+    open: bool,
     /// Newest review. Null while the report awaits review.
     review: Option<SafetyReview>,
 }
@@ -42,8 +42,8 @@ impl From<Closed> for SafetyReport {
     fn from(closed: Closed) -> Self {
         let id = closed.id();
         let Closed { trial, by, at, review, .. } = closed;
-        let stands = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
-        Self { id, trial_id: trial, by, at, stands, review }
+        let open = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
+        Self { id, trial_id: trial, author: by, created_at: at, open, review }
     }
 }
 
@@ -70,7 +70,7 @@ pub(super) async fn of_study(
     studies::get(&mut reader, id).await?;
     let SafetyReports { closed, lifted, .. } = SafetyReports::read(&mut reader, id).await?;
     let mut all: Vec<SafetyReport> = closed.into_iter().chain(lifted).map(Into::into).collect();
-    let at = |report: &SafetyReport| (report.at, report.trial_id, report.by.clone());
+    let at = |report: &SafetyReport| (report.created_at, report.trial_id, report.author.clone());
     all.sort_by_key(at);
     Ok(Json(paging.cut(all, at)?))
 }
@@ -118,7 +118,7 @@ pub(super) async fn report(
     tag = "preferences",
     params(("id" = TrialId, Path, description = "The trial")),
     request_body = Decision,
-    responses((status = 200, description = "Review", body = SafetyReview)),
+    responses((status = 201, description = "Review", body = SafetyReview)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn review(
@@ -131,5 +131,7 @@ pub(super) async fn review(
         Err(before) => return Ok(before),
     };
     let row = safety_review::give(&mut writer, &request.caller, id, &decision).await?;
-    request.done(&app, writer, &row).await
+    let study = trials::get(&mut writer, id).await?.study_id;
+    let location = format!("/api/v1/studies/{study}/safety-reports");
+    request.created(&app, writer, location, &row).await
 }

@@ -81,12 +81,12 @@ pub(super) async fn tell(
     IdempotentWith(request, tell): IdempotentWith<Run, Tell>,
 ) -> Result<Response, Refusal> {
     for _ in 0..TRIES {
-        let heard = script::hear(app.store_mut(), id, &tell).await;
+        let checked = script::check_outcome(app.store_mut(), id, &tell).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return Ok(before),
         };
-        if let Some(trial) = script::record(&mut writer, &request.caller, id, &heard?).await? {
+        if let Some(trial) = script::record(&mut writer, &request.caller, id, &checked?).await? {
             return request.done(&app, writer, &trial).await;
         }
     }

@@ -134,7 +134,7 @@ pub(super) async fn create(
 /// Reason for a command.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Why {
+pub(super) struct StudyActionReason {
     /// Reason, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -148,7 +148,7 @@ pub(super) struct Why {
     operation_id = "start_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "Optional"),
+    request_body(content = StudyActionReason, description = "Optional"),
     responses((status = 200, description = "Started study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -156,7 +156,7 @@ pub(super) async fn start(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
     act(&app, id, expected, &request, Act::Start, &why).await
 }
@@ -170,7 +170,7 @@ pub(super) async fn start(
     operation_id = "pause_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "Optional"),
+    request_body(content = StudyActionReason, description = "Optional"),
     responses((status = 200, description = "Paused study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -178,7 +178,7 @@ pub(super) async fn pause(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
     act(&app, id, expected, &request, Act::Pause, &why).await
 }
@@ -190,7 +190,7 @@ pub(super) async fn pause(
     operation_id = "resume_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "Optional"),
+    request_body(content = StudyActionReason, description = "Optional"),
     responses((status = 200, description = "Resumed study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -198,7 +198,7 @@ pub(super) async fn resume(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
     act(&app, id, expected, &request, Act::Resume, &why).await
 }
@@ -212,7 +212,7 @@ pub(super) async fn resume(
     operation_id = "stop_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = Why, description = "Optional"),
+    request_body(content = StudyActionReason, description = "Optional"),
     responses((status = 200, description = "Stopped study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -220,7 +220,7 @@ pub(super) async fn stop(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, Why>,
+    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
     act(&app, id, expected, &request, Act::Stop, &why).await
 }
@@ -231,7 +231,7 @@ async fn act(
     expected: IfMatch,
     request: &Idempotent<Run>,
     act: Act,
-    why: &Why,
+    why: &StudyActionReason,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 
 /// New token.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct MadeToken {
+pub(super) struct CreatedToken {
     /// The token.
     #[serde(flatten)]
     token: Token,
@@ -73,7 +73,7 @@ pub(super) async fn get(
     operation_id = "create_token",
     tag = "access",
     request_body = NewToken,
-    responses((status = 201, description = "Token; the secret is shown once", body = MadeToken)),
+    responses((status = 201, description = "Token; the secret is shown once", body = CreatedToken)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -84,7 +84,7 @@ pub(super) async fn create(
     let mut writer = request.begin_secret(&app).await?;
     let (token, secret) = making::make(&mut writer, &request.actor, &new).await?;
     let location = format!("/api/v1/tokens/{}", token.id);
-    request.created(&app, writer, location, &MadeToken { token, secret }).await
+    request.created(&app, writer, location, &CreatedToken { token, secret }).await
 }
 
 /// Revoke a token

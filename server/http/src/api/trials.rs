@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::csv_answer::csv_answer;
+use crate::csv_response::csv_response;
 use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
@@ -232,7 +232,7 @@ async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
     studies::get(&mut reader, id).await?;
     let all = trials::of_study(&mut reader, id).await?;
     drop(reader);
-    csv_answer(app, &format!("trials-{}.csv", id.short()), move || written(&all)).await
+    csv_response(app, &format!("trials-{}.csv", id.short()), move || written(&all)).await
 }
 
 fn written(all: &[Trial]) -> CsvTable {

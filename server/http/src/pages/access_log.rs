@@ -1,9 +1,9 @@
 //! The page of the access log: who viewed or exported data of subjects, and who was refused.
 
-use super::error::{Page, page};
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Administer;

@@ -1,10 +1,10 @@
 //! The page of the audit trail, with the check of its hash chain.
 
-use super::error::{Page, page};
 use super::format::words;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Administer;

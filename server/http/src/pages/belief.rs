@@ -1,12 +1,12 @@
 //! What the learner believes about the search space of a study.
 
 use super::drawn::Drawn;
-use super::error::{Page, page};
 use super::format::{self, meaning, percent, signed};
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -30,8 +30,8 @@ const LISTED: usize = 12;
 /// Which two bounds the maps show.
 #[derive(Debug, Default, Deserialize)]
 pub(crate) struct Choice {
-    right: Option<String>,
-    down: Option<String>,
+    x: Option<String>,
+    y: Option<String>,
 }
 
 #[derive(Template)]
@@ -66,8 +66,8 @@ struct Maps {
 struct DimensionChoice {
     name: String,
     meaning: &'static str,
-    right: bool,
-    down: bool,
+    x: bool,
+    y: bool,
 }
 
 struct BestRow {
@@ -176,8 +176,8 @@ fn show(
     let maps = maps(belief, snapshot, chosen).map_err(Error::Learner)?;
     let names =
         |asked: fn(&DimensionChoice) -> bool| maps.dimensions.iter().find(|d| asked(d)).map(|d| d.name.as_str());
-    let query = match (names(|d| d.right), names(|d| d.down)) {
-        (Some(right), Some(down)) => format!("?right={right}&down={down}"),
+    let query = match (names(|d| d.x), names(|d| d.y)) {
+        (Some(x), Some(y)) => format!("?x={x}&y={y}"),
         _ => String::new(),
     };
     let charts = maps.figures.iter().zip(MAP_NOTES);
@@ -207,11 +207,11 @@ fn chosen(space: &SearchSpace, choice: &Choice) -> Result<Option<(usize, usize)>
             found.ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
         }
     };
-    let (right, down) = (place("right", &choice.right, 0)?, place("down", &choice.down, 1)?);
-    if right == down {
-        return Err(Error::invalid("down", names[down], &format!("a bound other than {}", names[right])));
+    let (x, y) = (place("x", &choice.x, 0)?, place("y", &choice.y, 1)?);
+    if x == y {
+        return Err(Error::invalid("y", names[y], &format!("a bound other than {}", names[x])));
     }
-    Ok(Some((right, down)))
+    Ok(Some((x, y)))
 }
 
 /// All on one scale: what matters is which bound matters.
@@ -244,8 +244,8 @@ fn maps(belief: &Belief, snapshot: &StudySnapshot, chosen: Option<(usize, usize)
         .map(|(place, dimension)| DimensionChoice {
             name: dimension.name.clone(),
             meaning: meaning(&dimension.name),
-            right: chosen.is_some_and(|(right, _)| right == place),
-            down: chosen.is_some_and(|(_, down)| down == place),
+            x: chosen.is_some_and(|(x, _)| x == place),
+            y: chosen.is_some_and(|(_, y)| y == place),
         })
         .collect();
     let (Some((right, down)), Some(best)) = (chosen, belief.posterior.best()) else {

@@ -1,10 +1,10 @@
 //! The certificate on the page of a gait, and the button that certifies it.
 
-use super::error::PageError;
 use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};
@@ -55,7 +55,7 @@ impl InWords {
             figures.push(("Pushes at the hip from which the walker recovers", words));
         }
         let checks = certificate.checks.into_iter().map(CheckInWords::new).collect();
-        Self { passed: certificate.passed, failures: certificate.objections, figures, checks }
+        Self { passed: certificate.passed, failures: certificate.failures, figures, checks }
     }
 }
 

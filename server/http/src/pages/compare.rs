@@ -1,15 +1,15 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
 use super::drawn::Drawn;
-use super::error::{Page, PageError, page};
 use super::figures;
-use super::refusal;
 use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -26,7 +26,7 @@ use gaitwright_service::studies::answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::comparison::{Question, open_question};
-use gaitwright_service::studies::preference::{self, StandingAnswer};
+use gaitwright_service::studies::preference::{self, CurrentAnswer};
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable;
@@ -298,12 +298,12 @@ pub(super) struct Submitted {
 }
 
 /// An answer as given in the form.
-enum Said {
+enum GivenAnswer {
     Preference(Answer),
     Assessment(NewAssessment),
 }
 
-impl Said {
+impl GivenAnswer {
     fn is_about_safety(&self) -> bool {
         matches!(self, Self::Assessment(assessment) if assessment.answer.is_about_safety())
     }
@@ -321,18 +321,18 @@ impl Said {
 }
 
 impl Submitted {
-    fn read(&self) -> Result<(Said, FeedbackId), Error> {
+    fn read(&self) -> Result<(GivenAnswer, FeedbackId), Error> {
         let source = Source::from_str(&self.source)
             .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician or script"))?;
         let (a, b) = (identifier("trial_a", &self.a)?, identifier("trial_b", &self.b)?);
         let (source, author, note) = (Some(source), Some(self.author.clone()), self.note.clone());
         let preference = |answer| {
             let (author, note) = (author.clone(), note.clone());
-            Said::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note })
+            GivenAnswer::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note })
         };
         let assessment = |answer| {
             let (author, note) = (author.clone(), note.clone());
-            Said::Assessment(NewAssessment { first: a, second: b, answer, source, author, note })
+            GivenAnswer::Assessment(NewAssessment { first: a, second: b, answer, source, author, note })
         };
         let judgement = match self.answer.as_str() {
             "a" => preference(PairAnswer::A),
@@ -434,8 +434,8 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
         return Ok(Given::Elsewhere(saved));
     }
     let saved = match judgement {
-        Said::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
-        Said::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
+        GivenAnswer::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
+        GivenAnswer::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };
     if !is_reviewed {
         let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
@@ -450,11 +450,11 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
 async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitted) -> Result<Option<Recorded>, Error> {
     let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;
-    Ok(preference::standing_answer(db, study, pair, author).await?.and_then(|answer| match answer {
-        StandingAnswer::Preference(id) => Some(Recorded::Preference(id)),
-        StandingAnswer::Note(id) => Some(Recorded::Assessment(id)),
+    Ok(preference::current_answer(db, study, pair, author).await?.and_then(|answer| match answer {
+        CurrentAnswer::Preference(id) => Some(Recorded::Preference(id)),
+        CurrentAnswer::Assessment(id) => Some(Recorded::Assessment(id)),
         // The page shows no blinded answer, and no suggestion as an answer: the refusal says that there is one.
-        StandingAnswer::Blind(_) | StandingAnswer::Suggestion(_) => None,
+        CurrentAnswer::Blind(_) | CurrentAnswer::Suggestion(_) => None,
     }))
 }
 

@@ -1,11 +1,11 @@
 //! The pages of devices: the list, and each device with the form to derive a new one.
 
-use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::{Page, PageError, page};
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;

@@ -1,14 +1,14 @@
 //! The explanation of a trial without a gait, on its page, and the button that requests it.
 
-use super::error::PageError;
 use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::Violation;
-use gait_optimizer::explanation::verdict;
+use gait_optimizer::explanation::status_in_words;
 use gaitwright_service::access::Run;
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_store::trials::Trial;
@@ -27,7 +27,7 @@ pub(super) struct NoGait {
 impl NoGait {
     /// `None` if the trial has a gait or was not solved by the service.
     pub(super) fn new(trial: &Trial, state: ExplanationState, last_event: i64) -> Option<Self> {
-        Some(Self { outcome: trial.status.and_then(verdict)?, state, last_event })
+        Some(Self { outcome: trial.status.and_then(status_in_words)?, state, last_event })
     }
 
     pub(super) fn is_coming(&self) -> bool {

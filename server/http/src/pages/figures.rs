@@ -1,13 +1,13 @@
 //! The figures of a study, of a gait, of a lab session: for their pages and as files.
 
 use super::drawn::Drawn;
-use super::error::{Page, page};
 use super::side_by_side::Side;
 use super::{lab_charts, study};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -19,7 +19,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::answer;
-use gaitwright_service::studies::lab::{self, LimitCycles, SessionView};
+use gaitwright_service::studies::lab::{self, LabSessionView, LimitCycles};
 use gaitwright_store::studies::{Chosen, Study};
 use gaitwright_store::{LabSessionId, Store, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials};
 use serde::Deserialize;
@@ -137,7 +137,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
             id: "angles",
             heading: "Joint angles of the best gait",
             hint: format!("Figure 3c of the paper, with the reference gait. {}", band_in_words(reference)),
-            figures: charts("angles", gait_charts::beside_reference(&gaits, reference)),
+            figures: charts("angles", gait_charts::with_reference(&gaits, reference)),
         },
         Section {
             id: "tiles",
@@ -206,7 +206,7 @@ pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Resul
 /// The joint angles of two gaits, named by their trials, over the reference gait.
 pub(super) fn pair((a, gait_a): (u32, &Gait), (b, gait_b): (u32, &Gait), reference: &ReferenceGait) -> Vec<Figure> {
     let (a, b) = (format!("gait A, trial {a}"), format!("gait B, trial {b}"));
-    let charts = gait_charts::beside_reference(&[(&a, gait_a), (&b, gait_b)], reference);
+    let charts = gait_charts::with_reference(&[(&a, gait_a), (&b, gait_b)], reference);
     charts.into_iter().map(|chart| Figure::chart("pair", chart)).collect()
 }
 
@@ -223,7 +223,7 @@ pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
 pub(crate) async fn of_session(app: &mut AppState, id: LabSessionId) -> Result<Vec<Figure>, Error> {
     let (emg, cycles) = (lab::emg(app.store_mut(), id).await?, measured_cycles(app.store_mut(), id).await?);
     let mut reader = app.read().await?;
-    let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
+    let session = LabSessionView::from(&lab_sessions::get(&mut reader, id).await?);
     drop(reader);
     let draw = move |_: &OnPool| {
         let mut figures = emg.map_or_else(Vec::new, |emg| lab_charts::emg(&session, &emg));
@@ -267,7 +267,7 @@ impl FiguresPage {
 
 /// The second study.
 #[derive(Debug, Deserialize)]
-pub(super) struct Beside {
+pub(super) struct ComparedWith {
     /// The form sends an empty value if no study is chosen.
     other: Option<String>,
 }
@@ -277,9 +277,9 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    Params(beside): Params<Beside>,
+    Params(compared): Params<ComparedWith>,
 ) -> Page {
-    let other = match beside.other.as_deref() {
+    let other = match compared.other.as_deref() {
         None | Some("") => None,
         Some(text) => {
             Some(text.parse::<Named<StudyId>>().map_err(|_| Error::invalid("other", text, "a study from the list"))?)

@@ -115,7 +115,7 @@ pub(super) fn walks_in_words(judgement: Judgement) -> &'static str {
         Judgement::UnsafeFirst => "walk 2 was unsafe",
         Judgement::UnsafeSecond => "walk 3 was unsafe",
         Judgement::UnsafeBoth => "walk 2 and walk 3 were unsafe",
-        Judgement::Withdrawn => "retracted",
+        Judgement::Retracted => "retracted",
     }
 }
 
@@ -129,7 +129,7 @@ pub(super) fn sides_in_words(answer: Judgement) -> &'static str {
         Judgement::UnsafeFirst => "the first gait is unsafe",
         Judgement::UnsafeSecond => "the second gait is unsafe",
         Judgement::UnsafeBoth => "both gaits are unsafe",
-        Judgement::Withdrawn => "retracted",
+        Judgement::Retracted => "retracted",
     }
 }
 

@@ -3,11 +3,11 @@
 use super::bound_use::{self, BoundUse};
 use super::certificate;
 use super::drawn::Drawn;
-use super::error::{Page, page};
 use super::explanation::NoGait;
 use super::format::{self, words};
 use crate::AppState;
 use crate::authorization::Authorized;
+use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;

@@ -1,8 +1,8 @@
 //! The guides of `docs/`, embedded into the binary, so that a lab without internet has them.
 
-use super::error::{Page, page};
-use crate::identify::AnsweredTo;
+use crate::page_error::{Page, page};
 use crate::problem::Refusal;
+use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::Extension;
 use axum::extract::Path;
@@ -37,7 +37,7 @@ const IMAGES: &str = "/help/images/";
 #[template(path = "help.html")]
 struct Help {
     /// The reader's role decides the navigation; `None` shows none.
-    to: Option<AnsweredTo>,
+    to: Option<RespondedTo>,
     title: String,
     /// HTML made from a guide; empty for the table of contents.
     guide: String,
@@ -46,13 +46,13 @@ struct Help {
 
 /// `GET /help`.
 pub(super) async fn contents(caller: Option<Extension<Caller>>) -> Page {
-    let to = caller.map(|Extension(caller)| AnsweredTo(caller.role));
+    let to = caller.map(|Extension(caller)| RespondedTo(caller.role));
     page(&Help { to, title: "Help".to_owned(), guide: String::new(), guides: GUIDES })
 }
 
 /// `GET /help/{name}`.
 pub(super) async fn guide(caller: Option<Extension<Caller>>, Path(name): Path<String>) -> Page {
-    let to = caller.map(|Extension(caller)| AnsweredTo(caller.role));
+    let to = caller.map(|Extension(caller)| RespondedTo(caller.role));
     let unknown = || Error::NotFound { what: "guide".to_owned(), id: name.clone() };
     let (file, title) = GUIDES.iter().find(|(guide, _)| *guide == name).ok_or_else(unknown)?;
     let text = Files::get(&format!("{file}.md")).ok_or_else(unknown)?;

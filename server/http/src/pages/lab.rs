@@ -1,17 +1,17 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
 use super::drawn::Drawn;
-use super::error::{Page, PageError, page};
 use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
 use super::measurement_forms::{Forms, Settings};
-use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -22,7 +22,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
-    self, Condition, EmgView, FileForm, NewSession, SessionView, WalkActivity, WalkView,
+    self, Condition, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkView,
 };
 use gaitwright_store::listing::Listed;
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
@@ -37,7 +37,7 @@ const OFFERED: u32 = 200;
 #[template(path = "lab_sessions.html")]
 struct SessionsPage {
     study: Study,
-    sessions: Vec<(SessionView, String)>,
+    sessions: Vec<(LabSessionView, String)>,
     /// Different walkable gaits of the study, lowest Gait RMSE first, with their labels.
     gaits: Vec<(TrialId, String)>,
     may_run: bool,
@@ -61,9 +61,9 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    fn read(&self) -> Result<NewSession, Error> {
+    fn read(&self) -> Result<NewLabSession, Error> {
         let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait from the list"));
-        Ok(NewSession {
+        Ok(NewLabSession {
             gait_one: gait("gait_one", &self.gait_one)?,
             gait_two: gait("gait_two", &self.gait_two)?,
             notes: self.notes.clone(),
@@ -89,7 +89,7 @@ async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, r
     let named =
         |trial: Listed| (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)));
     let shown = |session| {
-        let view = SessionView::from(&session);
+        let view = LabSessionView::from(&session);
         let state = words(view.state.as_str());
         (view, state)
     };
@@ -150,7 +150,7 @@ struct SessionPage {
     refused: Option<String>,
     /// The answer of the subject, in words.
     answer_in_words: &'static str,
-    session: SessionView,
+    session: LabSessionView,
 }
 
 /// The results of the EMG recordings.
@@ -169,7 +169,7 @@ struct Measured {
 }
 
 impl Measured {
-    fn of(session: &SessionView, emg: &EmgView, charts: Vec<Drawn>) -> Self {
+    fn of(session: &LabSessionView, emg: &EmgView, charts: Vec<Drawn>) -> Self {
         let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
         let strides = |walk: &WalkActivity| {
             let strides = match walk.channels.first().map_or(0, |channel| channel.strides) {
@@ -258,7 +258,7 @@ async fn show(
     let emg = lab::emg(app.store_mut(), id).await?;
     let cycles = measured_cycles(app.store_mut(), id).await?;
     let mut reader = app.read().await?;
-    let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
+    let session = LabSessionView::from(&lab_sessions::get(&mut reader, id).await?);
     let study = studies::get(&mut reader, session.study_id).await?;
     let one = trials::get(&mut reader, session.gait_one).await?.number;
     let two = trials::get(&mut reader, session.gait_two).await?.number;

@@ -5,7 +5,7 @@ use gait_optimizer::emg::CycleActivity;
 use gait_optimizer::phase_portrait::JOINTS;
 use gaitwright_charts::gait_charts::orbit;
 use gaitwright_charts::{Chart, Figure, Stroke};
-use gaitwright_service::studies::lab::{Condition, EmgView, LimitCycles, SessionView};
+use gaitwright_service::studies::lab::{Condition, EmgView, LabSessionView, LimitCycles};
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
 /// Names of the EMG channels.
@@ -22,7 +22,7 @@ const JOINT_NAMES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
 /// The condition of a walk, or its number while it is blinded.
-pub(super) fn walk_name(session: &SessionView, walk: u8) -> String {
+pub(super) fn walk_name(session: &LabSessionView, walk: u8) -> String {
     let condition = session.walks.iter().find(|known| known.number == walk).and_then(|known| known.condition);
     match condition {
         Some(Condition::Normal) => "without the device".to_owned(),
@@ -39,7 +39,7 @@ pub(super) fn muscle_name(channel: &str) -> &str {
 
 /// Muscle activity over the gait cycle (figure 6 of the paper): a chart for each channel with mean and standard deviation
 /// of each walk, and the activation of the model after unblinding.
-pub(super) fn emg(session: &SessionView, emg: &EmgView) -> Vec<Figure> {
+pub(super) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
     let Some(normal) = emg.result.walks.first() else { return Vec::new() };
     let chart = |(place, channel): (usize, &CycleActivity)| {
         let mut chart = Chart::new(
@@ -80,7 +80,7 @@ fn look(walk: u8) -> (usize, Stroke) {
 }
 
 /// Measured limit cycles (figure 5 of the paper): a chart per joint and walk, over the orbit of the gait where it is known.
-pub(super) fn limit_cycles(session: &SessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
+pub(super) fn limit_cycles(session: &LabSessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
     let mut charts = Vec::new();
     for (place, joint) in JOINTS.iter().enumerate() {
         for (walk, gait) in measured {

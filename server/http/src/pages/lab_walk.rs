@@ -1,19 +1,19 @@
 //! The pages in the lab: the next walk, and the answer of the subject. They never name a gait.
 
-use super::error::{Page, PageError, page};
 use super::format::walks_in_words;
-use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::Rate;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self, InTheLab, NewAnswer, RecordedWalk};
+use gaitwright_service::studies::lab::{self, LabSessionProgress, NewAnswer, RecordedWalk};
 use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members};
 use serde::Deserialize;
 
@@ -35,7 +35,7 @@ struct WalkPage {
     name: String,
     /// The answer in force.
     answer_in_words: &'static str,
-    seen: InTheLab,
+    seen: LabSessionProgress,
     refused: Option<String>,
     /// The note of a refused form.
     typed: String,
@@ -64,8 +64,8 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
     let mut reader = app.read().await?;
     let mut sessions = Vec::new();
     for session in lab_sessions::open(&mut reader, authorized.caller.reach(), LISTED).await? {
-        let seen = lab::in_the_lab(&mut reader, session.id).await?;
-        let next = match (seen.walk, seen.asks) {
+        let seen = lab::session_progress(&mut reader, session.id).await?;
+        let next = match (seen.walk, seen.answer_number) {
             _ if seen.was_unsafe() => "a walk was reported as unsafe".to_owned(),
             (Some(walk), _) => format!("walk {walk} is next"),
             (None, Some(_)) => "all walks recorded, answer pending".to_owned(),
@@ -83,7 +83,7 @@ pub(super) async fn get(_: Authorized<Rate>, State(app): State<AppState>, Id(id,
 }
 
 async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> Page {
-    let seen = lab::in_the_lab(&mut *app.read().await?, id).await?;
+    let seen = lab::session_progress(&mut *app.read().await?, id).await?;
     let answer_in_words = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
     page(&WalkPage { name: id.short(), answer_in_words, seen, refused, typed })
 }

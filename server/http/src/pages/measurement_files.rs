@@ -1,12 +1,12 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
-use super::error::PageError;
 use super::lab;
 use super::measurement_forms::{EmgFields, Forms, MotionFields, Settings};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::Run;

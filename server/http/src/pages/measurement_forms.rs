@@ -2,7 +2,7 @@
 
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{EmgReading, FileForm, MotionReading, NewEmg, NewMotion};
+use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion};
 use gaitwright_service::studies::reference_import::Unit;
 use serde::Deserialize;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use std::str::FromStr;
 #[serde(deny_unknown_fields, default)]
 pub(super) struct EmgFields {
     pub(super) walk: u8,
-    pub(super) form: FileForm,
+    pub(super) form: MeasurementFormat,
     pub(super) recording: String,
     pub(super) rate_hz: String,
     pub(super) channels: String,
@@ -84,7 +84,7 @@ fn optional(field: &str, text: &str) -> Result<Option<f64>, Error> {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct MotionFields {
     pub(super) walk: u8,
-    pub(super) form: FileForm,
+    pub(super) form: MeasurementFormat,
     pub(super) recording: String,
     pub(super) unit: String,
     pub(super) cutoff_hz: String,

@@ -1,13 +1,13 @@
 //! The form for measured muscle parameters of a subject, which override the published table.
 
-use super::error::{Page, PageError, page};
 use super::format;
-use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;

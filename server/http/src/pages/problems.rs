@@ -1,6 +1,6 @@
 //! The pages of problem types, whose addresses are the `type` of problem documents.
 
-use super::error::{Page, page};
+use crate::page_error::{Page, page};
 use crate::problem_kinds::{Entry, Kind};
 use askama::Template;
 use axum::extract::Path;

@@ -1,12 +1,12 @@
 //! The pages of a rater: the studies, and one blinded pair. They never name a trial.
 
-use super::error::{Page, PageError, page};
 use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use askama::Template;
 use axum::extract::{Path, State};
@@ -54,8 +54,8 @@ struct Saved {
 
 impl Saved {
     /// Whether it was retracted.
-    fn is_withdrawn(&self) -> bool {
-        self.answer == Judgement::Withdrawn
+    fn is_retracted(&self) -> bool {
+        self.answer == Judgement::Retracted
     }
 
     fn words(&self) -> &'static str {
@@ -262,7 +262,7 @@ pub(super) async fn answer(
         Ok(before.is_some() && given.answer.is_about_safety())
     };
     let answered = answered.await;
-    told(&mut app, &authorized.caller, &token, answered).await
+    redirected(&mut app, &authorized.caller, &token, answered).await
 }
 
 /// `POST /rate/pair/{token}/retract`.
@@ -279,12 +279,12 @@ pub(super) async fn retract(
         Ok(false)
     };
     let retracted = retracted.await;
-    told(&mut app, &authorized.caller, &token, retracted).await
+    redirected(&mut app, &authorized.caller, &token, retracted).await
 }
 
 /// Redirects after an action, which may be a safety report about an answered pair; a conflict is shown on the page of
 /// the pair.
-async fn told(
+async fn redirected(
     app: &mut AppState,
     caller: &Caller,
     token: &str,

@@ -3,8 +3,8 @@
 //! Ready-made viewers add megabytes of script and inline styles, which the content policy refuses. This page is
 //! complete without scripts and loads nothing from other origins.
 
-use super::error::{Page, page};
 use crate::openapi;
+use crate::page_error::{Page, page};
 use askama::Template;
 use gaitwright_service::error::Error;
 use serde_json::Value;

@@ -1,21 +1,21 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
 use super::drawn::Drawn;
-use super::error::{Page, PageError, page};
 use super::figures;
-use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form as Submitted, Params};
+use crate::page_error::{Page, PageError, page};
+use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::error::{Error, FieldError};
-use gaitwright_service::studies::nearest_reference::{self, Match};
-use gaitwright_service::studies::reference_import::{self, Form, NewReferenceGait, Strikes, Unit};
+use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
+use gaitwright_service::studies::reference_import::{self, JointAngleFormat, NewReferenceGait, Strikes, Unit};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::{Connection, ReferenceGaitId, SubjectId, commit};
@@ -27,7 +27,7 @@ use std::str::FromStr;
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Fields {
     name: String,
-    form: Form,
+    form: JointAngleFormat,
     recording: String,
     unit: String,
     force_column: String,
@@ -72,7 +72,7 @@ fn number(field: &str, text: &str) -> Result<f64, Error> {
 #[derive(Template)]
 #[template(path = "reference_gaits.html")]
 struct ReferenceGaitsPage {
-    matches: Vec<Match>,
+    matches: Vec<ReferenceGaitMatch>,
     subjects: Vec<Subject>,
     /// The subject from whom distances are measured.
     nearest_to: Option<Subject>,
@@ -91,7 +91,7 @@ impl ReferenceGaitsPage {
             nearest_reference::matches(db, &subject.body()).await?
         } else {
             let all = reference_gaits::all(db).await?.into_iter();
-            all.map(|reference_gait| Match { reference_gait, distance: None }).collect()
+            all.map(|reference_gait| ReferenceGaitMatch { reference_gait, distance: None }).collect()
         };
         let subjects = subjects::all(db).await?;
         Ok(Self { matches, subjects, nearest_to, may_run, fields: Fields::default(), refused: None })

@@ -1,10 +1,10 @@
 //! The forms for a safety report and a safety review on the page of a gait.
 
-use super::error::PageError;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gaitwright_service::access;

@@ -1,13 +1,13 @@
 //! The page that compares two studies in one chart and one table.
 
 use super::drawn::Drawn;
-use super::error::{Page, page};
 use super::format::{self, words};
 use super::study::{COURSE, Figures, course, figures};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;

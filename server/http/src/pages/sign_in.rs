@@ -1,12 +1,12 @@
 //! Signing in and out, and the user's own account.
 
-use super::error::{Page, PageError, page};
 use super::format;
-use super::refusal;
 use super::unsent::{SignInPage, Unsent, send_now};
 use crate::authorization::SignedIn;
 use crate::extract::Form;
 use crate::identify::{browser_cookie, browser_of, cookie, session_of};
+use crate::page_error::{Page, PageError, page};
+use crate::refusal;
 use crate::{AppState, ClientAddress};
 use askama::Template;
 use axum::extract::{Path, State};

@@ -1,20 +1,20 @@
 //! The pages of subjects, with the forms for consent, withdrawal and corrections.
 
-use super::error::{Page, PageError, page};
 use super::format::{variant, words};
-use super::refusal;
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Administer, Caller, Permission, Reach, Read, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
-use gaitwright_service::studies::lab::SessionView;
+use gaitwright_service::studies::lab::LabSessionView;
 use gaitwright_service::studies::subject::{self, NewCorrection, NewSubject};
 use gaitwright_store::consents::{self, Consent, ConsentKind};
 use gaitwright_store::studies::Study;
@@ -102,7 +102,7 @@ struct StudyRow {
 
 /// A lab session of the subject.
 struct SessionRow {
-    session: SessionView,
+    session: LabSessionView,
     study: String,
     state: String,
 }
@@ -225,7 +225,7 @@ async fn studies_of(db: &mut Connection, reach: Reach, id: SubjectId) -> Result<
 async fn sessions_of(db: &mut Connection, study: &Study) -> Result<Vec<SessionRow>, Error> {
     let sessions = lab_sessions::of_study(db, study.id).await?;
     let row = |session| {
-        let session = SessionView::from(session);
+        let session = LabSessionView::from(session);
         SessionRow { state: words(session.state.as_str()), session, study: study.plan.name.clone() }
     };
     Ok(sessions.iter().rev().map(row).collect())

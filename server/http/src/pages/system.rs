@@ -1,10 +1,10 @@
 //! The system page: version, workers, queue, record and backups.
 
-use super::error::{Page, page};
 use super::format::{duration, words};
 use crate::AppState;
 use crate::api::Workers;
 use crate::authorization::Authorized;
+use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::{Administer, Caller, Permission, Read};
@@ -12,9 +12,9 @@ use gaitwright_service::backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::scheduled_backups::{Failure, ScheduledBackups};
 use gaitwright_service::studies::job::JobState;
-use gaitwright_store::backup::those_beside;
+use gaitwright_store::backup::in_record_folder;
 use gaitwright_store::totals::{self, Totals};
-use gaitwright_store::{FORM, commit, jobs, trials};
+use gaitwright_store::{SCHEMA_VERSION, commit, jobs, trials};
 use std::time::Duration;
 
 #[derive(Template)]
@@ -22,7 +22,7 @@ use std::time::Duration;
 struct SystemPage {
     version: &'static str,
     /// Version of the database schema.
-    form: i64,
+    schema_version: i64,
     workers: Workers,
     /// The outcome of the backup that was just requested.
     backup: Option<BackupNotice>,
@@ -119,13 +119,13 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
     let (queued, running) = jobs::depth(&mut reader).await?;
     let may_administer = caller.may(Administer::NEEDED);
     let record = app.store().path();
-    let copies = if may_administer { those_beside(record) } else { Ok(Vec::new()) };
+    let copies = if may_administer { in_record_folder(record) } else { Ok(Vec::new()) };
     let measured = [trials::measured(&mut reader, true).await?, trials::measured(&mut reader, false).await?];
     let scheduled = app.backups.scheduled().filter(|_| may_administer).map(Scheduled::of);
     page(&SystemPage {
         scheduled,
         version: env!("CARGO_PKG_VERSION"),
-        form: FORM,
+        schema_version: SCHEMA_VERSION,
         copies: copies.map_err(|e| Error::Internal(format!("cannot list the backups: {e}")))?,
         workers,
         backup,

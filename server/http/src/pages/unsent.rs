@@ -2,10 +2,10 @@
 //!
 //! The answer is a sign-in page that carries the form along. After signing in, the user sends the form with one button.
 
-use super::error::{PageError, is_for_programs, page};
 use crate::AppState;
 use crate::authorization::SignedIn;
 use crate::extract::unreadable;
+use crate::page_error::{PageError, is_for_programs, page};
 use askama::Template;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request, State};
@@ -54,7 +54,7 @@ struct SendNowPage {
 }
 
 /// Shows the form for sending after signing in.
-pub(super) fn send_now(unsent: &Unsent) -> super::error::Page {
+pub(super) fn send_now(unsent: &Unsent) -> crate::page_error::Page {
     page(&SendNowPage { to: unsent.to.clone(), fields: unsent.pairs() })
 }
 

@@ -1,12 +1,13 @@
 //! The page of users, sessions and tokens.
 
-use super::error::{Page, PageError, page};
-use super::{format, refusal};
+use super::format;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extract::Form;
+use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
+use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};

@@ -26,7 +26,7 @@ pub enum Certification {
 /// Looks for the certificate of a trial's gait.
 ///
 /// # Errors
-/// [`Error::Conflict`] if the trial has no converged gait or the subject withdrew consent; errors of the database.
+/// [`Error::Conflict`] if the trial has no converged gait, a script evaluated it, or the subject withdrew consent; errors of the database.
 pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certification, Error> {
     let found = trials::get(reader, trial).await?;
     consents::may_be_shown(reader, found.study_id).await?;
@@ -37,6 +37,12 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
         let state = found.state.as_str().replace('_', " ");
         return Err(Error::conflict(format!(
             "Trial {} is {state}. Only a converged gait can be certified.",
+            found.number
+        )));
+    }
+    if found.asked_by.is_some() {
+        return Err(Error::conflict(format!(
+            "Trial {} was evaluated by a script, which gives no gait to certify.",
             found.number
         )));
     }
@@ -111,7 +117,7 @@ pub async fn record(
         let study = trials::get(writer, trial).await?.study_id;
         let payload = json!({ "trial_id": trial, "passed": certificate.passed });
         events::append(writer, study, "gait_certified", &payload).await?;
-        let detail = json!({ "passed": certificate.passed, "objections": certificate.objections });
+        let detail = json!({ "passed": certificate.passed, "failures": certificate.failures });
         audit::append(writer, actor, "trial.certify", &format!("trial {trial}"), &detail).await?;
     }
     Ok(())

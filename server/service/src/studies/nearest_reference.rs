@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 
 /// A reference gait and the distance between the recorded person and a subject.
 #[derive(Debug, Clone, Serialize, ToSchema)]
-pub struct Match {
+pub struct ReferenceGaitMatch {
     /// The reference gait.
     pub reference_gait: ReferenceGait,
     /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
@@ -22,14 +22,17 @@ pub struct Match {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Match>, Error> {
-    let mut found: Vec<Match> = reference_gaits::all(db)
+pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<ReferenceGaitMatch>, Error> {
+    let mut found: Vec<ReferenceGaitMatch> = reference_gaits::all(db)
         .await?
         .into_iter()
-        .map(|reference_gait| Match { distance: distance(subject, &reference_gait.definition), reference_gait })
+        .map(|reference_gait| ReferenceGaitMatch {
+            distance: distance(subject, &reference_gait.definition),
+            reference_gait,
+        })
         .collect();
     found.sort_by(|a, b| {
-        let far = |m: &Match| m.distance.unwrap_or(f64::INFINITY);
+        let far = |m: &ReferenceGaitMatch| m.distance.unwrap_or(f64::INFINITY);
         far(a).total_cmp(&far(b))
     });
     Ok(found)

@@ -66,7 +66,7 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
     }
     let pair = walkable::admit_pair(writer, study, fields, pair).await?;
     if again == Again::Refused {
-        let before = standing_answer(writer, study, pair.trials(), attribution.author).await?;
+        let before = current_answer(writer, study, pair.trials(), attribution.author).await?;
         before.map_or(Ok(()), |_| Err(answered_before(attribution.author)))?;
     }
     match judgement.heard(pair.trials()) {
@@ -104,11 +104,11 @@ async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId
 
 /// An answer of a person to a comparison that was not retracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StandingAnswer {
+pub enum CurrentAnswer {
     /// A preference or a tie.
     Preference(FeedbackId),
     /// An assessment: the person cannot tell, or reported a gait as unsafe.
-    Note(gaitwright_store::AssessmentId),
+    Assessment(gaitwright_store::AssessmentId),
     /// A rater's answer to a blinded pair.
     Blind(PresentationId),
     /// A suggestion whose bounds are those of the other gait.
@@ -119,12 +119,12 @@ pub enum StandingAnswer {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn standing_answer(
+pub async fn current_answer(
     db: &mut Connection,
     study: StudyId,
     (a, b): (TrialId, TrialId),
     author: &str,
-) -> Result<Option<StandingAnswer>, Error> {
+) -> Result<Option<CurrentAnswer>, Error> {
     let is_own = |other: &str| printable::is_same_name(other, author);
     // Most people answer a comparison once, and each further statement delays every other change.
     if !authors::of_pair(db, study, (a, b)).await?.iter().any(|name| is_own(name)) {
@@ -134,24 +134,24 @@ pub async fn standing_answer(
     let noted = assessments::of_study(db, study).await?;
     let noted = noted.iter().rfind(|r| r.retraction.is_none() && is_own(&r.author) && of_pair(r.pair()));
     if let Some(noted) = noted {
-        return Ok(Some(StandingAnswer::Note(noted.id)));
+        return Ok(Some(CurrentAnswer::Assessment(noted.id)));
     }
     let given = feedback::authors_of_pair(db, (a, b)).await?;
     if let Some((id, _)) = given.into_iter().find(|(_, other)| is_own(other)) {
-        return Ok(Some(StandingAnswer::Preference(id)));
+        return Ok(Some(CurrentAnswer::Preference(id)));
     }
     for shown in presentations::of_pair(db, (a, b)).await? {
         if is_own(&shown.rater) && stands(db, &shown).await? {
-            return Ok(Some(StandingAnswer::Blind(shown.id)));
+            return Ok(Some(CurrentAnswer::Blind(shown.id)));
         }
     }
     let (one, other) = (trials::get(db, a).await?.action_index, trials::get(db, b).await?.action_index);
-    standing_suggestion(db, study, (one, other), author).await
+    current_suggestion(db, study, (one, other), author).await
 }
 
 /// Whether a rater's answer counts: staff can retract the preference derived from it.
 async fn stands(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
-    if shown.answer.is_none_or(|judgement| judgement == Judgement::Withdrawn) {
+    if shown.answer.is_none_or(|judgement| judgement == Judgement::Retracted) {
         return Ok(false);
     }
     Ok(match presentations::heard_of(db, shown.id).await? {
@@ -161,15 +161,15 @@ async fn stands(db: &mut Connection, shown: &Presentation) -> Result<bool, Error
 }
 
 /// The suggestion of a person that compares two actions, in either direction.
-async fn standing_suggestion(
+async fn current_suggestion(
     db: &mut Connection,
     study: StudyId,
     (one, other): (ActionIndex, ActionIndex),
     author: &str,
-) -> Result<Option<StandingAnswer>, Error> {
+) -> Result<Option<CurrentAnswer>, Error> {
     let found = feedback::suggestions_between(db, study, (one, other)).await?;
     let own = found.into_iter().find(|(_, name)| printable::is_same_name(name, author));
-    Ok(own.map(|(id, _)| StandingAnswer::Suggestion(id)))
+    Ok(own.map(|(id, _)| CurrentAnswer::Suggestion(id)))
 }
 
 fn answered_before(author: &str) -> Error {
@@ -206,12 +206,12 @@ pub(super) async fn suggest(
                 trial.number
             )));
         }
-        if standing_answer(writer, study, (trial.id, over.id), attribution.author).await?.is_some() {
+        if current_answer(writer, study, (trial.id, over.id), attribution.author).await?.is_some() {
             return Err(answered_before(attribution.author));
         }
     }
     // Without a trial of these bounds, only another suggestion can be about them.
-    if standing_suggestion(writer, study, (suggested, over.action_index), attribution.author).await?.is_some() {
+    if current_suggestion(writer, study, (suggested, over.action_index), attribution.author).await?.is_some() {
         return Err(answered_before(attribution.author));
     }
     let content = FeedbackContent::Suggestion { suggested, over: over.id };

@@ -47,9 +47,9 @@ impl CertificateState {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Judged {
     /// State of the certificate of the best gait.
-    pub verdict: CertificateState,
+    pub certificate: CertificateState,
     /// Reasons if it failed.
-    pub objections: Vec<String>,
+    pub failures: Vec<String>,
     /// If the best gait failed, the best one that passed.
     pub passing: Option<TrialId>,
     /// The best gait without a certificate among the first [`MOST_CERTIFIED`], unless a better one passed.
@@ -62,8 +62,8 @@ impl Judged {
     /// Sets whether the service is certifying the best gait without a certificate.
     pub fn certified_by_service(&mut self, certifying: bool) {
         self.certifying = certifying;
-        if certifying && self.verdict == CertificateState::NotCertified {
-            self.verdict = CertificateState::BeingCertified;
+        if certifying && self.certificate == CertificateState::NotCertified {
+            self.certificate = CertificateState::BeingCertified;
         }
     }
 }
@@ -75,15 +75,15 @@ impl Judged {
 pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Judged> {
     let mut judged = Judged::default();
     for (place, &trial) in ranking.iter().enumerate() {
-        let verdict = match certificates::passed(db, trial).await? {
+        let certificate = match certificates::passed(db, trial).await? {
             Some(true) => CertificateState::Passed,
             Some(false) => CertificateState::Failed,
             None => CertificateState::NotCertified,
         };
         if place == 0 {
-            judged.verdict = verdict;
+            judged.certificate = certificate;
         }
-        match verdict {
+        match certificate {
             CertificateState::Passed => {
                 judged.passing = Some(trial).filter(|_| place > 0);
                 break;
@@ -95,8 +95,8 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
             _ => {}
         }
     }
-    if let Some(&best) = ranking.first().filter(|_| judged.verdict == CertificateState::Failed) {
-        judged.objections = certificates::find(db, best).await?.map(|found| found.objections).unwrap_or_default();
+    if let Some(&best) = ranking.first().filter(|_| judged.certificate == CertificateState::Failed) {
+        judged.failures = certificates::find(db, best).await?.map(|found| found.failures).unwrap_or_default();
     }
     Ok(judged)
 }

@@ -23,7 +23,7 @@ const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 /// File format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Form {
+pub enum JointAngleFormat {
     /// OpenSim motion or storage file (.mot, .sto) of a gait model.
     #[default]
     Opensim,
@@ -73,7 +73,7 @@ pub struct NewReferenceGait {
     pub name: String,
     /// File format of the recording.
     #[serde(default)]
-    pub form: Form,
+    pub form: JointAngleFormat,
     /// Content of the file.
     pub recording: String,
     /// Unit of angles, if the header of an OpenSim file does not state it.
@@ -110,22 +110,22 @@ impl NewReferenceGait {
     pub fn definition(&self, what: &str, forces: &str) -> Result<Definition, Error> {
         let name = printable::name("name", &self.name, LONGEST_NAME)?;
         let recording = match self.form {
-            Form::Opensim => {
+            JointAngleFormat::Opensim => {
                 let unit = self.unit.map(AngleUnit::from);
                 let here = self.force_column.as_deref().filter(|_| self.forces.is_none());
                 MotionRecording::from_opensim(what, &self.recording, unit, here)?
             }
-            Form::Camargo => MotionRecording::from_camargo_csv(what, &self.recording)?,
-            Form::Csv => MotionRecording::from_csv(what, &self.recording)?,
+            JointAngleFormat::Camargo => MotionRecording::from_camargo_csv(what, &self.recording)?,
+            JointAngleFormat::Csv => MotionRecording::from_csv(what, &self.recording)?,
         };
         let recording = match &self.forces {
             Some(text) => {
                 let column = self.force_column.as_deref();
                 match self.form {
-                    Form::Camargo => {
+                    JointAngleFormat::Camargo => {
                         recording.with_camargo_forces(forces, text, column.unwrap_or(CAMARGO_FORCE_COLUMN))?
                     }
-                    Form::Opensim | Form::Csv => {
+                    JointAngleFormat::Opensim | JointAngleFormat::Csv => {
                         recording.with_force_file(forces, text, column.unwrap_or(FORCE_COLUMN))?
                     }
                 }

@@ -16,7 +16,7 @@ use utoipa::ToSchema;
 /// A decision about the safety reports of a gait.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-#[schema(as = SafetyReviewToMake)]
+#[schema(as = NewSafetyReview)]
 pub struct Decision {
     /// `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
     pub decision: SafetyDecision,
@@ -74,7 +74,7 @@ pub async fn give(
     let new = NewSafetyReview { trial: id, reports: &decided, decision: taken, author, reason };
     let made = safety_reviews::insert(writer, new).await?;
     if taken == SafetyDecision::Walkable {
-        take_back_what_was_heard(writer, &closed, (author, reason)).await?;
+        retract_derived_preferences(writer, &closed, (author, reason)).await?;
     }
     let payload = json!({ "trial_id": id, "number": number, "decision": taken });
     events::append(writer, trial.study_id, "safety_reviewed", &payload).await?;
@@ -87,13 +87,13 @@ pub async fn give(
 }
 
 /// Retracts the preferences that were derived from safety reports, because nobody stated them.
-async fn take_back_what_was_heard(
+async fn retract_derived_preferences(
     writer: &mut Writer,
     closed: &[Closed],
     (author, reason): (&str, &str),
 ) -> StoreResult<()> {
     for closed in closed {
-        if let Some(id) = heard_of(writer, closed.source).await? {
+        if let Some(id) = derived_preference(writer, closed.source).await? {
             let row = feedback::get(writer, id).await?;
             feedback::retract(writer, &row, author, reason).await?;
         }
@@ -101,7 +101,7 @@ async fn take_back_what_was_heard(
     Ok(())
 }
 
-async fn heard_of(db: &mut Connection, source: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
+async fn derived_preference(db: &mut Connection, source: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
     match source {
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),

@@ -177,9 +177,9 @@ pub struct Tell {
 
 /// A checked outcome, ready to be written.
 #[derive(Debug)]
-pub struct Heard {
+pub struct CheckedOutcome {
     snapshot: StudySnapshot,
-    told: ScriptOutcome,
+    outcome: ScriptOutcome,
     answers: Vec<FeedbackContent>,
 }
 
@@ -187,7 +187,7 @@ pub struct Heard {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial is not open or not evaluated by a script.
-pub async fn hear(store: &mut Store, id: TrialId, tell: &Tell) -> Result<Heard, Error> {
+pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Result<CheckedOutcome, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
     if trial.asked_by.is_none() {
@@ -197,14 +197,14 @@ pub async fn hear(store: &mut Store, id: TrialId, tell: &Tell) -> Result<Heard, 
         return Err(Error::conflict(format!("The trial is already {}.", trial.state.as_str())));
     }
     let study = studies::get(&mut db, trial.study_id).await?;
-    let told = checked(&study, tell)?;
+    let outcome = checked(&study, tell)?;
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let (TrialState::Converged, Some(rmse)) = (told.state, told.gait_rmse_rad) else {
-        return Ok(Heard { snapshot, told, answers: Vec::new() });
+    let (TrialState::Converged, Some(rmse)) = (outcome.state, outcome.gait_rmse_rad) else {
+        return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
     };
     if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
-        return Ok(Heard { snapshot, told, answers: Vec::new() });
+        return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
     }
     let find = move |pool: &OnPool| {
         let partners = partners(pool, &snapshot, id);
@@ -216,7 +216,7 @@ pub async fn hear(store: &mut Store, id: TrialId, tell: &Tell) -> Result<Heard, 
         .into_iter()
         .filter_map(|old| snapshot.trial(old)?.gait_rmse_rad.map(|figure| by_gait_rmse((id, rmse), (old, figure))))
         .collect();
-    Ok(Heard { snapshot, told, answers })
+    Ok(CheckedOutcome { snapshot, outcome, answers })
 }
 
 fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
@@ -251,17 +251,23 @@ fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn record(writer: &mut Writer, caller: &Caller, id: TrialId, heard: &Heard) -> Result<Option<Trial>, Error> {
-    let study = heard.snapshot.study.id;
+pub async fn record(
+    writer: &mut Writer,
+    caller: &Caller,
+    id: TrialId,
+    checked: &CheckedOutcome,
+) -> Result<Option<Trial>, Error> {
+    let study = checked.snapshot.study.id;
     let present = trials::get(writer, id).await?;
-    if present.state != TrialState::Running || !is_current(writer, &heard.snapshot).await? {
+    if present.state != TrialState::Running || !is_current(writer, &checked.snapshot).await? {
         return Ok(None);
     }
-    trials::tell(writer, id, &heard.told).await?;
-    preference::compute(writer, study, (id, heard.told.state), &heard.answers, &caller.name).await?;
-    let payload = json!({ "trial_id": id, "number": present.number, "state": heard.told.state });
+    trials::tell(writer, id, &checked.outcome).await?;
+    preference::compute(writer, study, (id, checked.outcome.state), &checked.answers, &caller.name).await?;
+    let payload = json!({ "trial_id": id, "number": present.number, "state": checked.outcome.state });
     events::append(writer, study, "trial_ended", &payload).await?;
-    let detail = json!({ "study": study, "state": heard.told.state, "gait_rmse_rad": heard.told.gait_rmse_rad });
+    let detail =
+        json!({ "study": study, "state": checked.outcome.state, "gait_rmse_rad": checked.outcome.gait_rmse_rad });
     audit::append(writer, &caller.actor, "trial.tell", &format!("trial {id}"), &detail).await?;
     Ok(Some(trials::get(writer, id).await?))
 }

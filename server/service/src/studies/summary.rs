@@ -26,7 +26,7 @@ pub struct Summary {
     /// State of the certificate of the recommended gait.
     pub best_certificate: CertificateState,
     /// Reasons if that certificate failed.
-    pub best_objections: Vec<String>,
+    pub best_failures: Vec<String>,
     /// If it failed, the best trial whose gait passed.
     pub passing: Option<TrialSummary>,
     /// Every trial, by number.
@@ -70,8 +70,8 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, judged: Judged) -> Su
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        best_certificate: judged.verdict,
-        best_objections: judged.objections,
+        best_certificate: judged.certificate,
+        best_failures: judged.failures,
         passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| line(trial, &snapshot.trials)),
         trials: snapshot.trials.iter().map(|trial| line(trial, &snapshot.trials)).collect(),
     }

@@ -1,10 +1,10 @@
-//! The certifier and the explainer, which examine completed solves.
+//! The certifier and the explainer of completed solves.
 
 use super::{Certify, Explain, GaitCertifier, GaitExplainer};
 use std::fmt;
 use std::sync::Arc;
 
-/// The services that examine completed solves.
+/// The services that certify and explain completed solves.
 #[derive(Clone)]
 pub struct AfterSolves {
     /// Certifies gaits.

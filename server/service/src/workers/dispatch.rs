@@ -4,9 +4,8 @@
 //! An engine may lose jobs, and may deliver a result late or twice. The record decides what counts, by the number of
 //! the attempt.
 
-use super::Assignment;
 use futures_util::future::BoxFuture;
-use gait_optimizer::{IterationRecord, SolveOutcome};
+use gait_optimizer::{GaitProblem, IterationRecord, SolveOptions, SolveOutcome, WarmStart};
 use gaitwright_store::TrialId;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -20,6 +19,21 @@ pub struct Attempt {
     pub trial: TrialId,
     /// Number of the attempt, from 1. A result counts only if this is the newest attempt.
     pub number: u32,
+}
+
+/// One solve to run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Assignment {
+    /// The trial and the number of the attempt.
+    pub attempt: Attempt,
+    /// Number of the trial within its study.
+    pub number: u32,
+    /// The gait problem.
+    pub problem: GaitProblem,
+    /// The warm start; `None` for a cold start.
+    pub warm_start: Option<WarmStart>,
+    /// Settings and limits of the solver.
+    pub options: SolveOptions,
 }
 
 /// The result of an assignment.

@@ -1,23 +1,7 @@
 //! The interface between the workers and the optimizer.
 
-use super::dispatch::Attempt;
-use gait_optimizer::{CancelToken, GaitProblem, IterationRecord, SolveOptions, SolveOutcome, WarmStart, solve};
-use serde::{Deserialize, Serialize};
-
-/// One solve to run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Assignment {
-    /// The trial and the number of the attempt.
-    pub attempt: Attempt,
-    /// Number of the trial within its study.
-    pub number: u32,
-    /// The gait problem.
-    pub problem: GaitProblem,
-    /// The warm start; `None` for a cold start.
-    pub warm_start: Option<WarmStart>,
-    /// Settings and limits of the solver.
-    pub options: SolveOptions,
-}
+use super::dispatch::Assignment;
+use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome, solve};
 
 /// Runs a solve on the calling thread.
 pub trait Evaluate: Send + Sync + 'static {

@@ -46,7 +46,7 @@ pub(super) struct Outcome {
     /// State of the certificate of the best gait.
     pub(super) certificate: CertificateState,
     /// Reasons if it failed.
-    pub(super) objections: Vec<String>,
+    pub(super) failures: Vec<String>,
     /// If it failed, number and Gait RMSE, rad, of the best trial whose gait passed.
     pub(super) passing: Option<(u32, Option<f64>)>,
     /// Best gait.
@@ -77,9 +77,9 @@ impl Outcome {
     /// Why the certificate of the best gait failed, if it did.
     pub(super) fn failure_in_words(&self) -> Option<String> {
         let with = if self.muscles { "with" } else { "without" };
-        let objections = self.objections.join("; ");
+        let failures = self.failures.join("; ");
         let who = format!("subject {}, seed {}, {with} muscles", self.subject, self.seed);
-        (self.certificate == CertificateState::Failed).then(|| format!("{who}: {objections}"))
+        (self.certificate == CertificateState::Failed).then(|| format!("{who}: {failures}"))
     }
 }
 
@@ -95,7 +95,7 @@ pub(super) fn by_iteration(milestones: &[Milestone], results: usize) -> Vec<Opti
 
 /// Whether muscles gave the lower Gait RMSE, for one subject and seed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Verdict {
+pub(super) struct PairComparison {
     pub(super) subject: u32,
     pub(super) seed: u64,
     /// Number of iterations at which both studies had a gait.
@@ -106,7 +106,7 @@ pub(super) struct Verdict {
     pub(super) last: Option<(f64, f64)>,
 }
 
-impl Verdict {
+impl PairComparison {
     /// "Throughout the tuning process", as the paper says.
     pub(super) fn throughout(&self) -> bool {
         self.compared > 0 && self.lower == self.compared
@@ -129,7 +129,7 @@ impl Verdict {
 }
 
 /// One comparison for each pair of studies.
-pub(super) fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
+pub(super) fn pair_comparisons(outcomes: &[Outcome]) -> Vec<PairComparison> {
     let partner =
         |plain: &Outcome| outcomes.iter().find(|o| o.muscles && (o.subject, o.seed) == (plain.subject, plain.seed));
     outcomes
@@ -143,7 +143,7 @@ pub(super) fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
                 .zip(&muscles.by_iteration)
                 .filter_map(|(p, m)| Some(((*p)?, (*m)?)))
                 .collect();
-            Verdict {
+            PairComparison {
                 subject: plain.subject,
                 seed: plain.seed,
                 compared: both.len(),
@@ -155,10 +155,10 @@ pub(super) fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
 }
 
 /// The conclusion over all pairs, in words.
-pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
-    let throughout = verdicts.iter().filter(|v| v.throughout()).count();
-    let at_the_end = verdicts.iter().filter(|v| v.last.is_some_and(|(without, with)| with < without)).count();
-    let pairs = verdicts.len();
+pub(super) fn conclusion(pair_comparisons: &[PairComparison]) -> String {
+    let throughout = pair_comparisons.iter().filter(|v| v.throughout()).count();
+    let at_the_end = pair_comparisons.iter().filter(|v| v.last.is_some_and(|(without, with)| with < without)).count();
+    let pairs = pair_comparisons.len();
     let paper = "The paper's claim, lower Gait RMSE with muscles throughout the tuning process,";
     let answer = match throughout {
         _ if pairs == 0 => "cannot be tested: there is no pair of studies",
@@ -169,19 +169,20 @@ pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
         0 => "holds in no pair",
         _ => "holds in only some pairs, depending on local optima",
     };
-    let lower: usize = verdicts.iter().map(|v| v.lower).sum();
-    let compared: usize = verdicts.iter().map(|v| v.compared).sum();
+    let lower: usize = pair_comparisons.iter().map(|v| v.lower).sum();
+    let compared: usize = pair_comparisons.iter().map(|v| v.compared).sum();
     format!(
         "{paper} {answer} ({throughout} of {pairs}). Gait RMSE is lower with muscles at {lower} of {compared} iterations, \
          and at the end in {at_the_end} of {pairs} pair{}{}.",
         if pairs == 1 { "" } else { "s" },
-        spread(verdicts)
+        spread(pair_comparisons)
     )
 }
 
 /// How much muscles lower the Gait RMSE of the final best actions.
-fn spread(verdicts: &[Verdict]) -> String {
-    let mut gains: Vec<f64> = verdicts.iter().filter_map(|v| v.last).map(|(without, with)| without - with).collect();
+fn spread(pair_comparisons: &[PairComparison]) -> String {
+    let mut gains: Vec<f64> =
+        pair_comparisons.iter().filter_map(|v| v.last).map(|(without, with)| without - with).collect();
     gains.sort_by(f64::total_cmp);
     match (gains.first(), gains.last()) {
         (Some(least), Some(most)) => {
@@ -293,7 +294,7 @@ mod tests {
             best_cost_of_transport: Some(0.06),
             best_bounds: None,
             certificate: CertificateState::Failed,
-            objections: vec!["the simulated walker falls".to_owned()],
+            failures: vec!["the simulated walker falls".to_owned()],
             passing: Some((2, Some(0.625))),
             gait: None,
             reference: ReferenceGait::builtin().unwrap(),
@@ -308,7 +309,7 @@ mod tests {
             outcome(false, 2, vec![Some(0.8), Some(0.8)]),
             outcome(true, 2, vec![Some(0.7), Some(0.6)]),
         ];
-        let found = verdicts(&outcomes);
+        let found = pair_comparisons(&outcomes);
         assert_eq!((found[0].compared, found[0].lower, found[0].throughout()), (3, 2, false));
         assert_eq!(found[0].last, Some((0.5, 0.6)));
         assert!(found[1].throughout());

@@ -102,10 +102,10 @@ impl Reproduce {
         for (file, text) in files.into_iter().zip(texts) {
             file.write(&text)?;
         }
-        for verdict in comparison::verdicts(&outcomes) {
-            data(&verdict.sentence())?;
+        for comparison in comparison::pair_comparisons(&outcomes) {
+            data(&comparison.sentence())?;
         }
-        data(&comparison::conclusion(&comparison::verdicts(&outcomes)))?;
+        data(&comparison::conclusion(&comparison::pair_comparisons(&outcomes)))?;
         tell(&format!("report: {}", self.folder.join("report.html").display()));
         for failure in &failures {
             tell(&format!("gaitwright: {failure}"));
@@ -222,8 +222,8 @@ async fn outcome(
         best_trial: best.map(|trial| trial.number),
         best_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        certificate: judged.verdict,
-        objections: judged.objections,
+        certificate: judged.certificate,
+        failures: judged.failures,
         passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
         best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
         gait,

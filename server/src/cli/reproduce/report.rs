@@ -1,6 +1,6 @@
 //! The report of `gaitwright reproduce`: one self-contained HTML file.
 
-use super::comparison::{Outcome, Verdict, conclusion, verdicts};
+use super::comparison::{Outcome, PairComparison, conclusion, pair_comparisons};
 use super::statements::{Statement, statements};
 use askama::Template;
 use gait_optimizer::Gait;
@@ -28,7 +28,7 @@ struct Report<'a> {
     failures: Vec<String>,
     /// Name of the reference gait, and the meaning of its band.
     reference: Option<(&'a str, &'static str)>,
-    verdicts: Vec<Verdict>,
+    pair_comparisons: Vec<PairComparison>,
     outcomes: &'a [Outcome],
     pairs: Vec<Pair>,
 }
@@ -55,40 +55,40 @@ struct Drawn {
 /// # Errors
 /// When the template cannot be rendered.
 pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
-    let verdicts = verdicts(outcomes);
-    let pairs = verdicts.iter().map(|verdict| pair(verdict, outcomes)).collect::<Result<_, Error>>()?;
+    let pair_comparisons = pair_comparisons(outcomes);
+    let pairs = pair_comparisons.iter().map(|comparison| pair(comparison, outcomes)).collect::<Result<_, Error>>()?;
     let report = Report {
         style: STYLE,
         version: env!("CARGO_PKG_VERSION"),
         trials,
-        conclusion: conclusion(&verdicts),
-        statements: statements(outcomes, &verdicts),
+        conclusion: conclusion(&pair_comparisons),
+        statements: statements(outcomes, &pair_comparisons),
         solve_seconds: outcomes.iter().map(|outcome| outcome.solve_seconds).sum(),
         wall_seconds: outcomes.iter().map(|outcome| outcome.wall_seconds).sum(),
         failures: outcomes.iter().filter_map(Outcome::failure_in_words).collect(),
         reference: outcomes.first().map(|o| (o.reference.name.as_str(), band_in_words(&o.reference))),
-        verdicts,
+        pair_comparisons,
         outcomes,
         pairs,
     };
     report.render().map_err(|e| Error::Internal(e.to_string()))
 }
 
-fn pair(verdict: &Verdict, outcomes: &[Outcome]) -> Result<Pair, Error> {
+fn pair(comparison: &PairComparison, outcomes: &[Outcome]) -> Result<Pair, Error> {
     let pair: Vec<&Outcome> =
-        outcomes.iter().filter(|o| (o.subject, o.seed) == (verdict.subject, verdict.seed)).collect();
+        outcomes.iter().filter(|o| (o.subject, o.seed) == (comparison.subject, comparison.seed)).collect();
     let gaits: Vec<(&'static str, &Gait)> =
         pair.iter().filter_map(|outcome| Some((label(outcome), outcome.gait.as_ref()?))).collect();
     let mut course_and_angles = vec![drawn(&rmse_chart(&pair))];
     if let Some(first) = pair.first() {
-        course_and_angles.extend(gait_charts::beside_reference(&gaits, &first.reference).iter().map(drawn));
+        course_and_angles.extend(gait_charts::with_reference(&gaits, &first.reference).iter().map(drawn));
     }
     let mut tiles = Vec::with_capacity(gaits.len());
     for (name, gait) in &gaits {
         tiles.push((*name, gait_tiles(&stick_figures(gait)?)));
     }
     Ok(Pair {
-        title: format!("Subject {}, seed {}", verdict.subject, verdict.seed),
+        title: format!("Subject {}, seed {}", comparison.subject, comparison.seed),
         course_and_angles,
         tiles,
         orbits: gait_charts::orbits(&gaits).iter().map(drawn).collect(),

@@ -1,6 +1,6 @@
 //! The statements of the paper about its experiment, each with the result of this comparison.
 
-use super::comparison::{Outcome, Verdict};
+use super::comparison::{Outcome, PairComparison};
 use gaitwright_service::studies::recommended::CertificateState;
 
 /// A statement of the paper.
@@ -15,11 +15,11 @@ pub(super) struct Statement {
 }
 
 /// Every statement of the paper, in its order.
-pub(super) fn statements(outcomes: &[Outcome], verdicts: &[Verdict]) -> Vec<Statement> {
-    let mut subjects: Vec<u32> = verdicts.iter().map(|verdict| verdict.subject).collect();
+pub(super) fn statements(outcomes: &[Outcome], pair_comparisons: &[PairComparison]) -> Vec<Statement> {
+    let mut subjects: Vec<u32> = pair_comparisons.iter().map(|comparison| comparison.subject).collect();
     subjects.sort_unstable();
     subjects.dedup();
-    let mut all: Vec<Statement> = subjects.iter().map(|subject| lower_rmse(*subject, verdicts)).collect();
+    let mut all: Vec<Statement> = subjects.iter().map(|subject| lower_rmse(*subject, pair_comparisons)).collect();
     all.push(stable(outcomes));
     let people = "not compared: this needs a subject with electrodes, in a lab session of the service";
     for paper in [
@@ -31,10 +31,12 @@ pub(super) fn statements(outcomes: &[Outcome], verdicts: &[Verdict]) -> Vec<Stat
     all
 }
 
-fn lower_rmse(subject: u32, verdicts: &[Verdict]) -> Statement {
-    let pairs: Vec<&Verdict> = verdicts.iter().filter(|verdict| verdict.subject == subject).collect();
-    let throughout = pairs.iter().filter(|verdict| verdict.throughout()).count();
-    let (lower, compared) = pairs.iter().fold((0, 0), |(l, c), verdict| (l + verdict.lower, c + verdict.compared));
+fn lower_rmse(subject: u32, pair_comparisons: &[PairComparison]) -> Statement {
+    let pairs: Vec<&PairComparison> =
+        pair_comparisons.iter().filter(|comparison| comparison.subject == subject).collect();
+    let throughout = pairs.iter().filter(|comparison| comparison.throughout()).count();
+    let (lower, compared) =
+        pairs.iter().fold((0, 0), |(l, c), comparison| (l + comparison.lower, c + comparison.compared));
     Statement {
         paper: format!(
             "Subject {subject}: Gait RMSE of the best action is lower with muscles throughout the tuning (figure 3b)"

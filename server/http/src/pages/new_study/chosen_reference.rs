@@ -4,7 +4,7 @@ use super::super::drawn::Drawn;
 use askama::Template;
 use gaitwright_charts::{Chart, Stroke};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::nearest_reference::{self, Match};
+use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
 use gaitwright_store::reference_gaits::ReferenceGait;
 use gaitwright_store::studies::StudyPlan;
 use gaitwright_store::{Connection, ReferenceGaitId};
@@ -23,7 +23,7 @@ struct ChosenReference {
 
 /// Every reference gait with its distance from the subject of a study, and the chosen one.
 pub(super) struct Choice {
-    matches: Vec<Match>,
+    matches: Vec<ReferenceGaitMatch>,
     chosen: ReferenceGaitId,
 }
 
@@ -48,9 +48,11 @@ impl Choice {
 }
 
 /// A sentence about the nearest reference gait, from matches in the order of distance.
-fn nearest(matches: &[Match], chosen: &Match) -> String {
+fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> String {
     let known = matches.iter().filter(|found| found.distance.is_some()).count();
-    let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
+    let away = |found: &ReferenceGaitMatch| {
+        found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"))
+    };
     match matches.first() {
         _ if known == 0 => {
             let why = "No reference gait has both height and body mass, so the nearest one is unknown.";

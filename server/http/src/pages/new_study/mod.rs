@@ -5,11 +5,12 @@ mod space_editor;
 
 use self::chosen_reference::Choice;
 use self::space_editor::SpaceEditor;
-use super::error::{Page, PageError, page};
-use super::{format, refusal};
+use super::format;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
+use crate::refusal;
 use askama::Template;
 use axum::Json;
 use axum::extract::State;

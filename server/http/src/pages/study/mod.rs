@@ -6,12 +6,12 @@ mod without_gait;
 use self::trials_table::{Choice, TrialRow, TrialsTable};
 use self::without_gait::WithoutGait;
 use super::drawn::Drawn;
-use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::page_error::{Page, PageError, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -151,15 +151,15 @@ struct Best {
 
 impl Best {
     fn failed(&self) -> bool {
-        self.judged.verdict == CertificateState::Failed
+        self.judged.certificate == CertificateState::Failed
     }
 
     fn passed(&self) -> bool {
-        self.judged.verdict == CertificateState::Passed
+        self.judged.certificate == CertificateState::Passed
     }
 
     fn is_being_certified(&self) -> bool {
-        self.judged.verdict == CertificateState::BeingCertified
+        self.judged.certificate == CertificateState::BeingCertified
     }
 }
 

@@ -23,7 +23,7 @@ pub struct Drawn {
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
 /// earlier presentations of this rater; `closed` lists trials with an open safety report.
 pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], closed: &[TrialId]) -> Drawn {
-    let taken_back = before.last().filter(|last| last.answer == Some(Judgement::Withdrawn) && last.kind != Kind::Null);
+    let taken_back = before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != Kind::Null);
     if let Some(last) = taken_back.filter(|last| !last.has_one_of(closed)) {
         // A rater who confused the sides must find them unchanged.
         let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
@@ -119,7 +119,7 @@ mod tests {
             let asked = question();
             let earlier = shown(1, draw(1, question(), &[], &[]));
             let drawn = draw(lot, asked, std::slice::from_ref(&earlier), &[]);
-            let taken_back = Presentation { answer: Some(Judgement::Withdrawn), ..shown(2, drawn) };
+            let taken_back = Presentation { answer: Some(Judgement::Retracted), ..shown(2, drawn) };
             let id = taken_back.id;
             let again = draw(3, asked, &[earlier, taken_back], &[]);
             assert_eq!(again, Drawn { again: Some(id), ..drawn });
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn settled_comparison_does_not_come_again() {
-        let taken_back = Presentation { answer: Some(Judgement::Withdrawn), ..shown(1, draw(1, question(), &[], &[])) };
+        let taken_back = Presentation { answer: Some(Judgement::Retracted), ..shown(1, draw(1, question(), &[], &[])) };
         let asked = question();
         assert_eq!(draw(1, asked, &[taken_back], &[]).pair, asked);
     }

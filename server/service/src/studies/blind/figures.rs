@@ -75,7 +75,7 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterFigures 
     RaterFigures {
         rater: rater.to_owned(),
         shown: count(&|_| true),
-        answered: count(&|shown| shown.answer.is_some_and(|judgement| judgement != Judgement::Withdrawn)),
+        answered: count(&|shown| shown.answer.is_some_and(|judgement| judgement != Judgement::Retracted)),
         first_preferred: first_preferred(rater, sides),
         repeats_agree: repeats_agree(&own),
         cannot_tell: count(&|s| s.answer == Some(Judgement::CannotTell)),

@@ -30,7 +30,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RaterAnswer {
-    /// The answer. `withdrawn` is reserved for the service.
+    /// The answer. `retracted` is reserved for the service.
     pub answer: Judgement,
     /// Response time of the rater, ms.
     #[serde(default)]
@@ -142,18 +142,18 @@ async fn is_answered(
     pair: (TrialId, TrialId),
     rater: &str,
 ) -> Result<bool, Error> {
-    Ok(preference::standing_answer(db, study, pair, rater).await?.is_some())
+    Ok(preference::current_answer(db, study, pair, rater).await?.is_some())
 }
 
 async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
-    let withdrawn = NewAnswer {
-        judgement: Judgement::Withdrawn,
+    let retracted = NewAnswer {
+        judgement: Judgement::Retracted,
         response_ms: None,
         note: "",
         feedback: None,
         could_have_known: open.unblinded,
     };
-    presentations::answer(writer, open.id, withdrawn).await?;
+    presentations::answer(writer, open.id, retracted).await?;
     Ok(())
 }
 
@@ -175,10 +175,10 @@ pub async fn answer(
 ) -> Result<(StudyId, Answered), Error> {
     let sided = own(writer, caller, token).await?;
     let shown = &sided.presentation;
-    if given.answer == Judgement::Withdrawn {
+    if given.answer == Judgement::Retracted {
         return Err(Error::invalid(
             "answer",
-            "withdrawn",
+            "retracted",
             "one of the other answers, because this value is reserved for the service",
         ));
     }
@@ -236,7 +236,7 @@ fn without_gaits(error: Error) -> Error {
 /// Explains which answer counts after a second one was refused.
 fn answered_already(before: Option<Judgement>) -> String {
     match before {
-        Some(Judgement::Withdrawn) => "This pair was already answered, and the answer was retracted.".to_owned(),
+        Some(Judgement::Retracted) => "This pair was already answered, and the answer was retracted.".to_owned(),
         Some(judgement) => {
             let judgement = judgement.as_str().replace('_', " ");
             format!("This pair was already answered. Your first answer, \u{201c}{judgement}\u{201d}, counts.")

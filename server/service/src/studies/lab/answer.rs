@@ -4,7 +4,7 @@
 //! was in the lab could infer the allocation from them.
 
 use super::question::{can_be_retracted, next_number, next_walk};
-use super::session::{InTheLab, in_the_lab, still_open, still_shown};
+use super::session::{LabSessionProgress, session_progress, still_open, still_shown};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -30,11 +30,11 @@ const LONGEST_NOTE: usize = 2000;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewLabAnswer)]
 pub struct NewAnswer {
-    /// Number of the answer: `asks` or, for a report of an unsafe walk, `reports` of the session. An answer that is sent
+    /// Number of the answer: `answer_number` or, for a report of an unsafe walk, `report_number` of the session. An answer that is sent
     /// twice counts once.
     #[schema(minimum = 1)]
     pub number: u32,
-    /// The answer. First is walk 2, second is walk 3. `withdrawn` is reserved for the service.
+    /// The answer. First is walk 2, second is walk 3. `retracted` is reserved for the service.
     pub answer: Judgement,
     /// Free text, at most 2000 characters.
     #[serde(default)]
@@ -47,11 +47,16 @@ pub struct NewAnswer {
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the subject withdrew consent; for an answer other than a
 /// safety report even if there is another answer, before all walks are recorded, and in a closed session.
-pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
-    if new.answer == Judgement::Withdrawn {
+pub async fn give(
+    writer: &mut Writer,
+    caller: &Caller,
+    id: LabSessionId,
+    new: &NewAnswer,
+) -> Result<LabSessionProgress, Error> {
+    if new.answer == Judgement::Retracted {
         return Err(Error::invalid(
             "answer",
-            "withdrawn",
+            "retracted",
             "one of the other answers, because this value is reserved for the service",
         ));
     }
@@ -72,7 +77,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
     }
     if let Some(stands) = session.answer() {
         let other = "There is already an answer. To change it, retract it first.";
-        return if is_same(stands, new) { in_the_lab(writer, id).await } else { Err(Error::conflict(other)) };
+        return if is_same(stands, new) { session_progress(writer, id).await } else { Err(Error::conflict(other)) };
     }
     if new.number != number {
         return Err(Error::conflict(format!(
@@ -95,7 +100,7 @@ async fn report_unsafe(
     caller: &Caller,
     session: &LabSession,
     new: &NewAnswer,
-) -> Result<InTheLab, Error> {
+) -> Result<LabSessionProgress, Error> {
     let walked = session.walked();
     let (gaits, blinded) = match walked {
         Some(pair) => (new.answer.unsafe_of(pair), ""),
@@ -106,7 +111,7 @@ async fn report_unsafe(
         Some(stands)
             if is_same(stands, new) && SafetyReports::read(writer, session.study_id).await?.close_all(&gaits) =>
         {
-            in_the_lab(writer, session.id).await
+            session_progress(writer, session.id).await
         }
         Some(stands) if walked.is_none() && !stands.judgement.is_about_safety() => {
             retract_number(writer, caller, session.id, stands.number).await?;
@@ -121,7 +126,7 @@ async fn report_unsafe(
             let author = format!("the subject in lab session {} ({walks}{blinded})", session.number);
             let attribution = Attribution { source: Source::Subject, author: &author, note: &new.note };
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
-            in_the_lab(writer, session.id).await
+            session_progress(writer, session.id).await
         }
     }
 }
@@ -132,7 +137,7 @@ async fn add(
     id: LabSessionId,
     number: u32,
     new: &NewAnswer,
-) -> Result<InTheLab, Error> {
+) -> Result<LabSessionProgress, Error> {
     if !lab_answers::insert(writer, &caller.actor, id, number, (new.answer, &new.note)).await? {
         return Err(Error::conflict("Another answer was recorded at the same time."));
     }
@@ -144,14 +149,14 @@ async fn add(
     audit::append(writer, &caller.actor, "lab_session.answer", &format!("lab session {id}"), &detail).await?;
     // A safety report takes effect at once, so open pages must update.
     events::append(writer, session.study_id, "lab_session_answered", &json!({ "lab_session_id": id })).await?;
-    in_the_lab(writer, id).await
+    session_progress(writer, id).await
 }
 
 /// Retracts the current answer. It stays on record, but no longer counts.
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] if there is no answer, or one that cannot be retracted here.
-pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> Result<InTheLab, Error> {
+pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> Result<LabSessionProgress, Error> {
     let session = still_open(writer, id).await?;
     let answer = session.answer().ok_or_else(|| Error::conflict("There is no answer to retract."))?;
     if !can_be_retracted(&session) {
@@ -160,7 +165,7 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> 
         return Err(Error::conflict(why));
     }
     retract_number(writer, caller, id, answer.number).await?;
-    in_the_lab(writer, id).await
+    session_progress(writer, id).await
 }
 
 /// Retracts the answer with this number, and records it in the audit trail.

@@ -22,7 +22,9 @@ pub struct WalkActivity {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// Measurement file that it was computed from.
-    pub recording_id: MeasurementFileId,
+    // Records can name the field `recording_id`.
+    #[serde(alias = "recording_id")]
+    pub measurement_file_id: MeasurementFileId,
     /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
     /// the peak of walk 1.
     #[schema(value_type = Vec<schema::CycleActivity>)]
@@ -70,7 +72,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     let process = move |pool: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();
         let mut normal: Vec<CycleActivity> = Vec::new();
-        for (walk, recording_id, reading, file) in &files {
+        for (walk, measurement_file_id, reading, file) in &files {
             let (recording, strikes) = reading.read(WHAT, &file.text(pool)?)?;
             let measured = recording.cycles(&strikes, &settings)?;
             let activity = if walks.is_empty() {
@@ -80,7 +82,13 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
                 Activity::of_gait(&measured, &normal)?
             };
             let Activity { channels, averages, emg_rmse } = activity;
-            walks.push(WalkActivity { walk: *walk, recording_id: *recording_id, channels, averages, emg_rmse });
+            walks.push(WalkActivity {
+                walk: *walk,
+                measurement_file_id: *measurement_file_id,
+                channels,
+                averages,
+                emg_rmse,
+            });
         }
         Ok(EmgResult { settings, walks })
     };
@@ -98,7 +106,7 @@ pub async fn keep_result(
     result: &EmgResult,
 ) -> Result<(), Error> {
     let kept = measurement_files::insert_result(writer, actor, id, result).await?;
-    let used: Vec<MeasurementFileId> = result.walks.iter().map(|walk| walk.recording_id).collect();
+    let used: Vec<MeasurementFileId> = result.walks.iter().map(|walk| walk.measurement_file_id).collect();
     let detail = json!({ "result": kept, "settings": result.settings, "recordings": used });
     audit::append(writer, actor, "lab_session.process", &format!("lab session {id}"), &detail).await?;
     Ok(())
@@ -131,14 +139,14 @@ pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>,
     let mut db = store.read().await?;
     let Some(result) = measurement_files::newest_result::<EmgResult>(&mut db, id).await? else { return Ok(None) };
     drop(db);
-    beside_model(store, id, result).await.map(Some)
+    with_model(store, id, result).await.map(Some)
 }
 
 /// Adds the model's muscle activity to a result, if the session is unblinded.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn beside_model(store: &mut Store, id: LabSessionId, result: EmgResult) -> Result<EmgView, Error> {
+pub async fn with_model(store: &mut Store, id: LabSessionId, result: EmgResult) -> Result<EmgView, Error> {
     let mut db = store.read().await?;
     let mut gaits = Vec::new();
     for walk in &result.walks {
@@ -178,7 +186,7 @@ pub struct LimitCycles {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// Measurement file of the walk.
-    pub recording_id: MeasurementFileId,
+    pub measurement_file_id: MeasurementFileId,
     /// Cut-off frequency of the zero-phase low-pass filter before central differences, Hz.
     pub cutoff_hz: f64,
     /// Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
@@ -200,10 +208,11 @@ pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<Lim
     }
     drop(db);
     let process = move |pool: &OnPool| {
-        let cycles = |(walk, recording_id, reading, file): (u8, MeasurementFileId, MotionReading, PackedText)| {
-            let joints = reading.portraits(&file.text(pool)?)?;
-            Ok(LimitCycles { walk, recording_id, cutoff_hz: reading.cutoff_hz, joints })
-        };
+        let cycles =
+            |(walk, measurement_file_id, reading, file): (u8, MeasurementFileId, MotionReading, PackedText)| {
+                let joints = reading.portraits(&file.text(pool)?)?;
+                Ok(LimitCycles { walk, measurement_file_id, cutoff_hz: reading.cutoff_hz, joints })
+            };
         files.into_iter().map(cycles).collect()
     };
     store.compute(process).await?

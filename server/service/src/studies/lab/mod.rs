@@ -14,13 +14,16 @@ mod upload;
 
 pub use answer::{NewAnswer, give as answer, retract};
 pub use measured::{
-    EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, beside_model, compute, emg, keep_result, known_gait,
-    limit_cycles,
+    EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
+    with_model,
 };
 pub use question::{AnswerView, WALKS};
 pub use session::{
-    Condition, GaitOfWalk, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WalkView, checked_walk,
-    close, for_device, gaits_to_plan_with, gaits_to_walk_with, in_the_lab, plan, record_walk, still_open, was_recorded,
+    Condition, GaitOfWalk, LabSessionProgress, LabSessionState, LabSessionView, NewLabSession, RecordedWalk, WalkView,
+    checked_walk, close, for_device, gaits_to_plan_with, gaits_to_walk_with, plan, record_walk, session_progress,
+    still_open, was_recorded,
 };
 pub use unblinding::unblind;
-pub use upload::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, check_kept, keep};
+pub use upload::{
+    Brought, Checked, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, brought, check_kept, keep,
+};

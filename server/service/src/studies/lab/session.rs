@@ -1,6 +1,6 @@
 //! Lab sessions: planning, recording of walks, closing, and the views that conceal the allocation.
 
-use super::question::{AnswerView, WALKS, asks, can_be_retracted, has_file, next_walk, takes_report};
+use super::question::{AnswerView, WALKS, asked_answer, can_be_retracted, has_file, next_walk, takes_report};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -8,7 +8,7 @@ use crate::studies::motion::is_same_gait;
 use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, DeviceFile, Lot};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::lab_sessions::{self, Act, Done, LabSession, NewLabSession};
+use gaitwright_store::lab_sessions::{self, Act, LabSession, LabSessionStep};
 use gaitwright_store::listing::{self, Listed, Listing};
 use gaitwright_store::trials::{self, Trial, TrialState};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
@@ -22,7 +22,7 @@ const LONGEST_NOTE: usize = 2000;
 /// Lab session to plan.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct NewSession {
+pub struct NewLabSession {
     /// Converged trial of one gait.
     pub gait_one: TrialId,
     /// Converged trial of the other gait.
@@ -48,7 +48,7 @@ pub enum Condition {
 /// State of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum SessionState {
+pub enum LabSessionState {
     /// No walk is recorded yet.
     Planned,
     /// At least one walk is recorded.
@@ -57,7 +57,7 @@ pub enum SessionState {
     Closed,
 }
 
-impl SessionState {
+impl LabSessionState {
     /// The name of the state.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -86,14 +86,14 @@ pub struct WalkView {
     /// Condition of the walk. Absent while it is blinded.
     pub condition: Option<Condition>,
     /// Who recorded the walk, and when.
-    pub recorded: Option<Done>,
+    pub recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
     pub after_unblinding: bool,
 }
 
 /// Lab session, without blinded data.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct SessionView {
+pub struct LabSessionView {
     /// Identifier.
     pub id: LabSessionId,
     /// The study.
@@ -101,7 +101,7 @@ pub struct SessionView {
     /// Number of the session in this study, from 1.
     pub number: u32,
     /// State of the session.
-    pub state: SessionState,
+    pub state: LabSessionState,
     /// Trial of one gait. Does not imply the order of the walks.
     pub gait_one: TrialId,
     /// Trial of the other gait.
@@ -113,21 +113,21 @@ pub struct SessionView {
     /// Current answer of the subject. Absent if there is none.
     pub answer: Option<AnswerView>,
     /// Who unblinded the session, when and why. Absent while it is blinded.
-    pub unblinded: Option<Done>,
+    pub unblinded: Option<LabSessionStep>,
     /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
     /// it.
-    pub order_included: bool,
+    pub allocation_included: bool,
     /// Who fetched controller files of the walks.
     pub device_files: Vec<DeviceFile>,
     /// Who closed the session, and when.
-    pub closed: Option<Done>,
+    pub closed: Option<LabSessionStep>,
     /// Who planned the session.
     pub planned_by: String,
     /// Time of planning.
     pub created_at: Instant,
 }
 
-impl From<&LabSession> for SessionView {
+impl From<&LabSession> for LabSessionView {
     fn from(session: &LabSession) -> Self {
         let walk = |number| {
             let place = |act| session.acts.iter().position(|(known, _)| *known == act);
@@ -147,14 +147,14 @@ impl From<&LabSession> for SessionView {
             id: session.id,
             study_id: session.study_id,
             number: session.number,
-            state: SessionState::of(session),
+            state: LabSessionState::of(session),
             gait_one: session.gait_one,
             gait_two: session.gait_two,
             notes: session.notes.clone(),
             walks: (1..=WALKS).map(walk).collect(),
             answer: session.answer().map(|answer| AnswerView::of(session, answer)),
             unblinded: session.done(Act::Unblinded).cloned(),
-            order_included: session.allocation.included,
+            allocation_included: session.allocation.included,
             device_files: session.allocation.files.clone(),
             closed: session.done(Act::Closed).cloned(),
             planned_by: session.actor.clone(),
@@ -295,12 +295,17 @@ pub fn checked_walk(walk: u8) -> Result<u8, Error> {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`]; errors of the database.
-pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewSession) -> Result<LabSession, Error> {
+pub async fn plan(
+    writer: &mut Writer,
+    actor: &Actor,
+    study: StudyId,
+    new: &NewLabSession,
+) -> Result<LabSession, Error> {
     studies::get(writer, study).await?;
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
     walkable::admit_pair(writer, study, ("gait_one", "gait_two"), (new.gait_one, new.gait_two)).await?;
     let before = lab_sessions::of_study(writer, study).await?.len();
-    let row = NewLabSession {
+    let row = lab_sessions::NewLabSession {
         study_id: study,
         number: u32::try_from(before).unwrap_or(u32::MAX).saturating_add(1),
         gait_one: new.gait_one,
@@ -316,7 +321,7 @@ pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewS
 
 /// Session as shown in the lab, without anything that reveals a gait.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct InTheLab {
+pub struct LabSessionProgress {
     /// Identifier of the session.
     pub session: LabSessionId,
     /// Next walk, 1 to 3. Absent after the last walk and in a closed session.
@@ -326,9 +331,9 @@ pub struct InTheLab {
     /// Time at which the last walk was recorded.
     pub last_recorded: Option<Instant>,
     /// Number to send with the answer. Absent before the last walk and after an answer.
-    pub asks: Option<u32>,
+    pub answer_number: Option<u32>,
     /// Number to send with a report of an unsafe walk. Absent until the subject may have walked with the device.
-    pub reports: Option<u32>,
+    pub report_number: Option<u32>,
     /// Current answer of the subject.
     pub answer: Option<AnswerView>,
     /// Whether that answer can be retracted here.
@@ -337,7 +342,7 @@ pub struct InTheLab {
     pub closed: bool,
 }
 
-impl InTheLab {
+impl LabSessionProgress {
     /// Whether the answer reports an unsafe walk, which ends the walks.
     pub fn was_unsafe(&self) -> bool {
         self.answer.as_ref().is_some_and(|answer| answer.answer.is_about_safety())
@@ -348,16 +353,16 @@ impl InTheLab {
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent; errors of the database.
-pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLab, Error> {
+pub async fn session_progress(db: &mut Connection, id: LabSessionId) -> Result<LabSessionProgress, Error> {
     let session = still_shown(db, id).await?;
     let closed = session.done(Act::Closed).is_some();
-    Ok(InTheLab {
+    Ok(LabSessionProgress {
         session: id,
         walk: next_walk(&session).filter(|_| !closed && session.answer().is_none()),
         walks: WALKS,
         last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(Act::Walk(walk))).map(|done| done.at),
-        asks: asks(&session),
-        reports: takes_report(&session),
+        answer_number: asked_answer(&session),
+        report_number: takes_report(&session),
         answer: session.answer().map(|answer| AnswerView::of(&session, answer)),
         can_be_retracted: can_be_retracted(&session),
         closed,
@@ -386,7 +391,7 @@ pub async fn record_walk(
     actor: &Actor,
     id: LabSessionId,
     walked: &RecordedWalk,
-) -> Result<InTheLab, Error> {
+) -> Result<LabSessionProgress, Error> {
     let walk = checked_walk(walked.walk)?;
     printable::note("note", &walked.note, LONGEST_NOTE)?;
     let session = still_open(writer, id).await?;
@@ -401,7 +406,7 @@ pub async fn record_walk(
     lab_sessions::act(writer, actor, id, Act::Walk(walk), &walked.note).await?;
     let detail = json!({ "walk": walk, "note": walked.note });
     audit::append(writer, actor, "lab_session.walk", &format!("lab session {id}"), &detail).await?;
-    in_the_lab(writer, id).await
+    session_progress(writer, id).await
 }
 
 /// Whether the last recorded walk is this one, with the same note, as when a form is sent twice.

@@ -22,7 +22,7 @@ pub(super) const WHAT: &str = "recording";
 /// Format of a measurement file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum FileForm {
+pub enum MeasurementFormat {
     /// Comma-separated values, with column names in the first line that is not a comment.
     #[default]
     Csv,
@@ -35,7 +35,7 @@ pub enum FileForm {
 #[serde(deny_unknown_fields, default)]
 pub struct EmgReading {
     /// File format.
-    pub form: FileForm,
+    pub form: MeasurementFormat,
     /// Sampling rate of a CSV file without a column `time_s`, Hz.
     #[schema(minimum = 100, maximum = 20000)]
     pub rate_hz: Option<f64>,
@@ -53,7 +53,7 @@ pub struct EmgReading {
 impl Default for EmgReading {
     fn default() -> Self {
         Self {
-            form: FileForm::default(),
+            form: MeasurementFormat::default(),
             rate_hz: None,
             channels: BTreeMap::new(),
             heel_strikes_s: Vec::new(),
@@ -77,9 +77,9 @@ impl EmgReading {
             ));
         }
         let whole = match (self.form, self.rate_hz) {
-            (FileForm::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
-            (FileForm::Opensim, None) => EmgRecording::from_opensim(what, text)?,
-            (FileForm::Opensim, Some(rate_hz)) => {
+            (MeasurementFormat::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
+            (MeasurementFormat::Opensim, None) => EmgRecording::from_opensim(what, text)?,
+            (MeasurementFormat::Opensim, Some(rate_hz)) => {
                 return Err(Error::invalid(
                     "reading.rate_hz",
                     rate_hz,
@@ -136,7 +136,7 @@ pub struct NewEmg {
 pub struct MotionReading {
     /// File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     /// knee_R_rad, ankle_R_rad.
-    pub form: FileForm,
+    pub form: MeasurementFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     pub unit: Option<Unit>,
     /// Cut-off frequency of the low-pass filter before differentiation, Hz.
@@ -145,7 +145,7 @@ pub struct MotionReading {
 
 impl Default for MotionReading {
     fn default() -> Self {
-        Self { form: FileForm::default(), unit: None, cutoff_hz: 6.0 }
+        Self { form: MeasurementFormat::default(), unit: None, cutoff_hz: 6.0 }
     }
 }
 
@@ -165,8 +165,8 @@ impl MotionReading {
 
     fn joints(&self, text: &str) -> Result<JointRecording, Error> {
         Ok(match self.form {
-            FileForm::Csv => JointRecording::from_csv(WHAT, text)?,
-            FileForm::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
+            MeasurementFormat::Csv => JointRecording::from_csv(WHAT, text)?,
+            MeasurementFormat::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
         })
     }
 
@@ -254,7 +254,7 @@ pub struct Brought {
     /// What is known of it.
     pub recording: MeasurementFile,
     /// Its form.
-    pub form: FileForm,
+    pub form: MeasurementFormat,
     /// Its content.
     pub file: PackedText,
 }
@@ -267,7 +267,7 @@ pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Broug
     /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
     struct Reading {
-        form: FileForm,
+        form: MeasurementFormat,
     }
     let recording = measurement_files::get(db, id).await?;
     let (Reading { form }, file) = measurement_files::file(db, id).await?;

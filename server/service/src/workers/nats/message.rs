@@ -1,7 +1,7 @@
 //! Messages between service and workers: compressed MessagePack, which preserves every bit of a number.
 
+use crate::workers::dispatch::Assignment;
 use crate::workers::dispatch::{Attempt, DispatchError, Finding};
-use crate::workers::evaluate::Assignment;
 use gait_optimizer::IterationRecord;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

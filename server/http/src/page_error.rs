@@ -1,9 +1,8 @@
 //! Errors as pages.
 
-use super::refusal;
-use crate::identify::AnsweredTo;
-use crate::problem::Problem;
-use crate::problem::Refusal;
+use crate::problem::{Problem, Refusal};
+use crate::refusal;
+use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::http::{Method, Uri};
 use axum::response::{Html, IntoResponse, Redirect, Response};
@@ -25,7 +24,7 @@ impl<E: Into<Error>> From<E> for PageError {
 struct ErrorPage {
     problem: Problem,
     /// The reader's role decides the navigation; `None` shows none.
-    to: Option<AnsweredTo>,
+    to: Option<RespondedTo>,
 }
 
 impl IntoResponse for PageError {
@@ -37,13 +36,13 @@ impl IntoResponse for PageError {
             Error::Invalid(fault) => Error::Invalid(Box::new(refusal::with_label(*fault))),
             other => other,
         };
-        // `answers::complete` renders it with the navigation of the caller.
+        // `responses::complete` renders it with the navigation of the caller.
         Refusal(error).into_response()
     }
 }
 
 /// Renders a problem as a page with the navigation of the caller.
-pub(crate) fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
+pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
     let status = problem.status();
     match (ErrorPage { problem, to }).render() {
         Ok(text) => (status, Html(text)).into_response(),
@@ -73,7 +72,7 @@ pub(crate) async fn no_such_method(method: Method, uri: Uri) -> Refusal {
 }
 
 /// Whether the address is for programs, which get problem documents instead of pages.
-pub fn is_for_programs(path: &str) -> bool {
+pub(crate) fn is_for_programs(path: &str) -> bool {
     ["/api/", "/static/"].iter().any(|start| path.starts_with(start))
         || ["/health", "/ready", "/metrics"].contains(&path)
 }

@@ -1,10 +1,10 @@
 //! The outermost layer: gives each request an identifier, and turns every failure into a problem document or an error
 //! page.
 
-use super::identify::AnsweredTo;
-use super::pages::error::{is_for_programs, shown};
+use super::page_error::{is_for_programs, shown};
 use super::problem::Problem;
 use super::problem_kinds::Kind;
+use super::responded_to::RespondedTo;
 use axum::extract::{MatchedPath, Request};
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::middleware::Next;
@@ -21,11 +21,11 @@ pub(super) async fn complete(request: Request, next: Next) -> Response {
     let id = Uuid::now_v7().simple().to_string();
     let span = span_of(&request, &id);
     let for_programs = is_for_programs(request.uri().path());
-    let mut answer = with_problem(next.run(request).instrument(span).await, &id, for_programs);
+    let mut response = with_problem(next.run(request).instrument(span).await, &id, for_programs);
     if let Ok(id) = HeaderValue::from_str(&id) {
-        answer.headers_mut().insert(REQUEST_ID.clone(), id);
+        response.headers_mut().insert(REQUEST_ID.clone(), id);
     }
-    answer
+    response
 }
 
 /// The log span of a request. It has the route instead of the address, which may contain a sign-in secret or the token
@@ -37,30 +37,30 @@ fn span_of(request: &Request, id: &str) -> tracing::Span {
 }
 
 /// Adds a problem document with the request identifier to a failure.
-fn with_problem(mut answer: Response, id: &str, for_programs: bool) -> Response {
-    let problem = match answer.extensions_mut().remove::<Problem>() {
+fn with_problem(mut response: Response, id: &str, for_programs: bool) -> Response {
+    let problem = match response.extensions_mut().remove::<Problem>() {
         Some(problem) => problem,
-        None if speaks_for_itself(&answer) => return answer,
-        None => Problem::of_status(answer.status()),
+        None if speaks_for_itself(&response) => return response,
+        None => Problem::of_status(response.status()),
     };
     let problem = Problem { request_id: Some(id.to_owned()), ..problem };
-    let to = answer.extensions().get::<AnsweredTo>().copied();
+    let to = response.extensions().get::<RespondedTo>().copied();
     let new = if for_programs { problem.into_response() } else { shown(problem, to) };
     let (parts, body) = new.into_parts();
-    *answer.body_mut() = body;
-    answer.headers_mut().remove(header::CONTENT_LENGTH);
+    *response.body_mut() = body;
+    response.headers_mut().remove(header::CONTENT_LENGTH);
     // Keep headers of the failure, such as Allow or Retry-After.
-    answer.headers_mut().extend(parts.headers);
-    answer
+    response.headers_mut().extend(parts.headers);
+    response
 }
 
 /// Whether the response is a success, or a page or document that already shows the failure.
-fn speaks_for_itself(answer: &Response) -> bool {
-    let status = answer.status();
+fn speaks_for_itself(response: &Response) -> bool {
+    let status = response.status();
     if !status.is_client_error() && !status.is_server_error() {
         return true;
     }
-    let kind = answer.headers().get(header::CONTENT_TYPE).map_or(&b""[..], HeaderValue::as_bytes);
+    let kind = response.headers().get(header::CONTENT_TYPE).map_or(&b""[..], HeaderValue::as_bytes);
     [&b"text/html"[..], b"application/json"].iter().any(|known| kind.starts_with(known))
 }
 

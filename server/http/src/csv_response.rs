@@ -1,4 +1,4 @@
-//! Answers that are CSV files.
+//! Responses that are CSV files.
 
 use crate::AppState;
 use crate::problem::Refusal;
@@ -6,8 +6,8 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use gaitwright_charts::csv_table::CsvTable;
 
-/// A table as a CSV answer that a browser saves under `name`. The pool writes it, because it has up to ten thousand rows.
-pub(crate) async fn csv_answer(
+/// A table as a CSV response that a browser saves under `name`. The pool writes it, because it has up to ten thousand rows.
+pub(crate) async fn csv_response(
     app: &mut AppState,
     name: &str,
     write: impl FnOnce() -> CsvTable + Send + 'static,

@@ -34,12 +34,12 @@ const LABELS: &[(&str, &str)] = &[
 ];
 
 /// A text in quotation marks.
-pub(super) fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     format!("\u{201c}{text}\u{201d}")
 }
 
 /// A refusal under the label of its field.
-pub(super) fn of_field(label: &str, fault: &FieldError) -> String {
+pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
     let Some(allowed) = fault.allowed.as_deref() else { return fault.message.clone() };
     let given = match &fault.value {
         // The form shows names in place of identifiers.
@@ -51,7 +51,7 @@ pub(super) fn of_field(label: &str, fault: &FieldError) -> String {
 }
 
 /// The sentence of an error, with the label of the refused field: from `labels`, or else the common one.
-pub(super) fn of_form(error: &Error, labels: &[(&str, &str)]) -> String {
+pub(crate) fn of_form(error: &Error, labels: &[(&str, &str)]) -> String {
     match error {
         Error::Invalid(fault) => labelled(fault, labels),
         _ => error.to_string(),
@@ -59,12 +59,12 @@ pub(super) fn of_form(error: &Error, labels: &[(&str, &str)]) -> String {
 }
 
 /// The sentence of an error, with the common label of the refused field.
-pub(super) fn in_words(error: &Error) -> String {
+pub(crate) fn in_words(error: &Error) -> String {
     of_form(error, &[])
 }
 
 /// The same refusal, with the common label of its field.
-pub(super) fn with_label(fault: FieldError) -> FieldError {
+pub(crate) fn with_label(fault: FieldError) -> FieldError {
     FieldError { message: labelled(&fault, &[]), ..fault }
 }
 

@@ -1,0 +1,14 @@
+//! A tuned bound with its given value.
+
+use serde::{Deserialize, Serialize};
+
+/// A tuned bound with its given value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GivenBound {
+    /// Name of the bound.
+    pub bound: String,
+    /// What it limits, with its unit.
+    pub meaning: String,
+    /// Its value.
+    pub value: f64,
+}
