@@ -16,8 +16,8 @@ use gaitwright_store::{
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, signed_in, token};
-use gaitwright_tests::consistent::Consistent;
-use gaitwright_tests::orders::{gait_one_first, sides};
+use gaitwright_tests::consistent_gaits::Consistent;
+use gaitwright_tests::read_allocations::{gait_one_first, sides};
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::skipped::skipped;
 use gaitwright_tests::sources;

@@ -11,7 +11,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{Store, StudyId, now};
 use gaitwright_tests::archives::{exported, import, import_trusting};
 use gaitwright_tests::cli;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};

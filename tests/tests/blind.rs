@@ -12,7 +12,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{self, As, member, rater_of, send, signed_in};
-use gaitwright_tests::orders::sides;
+use gaitwright_tests::read_allocations::sides;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use tempfile::TempDir;

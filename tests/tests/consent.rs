@@ -10,7 +10,7 @@ use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::cli;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::measured::motion;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};

@@ -11,7 +11,7 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Store, StudyId, TrialId, certificates, commit, gaits, trials};
 use gaitwright_tests::archives::{exported, import, import_trusting};
 use gaitwright_tests::certified::certificate;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::scripted;
 use gaitwright_tests::service::Service;
 use serde_json::json;

@@ -16,7 +16,7 @@ use gaitwright_store::{Store, certificates, commit, explanations, gaits, members
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::certified::certificate;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::explained::explanation;
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;

@@ -1,7 +1,7 @@
 //! The statuses in the description are those of the operations. Every refusal that does not depend on the state of the
 //! record is provoked here, for every operation.
 //!
-//! Rights are in `access.rs`, withdrawn consent is in `consent.rs`, bodies beyond the description in `drawn_bodies.rs`.
+//! Rights are in `access.rs`, withdrawn consent is in `consent.rs`, bodies beyond the description in `random_bodies.rs`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -13,7 +13,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, trials};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
-use gaitwright_tests::away::Away;
+use gaitwright_tests::engine_without_workers::Away;
 use gaitwright_tests::service::Service;
 use serde_json::json;
 use std::collections::HashMap;

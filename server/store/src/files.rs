@@ -1,7 +1,7 @@
 //! Detects that files of the open record were deleted, replaced or truncated. SQLite would keep writing to a deleted
 //! file, and all acknowledged changes would be lost with the process.
 
-use super::log::Log;
+use super::wal_check::Log;
 use super::{StoreError, StoreResult, beside};
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};

@@ -344,7 +344,7 @@ async fn browser_shows_two_gaits_by_time_and_as_pictures() {
         .await;
     assert!(page.text("[data-phase]").await.ends_with(" s"));
     // Half a second is half a stride of one second and a quarter of one of two; side by side both are equally far.
-    let places = "import('/static/two_clocks.mjs').then(({ Clocks }) => { const c = new Clocks([1, 2], 1.5); c.at = 0.5; \
+    let places = "import('/static/stride_clock.mjs').then(({ Clocks }) => { const c = new Clocks([1, 2], 1.5); c.at = 0.5; \
                   const both = () => [c.strides(0), c.strides(1)].map(n => n.toFixed(2)); const share = both(); c.pace = 'time'; \
                   return [...share, ...both(), c.round].join(' ') })";
     assert_eq!(page.value(places).await, "0.33 0.33 0.50 0.25 2");

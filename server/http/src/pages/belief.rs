@@ -1,8 +1,8 @@
 //! What the learner believes about the search space of a study.
 
-use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::format::{self, meaning, percent, signed};
+use super::page_chart::Drawn;
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;

@@ -1,8 +1,8 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::figures;
+use super::page_chart::Drawn;
 use super::refusal;
 use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;

@@ -2,10 +2,10 @@
 
 use super::bound_use::{self, BoundUse};
 use super::certificate;
-use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::explanation::NoGait;
 use super::format::{self, words};
+use super::page_chart::Drawn;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::visible::Visible;

@@ -1,11 +1,11 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
-use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
 use super::measurement_forms::{Forms, Settings};
+use super::page_chart::Drawn;
 use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;

@@ -1,8 +1,8 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::figures;
+use super::page_chart::Drawn;
 use super::refusal;
 use crate::AppState;
 use crate::accessible::Id;

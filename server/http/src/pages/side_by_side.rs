@@ -1,8 +1,8 @@
 //! The page that compares two studies in one chart and one table.
 
-use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::format::{self, words};
+use super::page_chart::Drawn;
 use super::study::{COURSE, Figures, course, figures};
 use crate::AppState;
 use crate::accessible::{Named, accessible};

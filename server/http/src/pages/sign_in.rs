@@ -3,7 +3,7 @@
 use super::error::{Page, PageError, page};
 use super::format;
 use super::refusal;
-use super::unsent::{SignInPage, Unsent, send_now};
+use super::unsent_form::{SignInPage, Unsent, send_now};
 use crate::authorization::SignedIn;
 use crate::extract::Form;
 use crate::identify::{browser_cookie, browser_of, cookie, session_of};

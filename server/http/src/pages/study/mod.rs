@@ -5,9 +5,9 @@ mod without_gait;
 
 use self::trials_table::{Choice, TrialRow, TrialsTable};
 use self::without_gait::WithoutGait;
-use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
+use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;

@@ -11,7 +11,7 @@ use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, SubjectId, TrialId};
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::drawn::Drawn;
+use gaitwright_tests::bodies_from_schema::Drawn;
 use gaitwright_tests::measured::{electromyogram, four_strides, motion};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
