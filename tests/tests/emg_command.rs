@@ -30,7 +30,7 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
 const BY_NORMAL: [&str; 5] = ["walk.csv", "--normal", "normal.csv", "--heel-strike-column", "heel"];
 
 #[test]
-fn a_walk_is_measured_by_normal_walking() {
+fn emg_command_compares_a_walk_with_normal_walking() {
     let folder = recordings();
     insta::assert_snapshot!("emg", done(folder.path(), &BY_NORMAL));
     let files = ["--json", "--cycles", "cycles.csv", "--envelopes", "envelopes.csv"];
@@ -76,7 +76,7 @@ fn columns(path: &Path) -> Vec<(String, Vec<f64>)> {
 }
 
 #[test]
-fn columns_and_filters_can_be_named_and_an_opensim_file_gives_the_same() {
+fn named_columns_and_an_opensim_file_give_the_same_result() {
     let folder = recordings();
     let at = |name: &str| folder.path().join(name);
     let text = electromyogram(1.0);

@@ -331,7 +331,7 @@ fn every_route_is_classified() {
 }
 
 #[test]
-fn unknown_get_is_a_door_until_it_is_classified() {
+fn unknown_get_route_fails_until_it_is_classified() {
     for new in ["get /api/v1/trials/{id}/controller.bin", "get /lab/{id}/walk.json", "get /api/v1/studies/{id}/best"] {
         assert_eq!(entry_point_of(new), None, "{new}");
     }
@@ -384,7 +384,7 @@ fn every_command_is_classified() {
 }
 
 #[tokio::test]
-async fn every_door_is_closed_by_every_rule() {
+async fn every_entry_point_applies_every_rule() {
     let entry_points: Vec<(String, EntryPoint)> = operations()
         .into_iter()
         .filter_map(|operation| entry_point_of(&operation).map(|entry_point| (operation, entry_point)))
@@ -443,7 +443,7 @@ async fn every_door_is_closed_by_every_rule() {
 
 /// A rater's pair and answer under a rule that is broken after the pair was drawn.
 #[tokio::test]
-async fn a_pair_that_was_shown_is_not_answered_after_a_rule_closes_it() {
+async fn pair_cannot_be_answered_after_a_rule_excludes_it() {
     for (rule, statuses) in [
         (Rule::Safety, [StatusCode::CONFLICT, StatusCode::OK]),
         (Rule::Certificate, [StatusCode::CONFLICT, StatusCode::OK]),
@@ -520,7 +520,7 @@ impl Rated {
 }
 
 #[tokio::test]
-async fn person_who_answered_a_pair_elsewhere_does_not_answer_it_blind_and_the_other_way_round() {
+async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
     for blind_first in [true, false] {
         let scene = Rated::new().await;
         let token = scene.token().await;
@@ -567,7 +567,7 @@ async fn person_who_answered_a_pair_elsewhere_does_not_answer_it_blind_and_the_o
 }
 
 #[tokio::test]
-async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned() {
+async fn answer_about_a_gait_reported_as_unsafe_is_stored_and_not_learned() {
     let scene = Scene::new().await;
     let session = scene.session(3).await;
     scene.violate(Rule::Safety).await;
@@ -584,7 +584,7 @@ async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned
 
 /// The recommendation names walkable gaits only.
 #[tokio::test]
-async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certificate() {
+async fn recommendation_excludes_unsafe_and_uncertified_gaits() {
     for rule in [Rule::Safety, Rule::Certificate, Rule::Withdrawal] {
         let scene = Scene::new().await;
         let recommended = format!("/api/v1/studies/{}/recommendation", scene.study);
@@ -605,7 +605,7 @@ async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certi
 }
 
 #[test]
-fn learners_log_and_new_trials_are_each_written_at_one_door() {
+fn one_function_writes_the_learner_log_and_one_writes_trials() {
     let mut writers = Vec::new();
     let mut appenders = Vec::new();
     let mut planners = Vec::new();
@@ -627,7 +627,7 @@ fn learners_log_and_new_trials_are_each_written_at_one_door() {
 }
 
 #[tokio::test]
-async fn a_plan_made_before_a_safety_report_is_not_written() {
+async fn plan_made_before_a_safety_report_is_not_written() {
     let scene = Rated::new().await;
     let study = scene.service.get(scene.study).await;
     let snapshot = gaitwright_service::studies::snapshot::StudySnapshot::read(

@@ -104,7 +104,7 @@ async fn imported_trial_without_its_gait_is_not_walkable() {
 }
 
 #[tokio::test]
-async fn report_closes_the_same_motion_in_an_imported_study() {
+async fn report_covers_the_same_motion_in_an_imported_study() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let study = service.study(|new| new.trial_budget = 6).await;

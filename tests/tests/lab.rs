@@ -54,7 +54,7 @@ fn id(session: &Value) -> &str {
 }
 
 #[tokio::test]
-async fn lab_session_is_walked_in_order_closed_and_unblinded() {
+async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
@@ -263,7 +263,7 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
 }
 
 #[tokio::test]
-async fn unsafe_walk_closes_both_gaits_until_unblinding() {
+async fn unsafe_walk_excludes_both_gaits_until_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let (lab, session) = walked(&service, study, &trials).await;
     let said = json!({"number": 1, "answer": "unsafe_second", "note": "stumbled"});
@@ -298,7 +298,7 @@ async fn unsafe_walk_closes_both_gaits_until_unblinding() {
 }
 
 #[tokio::test]
-async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
+async fn lab_session_requires_two_converged_gaits_of_its_study() {
     let (_folder, service, study, trials) = finished().await;
     let gaits = converged(&trials);
     let other = service.study(|new| new.trial_budget = 1).await;
@@ -347,7 +347,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
 }
 
 #[tokio::test]
-async fn the_form_of_a_session_offers_each_motion_once_and_no_gait_reported_as_unsafe() {
+async fn lab_session_form_offers_each_motion_once_and_no_unsafe_gait() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service
@@ -373,7 +373,7 @@ async fn the_form_of_a_session_offers_each_motion_once_and_no_gait_reported_as_u
 }
 
 #[tokio::test]
-async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
+async fn archive_preserves_the_lab_sessions_of_its_study() {
     let (folder, service, study, trials) = finished_by(Consistent::default()).await;
     let session = planned(&service, study, &trials).await;
     service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
@@ -421,7 +421,7 @@ fn with_heel(walk: u8, recording: &str) -> Value {
 }
 
 #[tokio::test]
-async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_anew() {
+async fn emg_recordings_are_compared_with_normal_walking_and_can_be_reprocessed() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
@@ -485,7 +485,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
 }
 
 #[tokio::test]
-async fn a_recording_is_given_out_as_it_was_brought() {
+async fn measurement_file_is_downloaded_unchanged() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
@@ -581,7 +581,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
 }
 
 #[tokio::test]
-async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
+async fn limit_cycles_are_drawn_over_the_gait_after_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let (api, page) = (format!("/api/v1/lab-sessions/{}", id(&session)), format!("/lab-sessions/{}", id(&session)));

@@ -37,7 +37,7 @@ fn every_operation_of_the_client_is_in_the_description() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_example_runs_a_study_to_its_end() {
+async fn python_example_runs_a_study_to_its_end() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();

@@ -261,7 +261,7 @@ fn is_said_in_words(drawn: &Drawn, schema: &Value, field: &str) -> bool {
 }
 
 #[tokio::test]
-async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
+async fn bodies_are_accepted_if_and_only_if_they_match_the_description() {
     let (_folder, mut scene) = Scene::set().await;
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut drawn = Drawn::from(document.clone());

@@ -25,7 +25,7 @@ async fn service() -> (tempfile::TempDir, Service) {
 }
 
 #[tokio::test]
-async fn a_recording_becomes_the_reference_of_a_study() {
+async fn imported_recording_becomes_the_reference_of_a_study() {
     let (_folder, service) = service().await;
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await;
     assert_eq!(far.status, StatusCode::CREATED, "{}", far.text);
@@ -64,7 +64,7 @@ async fn a_recording_becomes_the_reference_of_a_study() {
 }
 
 #[tokio::test]
-async fn incomplete_archive_imports_nothing_and_names_the_place() {
+async fn incomplete_archive_is_refused_with_the_place() {
     let (_folder, service) = service().await;
     let before = service.fetch("/api/v1/reference-gaits").await.items();
     let text = recording();
@@ -92,7 +92,7 @@ async fn incomplete_archive_imports_nothing_and_names_the_place() {
 }
 
 #[tokio::test]
-async fn the_form_imports_and_comes_back_as_it_was_typed() {
+async fn import_form_imports_and_keeps_the_input_after_an_error() {
     let (_folder, service) = service().await;
     let kind = "application/x-www-form-urlencoded";
     let form = |recording: &str, height: &str| {
@@ -141,7 +141,7 @@ fn between(rows: &[Vec<f64>], column: usize, time: f64) -> f64 {
 }
 
 #[tokio::test]
-async fn the_table_of_a_gait_comes_back_as_the_same_curves() {
+async fn exported_gait_table_is_imported_as_the_same_curves() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 1).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -179,7 +179,7 @@ fn body_with(body: &Value, recording: &str) -> Value {
 }
 
 #[tokio::test]
-async fn a_new_study_takes_the_reference_gait_nearest_to_its_subject() {
+async fn new_study_uses_the_reference_gait_nearest_to_its_subject() {
     let (_folder, service) = service().await;
     let near = service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json();
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await.json();

@@ -161,7 +161,7 @@ async fn newest_act(service: &Service) -> String {
 }
 
 #[tokio::test]
-async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() {
+async fn every_entry_point_reports_a_restricted_study_as_unknown_to_non_members() {
     let closed = Closed::new().await;
     let outsiders = closed.outsiders().await;
     let before = newest_act(&closed.service).await;
@@ -259,7 +259,7 @@ async fn members_are_removed_on_the_page_of_a_study_whose_subject_withdrew() {
 }
 
 #[tokio::test]
-async fn lists_show_a_restricted_study_to_its_members_alone() {
+async fn lists_show_a_restricted_study_to_members_only() {
     let closed = Closed::new().await;
     let service = &closed.service;
     let open = service.study(|new| new.trial_budget = 2).await;
@@ -328,7 +328,7 @@ async fn asking() -> (TempDir, Service, StudyId, As) {
 }
 
 #[tokio::test]
-async fn rater_reaches_assigned_studies_alone_until_removed() {
+async fn rater_accesses_assigned_studies_only_until_removed() {
     let (_folder, service, study, rater) = asking().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
@@ -415,7 +415,7 @@ async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restrict
 }
 
 #[tokio::test]
-async fn event_stream_ends_for_whoever_is_removed() {
+async fn event_stream_of_a_removed_member_ends() {
     let (_folder, service, study, _) = asking().await;
     let admin = signed_in(&service, Role::Admin).await;
     let As::Session(secret) = signed_in(&service, Role::Clinician).await else { panic!("a session") };
@@ -475,7 +475,7 @@ async fn rater_is_invited_with_assignment_and_link_in_one_step() {
 }
 
 #[tokio::test]
-async fn study_that_is_made_restricted_is_never_open() {
+async fn study_created_as_restricted_is_never_open() {
     let (_folder, service) = service().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let other = token(&service, &[Right::Read, Right::Run]).await;
@@ -512,7 +512,7 @@ async fn answered_by_people(service: &Service) -> (StudyId, Vec<String>) {
 }
 
 #[tokio::test]
-async fn one_person_answers_a_pair_once_however_the_name_is_written() {
+async fn person_answers_a_pair_once_under_any_spelling_of_the_name() {
     let (_folder, service) = service().await;
     let script = token(&service, &[Right::Read, Right::Answer]).await;
     let clinician = signed_in(&service, Role::Clinician).await;
@@ -540,7 +540,7 @@ async fn one_person_answers_a_pair_once_however_the_name_is_written() {
 }
 
 #[tokio::test]
-async fn trial_of_another_study_is_answered_as_one_that_does_not_exist() {
+async fn trial_of_another_study_looks_unknown() {
     let (_folder, service) = service().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let (study, gaits) = answered_by_people(&service).await;

@@ -87,7 +87,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_rule_is_of_a_field_that_is_described() {
+    fn every_dependency_rule_names_a_described_field() {
         let document = openapi::value().unwrap();
         let mut fields = BTreeSet::new();
         for (component, field, rule) in RULES {

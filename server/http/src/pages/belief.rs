@@ -356,7 +356,7 @@ mod tests {
     use super::{LISTED, listed};
 
     #[test]
-    fn the_recommended_trial_is_always_listed() {
+    fn recommended_trial_is_always_listed() {
         assert_eq!(listed(3, Some(1)), [0, 1, 2]);
         assert_eq!(listed(LISTED + 5, Some(0)).len(), LISTED);
         let long = listed(LISTED + 5, Some(LISTED + 2));
