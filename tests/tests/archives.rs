@@ -417,7 +417,7 @@ const FORGERIES: [Forgery; 68] = [
     (
         "an answer by a name with spaces around it",
         |r| of_source(r, "clinician")["author"] = " Nina".into(),
-        "which is not a name without surrounding spaces",
+        "which has leading or trailing spaces",
     ),
     (
         "an answer by an invisible name",

@@ -132,7 +132,7 @@ async fn trial_is_certified_once() {
     let controller = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
     assert_eq!(controller.json()["certificate_passed"], certificate.json()["passed"]);
     assert_eq!(ControllerFile::from_json(&controller.text).unwrap().domains.len(), 8);
-    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("device-trial-1.json"));
+    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("controller-trial-1.json"));
     let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json?rate_hz=1", trial.id)).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
     assert!(refused.text.contains("rate_hz") && page.contains("/controller.json"), "{}", refused.text);

@@ -200,7 +200,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     };
     let header = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad".to_owned();
     let recording = std::iter::once(header).chain((0..440).map(row)).collect::<Vec<_>>().join("\n");
-    let reference = json!({"name": "R", "form": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
+    let reference = json!({"name": "R", "format": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
     scene.one(done, "post /reference-gaits", &format!("{api}/reference-gaits"), reference).await;
 
     let plan = format!("{api}/studies/{finished}/lab-sessions");

@@ -43,7 +43,7 @@ fn unknown_subject_is_refused_with_the_known_ones() {
 
 #[test]
 fn malformed_bounds_are_refused_by_name() {
-    refused(&["solve", "--bounds", "a0=1"], "bounds is \"a0\"; it must be one of a1");
+    refused(&["solve", "--bounds", "a0=1"], "\"a0\" is not a bound; the bounds are a1, ");
     refused(&["solve", "--bounds", "a5"], "expected NAME=VALUE");
     refused(&["solve", "--bounds", "a1=20,"], "expected NAME=VALUE");
     refused(&["solve", "--bounds", "a5=high"], "the value is not a number");

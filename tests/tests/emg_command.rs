@@ -85,7 +85,7 @@ fn named_columns_and_an_opensim_file_give_the_same_result() {
     let names = "time\te1\te2\te3\te4\te5\te6\tswitch";
     std::fs::write(at("walk.sto"), format!("{head}{names}\n{}\n", rows.join("\n"))).unwrap();
     let filters = ["--json", "--band-low-hz", "30", "--band-high-hz", "400", "--envelope-hz", "5", "--order", "2"];
-    let channels = ["--channels", "TA_L=e2,GAS_L=e4", "--heel-strike-column", "switch", "--form", "opensim"];
+    let channels = ["--channels", "TA_L=e2,GAS_L=e4", "--heel-strike-column", "switch", "--format", "opensim"];
     let sto = done(folder.path(), &[&["walk.sto"], &channels[..], &filters].concat());
     let same = ["--channels", "TA_L=TA_L,GAS_L=GAS_L", "--heel-strike-column", "heel"];
     let csv = done(folder.path(), &[&["normal.csv"], &same[..], &filters].concat());

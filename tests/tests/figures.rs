@@ -122,7 +122,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
 async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let recording = json!({"name": "S03, level", "form": "csv", "recording": four_strides(100)});
+    let recording = json!({"name": "S03, level", "format": "csv", "recording": four_strides(100)});
     let imported = service.post("/api/v1/reference-gaits", &recording).await;
     assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
     let deviation = imported.json()["definition"]["standard_deviation_rad"][50][3].as_f64().unwrap();

@@ -226,7 +226,7 @@ async fn form_sent_twice_with_another_answer_shows_the_recorded_one() {
 }
 
 #[tokio::test]
-async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retracted() {
+async fn second_answer_of_the_same_person_is_refused_until_the_first_is_retracted() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let path = format!("/studies/{study}/compare");
@@ -504,7 +504,7 @@ async fn refused_forms_name_fields_by_their_labels() {
     let other = "pseudonym=S08&height_m=17.2&body_mass_kg=70";
     let refused = service.post_text("/subjects", FORM, other).await;
     is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Height, m\u{201d} is 17.2; it must be 1.4 to 2.2.");
-    let other = "name=x&form=csv&recording=y&strikes=ends&height_m=tall";
+    let other = "name=x&format=csv&recording=y&strikes=ends&height_m=tall";
     let refused = service.post_text("/reference-gaits", FORM, other).await;
     is_page(
         &refused,

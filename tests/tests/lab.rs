@@ -528,8 +528,8 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         ),
         (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel_strikes_s is 99"),
         (json!({"walk": 1, "recording": whole, "reading": {"channels": {"XX": "TA_L"}}}), "RF_L, TA_L, BF_L"),
-        (json!({"walk": 1, "recording": whole, "reading": {"form": "opensim"}}), "endheader"),
-        (json!({"walk": 1, "recording": whole, "reading": {"form": "c3d"}}), "form"),
+        (json!({"walk": 1, "recording": whole, "reading": {"format": "opensim"}}), "endheader"),
+        (json!({"walk": 1, "recording": whole, "reading": {"format": "c3d"}}), "format"),
     ] {
         let refused = service.post(&format!("{api}/measurement-files/emg"), &body).await;
         assert!(refused.status.is_client_error(), "{expected}: {}", refused.text);
@@ -547,7 +547,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         assert!(refused.status.is_client_error() && refused.text.contains(expected), "{expected}: {}", refused.text);
     }
     let page = format!("/lab-sessions/{}", id(&session));
-    let form = "walk=1&form=csv&recording=time_s%2CTA_L&heel_strike_column=heel&channels=TA";
+    let form = "walk=1&format=csv&recording=time_s%2CTA_L&heel_strike_column=heel&channels=TA";
     let refused = service.post_text(&format!("{page}/measurement-files/emg"), FORM, form).await;
     assert!(refused.text.contains("CHANNEL=COLUMN"), "{}", refused.text);
     for typed in ["<details open>", ">time_s,TA_L</textarea>", "value=\"heel\"", "value=\"TA\""] {
@@ -556,17 +556,17 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
     for (kind, form, expected) in [
         (
             "emg",
-            "walk=1&form=opensim&recording=x&rate_hz=1000",
+            "walk=1&format=opensim&recording=x&rate_hz=1000",
             "\u{201c}Sampling rate, Hz\u{201d} is 1000.0; it must be omitted",
         ),
         (
             "emg",
-            "walk=1&form=csv&recording=x&rate_hz=fast",
+            "walk=1&format=csv&recording=x&rate_hz=fast",
             "\u{201c}Sampling rate, Hz\u{201d} is \u{201c}fast\u{201d}; it must be a number",
         ),
         (
             "motion",
-            "walk=1&form=csv&recording=x&cutoff_hz=fast",
+            "walk=1&format=csv&recording=x&cutoff_hz=fast",
             "\u{201c}Low-pass cut-off, Hz\u{201d} is \u{201c}fast\u{201d}",
         ),
     ] {
@@ -590,7 +590,7 @@ async fn limit_cycles_are_drawn_over_the_gait_after_unblinding() {
     }
     let recording = motion().replace('\n', "%0A").replace(',', "%2C");
     for walk in 1..=2 {
-        let form = format!("walk={walk}&form=csv&unit=&cutoff_hz=6&recording=%23 walk {walk}%0A{recording}");
+        let form = format!("walk={walk}&format=csv&unit=&cutoff_hz=6&recording=%23 walk {walk}%0A{recording}");
         let kept = service.post_text(&format!("{page}/measurement-files/motion"), FORM, &form).await;
         assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     }

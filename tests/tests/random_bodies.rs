@@ -234,7 +234,7 @@ fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>
         }
         path if path.ends_with("/reference-gaits") => BTreeMap::from([
             ("recording", vec![json!(four_strides(100))]),
-            ("form", vec![json!("csv")]),
+            ("format", vec![json!("csv")]),
             ("strikes", vec![json!("kinematics")]),
             ("forces", vec![Value::Null]),
             ("force_column", vec![Value::Null]),

@@ -15,7 +15,7 @@ fn recording() -> String {
 }
 
 fn new(name: &str, height_m: f64) -> Value {
-    json!({"name": name, "form": "csv", "recording": recording(), "height_m": height_m, "body_mass_kg": 66.0})
+    json!({"name": name, "format": "csv", "recording": recording(), "height_m": height_m, "body_mass_kg": 66.0})
 }
 
 async fn service() -> (tempfile::TempDir, Service) {
@@ -73,13 +73,13 @@ async fn incomplete_archive_is_refused_with_the_place() {
         (json!({"recording": half}), "recording, line 102"),
         (json!({"recording": text.replace("\n1.5,0.1,", "\n1.5,x,")}), "recording, line 152"),
         (json!({"recording": text.replace("hip_R_rad", "hip_rad")}), "hip_R_rad"),
-        (json!({"form": "opensim"}), "endheader"),
+        (json!({"format": "opensim"}), "endheader"),
         (json!({"strikes": "force"}), "the recording has no force under the right foot"),
         (json!({"heel_strikes_s": [0.5, 99.0]}), "heel_strikes_s is 99;"),
         (json!({"height_m": 17.2}), "height_m is 17.2; it must be 1.4 to 2.2."),
         (json!({"recording": format!("# {}\n{text}", "x".repeat(30_000))}), "at most 20000 bytes of comments"),
         (json!({"name": " "}), "1 to 200 printable characters"),
-        (json!({"form": "c3d"}), "form"),
+        (json!({"format": "c3d"}), "format"),
     ] {
         let mut body = new("x", 1.7);
         body.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
@@ -97,7 +97,7 @@ async fn import_form_imports_and_keeps_the_input_after_an_error() {
     let kind = "application/x-www-form-urlencoded";
     let form = |recording: &str, height: &str| {
         let recording = recording.replace('\n', "%0D%0A").replace(',', "%2C");
-        format!("name=S03%2C+level&form=csv&strikes=kinematics&height_m={height}&body_mass_kg=&recording={recording}")
+        format!("name=S03%2C+level&format=csv&strikes=kinematics&height_m={height}&body_mass_kg=&recording={recording}")
     };
     let refused = service.post_text("/reference-gaits", kind, &form(&recording(), "tall")).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
@@ -152,7 +152,7 @@ async fn exported_gait_table_is_imported_as_the_same_curves() {
         table.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(0.0)).collect()).collect();
     rows.dedup_by_key(|row| row[0].to_bits());
     let end = rows.last().unwrap()[0];
-    let body = json!({"name": "our own", "form": "csv", "recording": table, "strikes": "ends"});
+    let body = json!({"name": "our own", "format": "csv", "recording": table, "strikes": "ends"});
     let imported = service.post("/api/v1/reference-gaits", &body).await;
     assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
     let angles = imported.json()["definition"]["angles_rad"].clone();

@@ -142,7 +142,7 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
 
 fn read_cursor<K: DeserializeOwned>(text: &str) -> Result<K, Error> {
     let key = hex::decode(text).ok().and_then(|key| serde_json::from_slice(&key).ok());
-    key.ok_or_else(|| Error::invalid("cursor", text, "`next` of the previous page"))
+    key.ok_or_else(|| Error::invalid("cursor", text, "the value of `next` from the previous page"))
 }
 
 fn read_limit(text: &str) -> Result<u32, Error> {
