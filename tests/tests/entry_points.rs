@@ -8,6 +8,7 @@
 
 use axum::http::StatusCode;
 use gaitwright_http::openapi;
+use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
@@ -626,34 +627,56 @@ fn one_function_writes_the_learner_log_and_one_writes_trials() {
     assert_eq!(planners, ["service/src/studies/snapshot.rs"], "callers of the function that writes trials");
 }
 
+/// A trial that a study could plan next, with the snapshot that it follows from.
+struct Plan {
+    snapshot: StudySnapshot,
+    trial: NewTrial,
+}
+
+impl Plan {
+    async fn of(scene: &Rated) -> Self {
+        let study = scene.service.get(scene.study).await;
+        let snapshot = StudySnapshot::read(&mut scene.service.store.read().await.unwrap(), study).await.unwrap();
+        let last = snapshot.trials.last().unwrap();
+        let trial = NewTrial {
+            number: last.number + 1,
+            action_index: last.action_index,
+            action: last.action,
+            reason: "as asked".to_owned(),
+            best_before: None,
+            warm_started_from: None,
+        };
+        Self { snapshot, trial }
+    }
+
+    /// Whether the plan can be written. The change is dropped, so that it leaves no trace.
+    async fn is_written(&self, scene: &Rated) -> bool {
+        let mut writer = scene.service.store.write().await.unwrap();
+        self.snapshot.write_trial(&mut writer, &self.trial).await.unwrap().is_some()
+    }
+}
+
+#[tokio::test]
+async fn plan_made_before_an_answer_is_not_written() {
+    let scene = Rated::new().await;
+    let token = scene.token().await;
+    let plan = Plan::of(&scene).await;
+    assert!(plan.is_written(&scene).await);
+    let answer = format!("/api/v1/blind-pairs/{token}/answer");
+    let answered = scene.service.post(&answer, &json!({"answer": "first"})).await;
+    assert!(answered.status.is_success(), "{}", answered.text);
+    assert!(!plan.is_written(&scene).await);
+    scene.service.stop().await;
+}
+
 #[tokio::test]
 async fn plan_made_before_a_safety_report_is_not_written() {
     let scene = Rated::new().await;
-    let study = scene.service.get(scene.study).await;
-    let snapshot = gaitwright_service::studies::snapshot::StudySnapshot::read(
-        &mut scene.service.store.read().await.unwrap(),
-        study,
-    )
-    .await
-    .unwrap();
-    let last = snapshot.trials.last().unwrap();
-    let new = NewTrial {
-        number: last.number + 1,
-        action_index: last.action_index,
-        action: last.action,
-        reason: "as asked".to_owned(),
-        best_before: None,
-        warm_started_from: None,
-    };
-    // Dropped, so that it leaves no trace.
-    let is_written = async || {
-        let mut writer = scene.service.store.write().await.unwrap();
-        snapshot.write_trial(&mut writer, &new).await.unwrap().is_some()
-    };
-    assert!(is_written().await);
+    let plan = Plan::of(&scene).await;
+    assert!(plan.is_written(&scene).await);
     let feedback = scene.service.feedback(scene.study).await.len();
     scene.close(Rule::Safety).await;
     assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: nothing reaches the learner");
-    assert!(!is_written().await, "and the plan is made anew all the same");
+    assert!(!plan.is_written(&scene).await, "although no answer arrived");
     scene.service.stop().await;
 }

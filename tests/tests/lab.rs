@@ -598,9 +598,9 @@ async fn limit_cycles_are_drawn_over_the_gait_after_unblinding() {
     let joints: Vec<_> = cycles[1]["joints"].as_array().unwrap().iter().map(|joint| &joint["joint"]).collect();
     assert_eq!((joints, &cycles[1]["cutoff_hz"]), (vec![&json!("knee_R"), &json!("ankle_R")], &json!(6.0)));
     let before = service.fetch(&page).await.text;
-    assert!(before.contains("Right knee, walk 2") && !before.contains("orbit of the gait"), "{before}");
+    assert!(before.contains("Right knee, walk 2") && !before.contains("limit cycle of the gait"), "{before}");
     service.post(&format!("{api}/unblind"), &json!({"reason": "all were walked"})).await;
     let after = service.fetch(&page).await.text;
-    assert!(after.contains("orbit of the gait") && !after.contains("Right knee, walk 2"), "{after}");
+    assert!(after.contains("limit cycle of the gait") && !after.contains("Right knee, walk 2"), "{after}");
     service.stop().await;
 }

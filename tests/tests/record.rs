@@ -9,6 +9,7 @@ use gaitwright_store::studies::StudyState;
 use gaitwright_store::{Store, StoreError, backup, read_only};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use std::path::Path;
@@ -213,4 +214,12 @@ async fn backup_of_a_running_service_is_complete_and_usable() {
     again.stop().await;
     std::fs::write(&copy, b"not a database at all").unwrap();
     assert!(read_only::check(&copy).await.is_err());
+}
+
+/// SQL needs the crate `sqlx`.
+#[test]
+fn only_the_store_contains_sql() {
+    for (file, text) in sources::of_server() {
+        assert!(file.starts_with("store/") || !text.contains("sqlx"), "{file}");
+    }
 }

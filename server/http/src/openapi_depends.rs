@@ -19,9 +19,8 @@ const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
 const EMG_FILE: &str = "A file in the format that `format` names, with the columns of the muscles, sampled at 100 Hz or more, with one whole \
                         stride or more. It has all columns and heel strikes that are named in the request.";
-const MOTION_FILE: &str = "A file in the format that `format` names, with the angle of one joint or more over several strides, as optimizer/data/README.md \
-                           describes it.";
-const REFERENCE_FILE: &str = "A file in the format that `format` names, with its columns, as optimizer/data/README.md describes it: five \
+const MOTION_FILE: &str = "A file in the format that `format` names, with the angle of one joint or more over several strides, as `/help/data-files` describes it.";
+const REFERENCE_FILE: &str = "A file in the format that `format` names, with its columns, as `/help/data-files` describes it: five \
                               joint angles over at least one whole stride of a walking person. It has all columns and heel \
                               strikes that are named in the request.";
 
