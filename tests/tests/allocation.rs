@@ -666,7 +666,7 @@ async fn archive_omits_concealed_allocations_and_a_session_without_one_cannot_be
 }
 
 #[tokio::test]
-async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_and_the_device_is_not() {
+async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_device_is_not() {
     let (_folder, service) = callers::service().await;
     let (study, trials) = finished(&service).await;
     let clinician = signed_in(&service, Role::Clinician).await;
@@ -718,7 +718,7 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_and_the_d
 }
 
 #[tokio::test]
-async fn file_fetched_by_a_token_unblinds_everybody_and_by_the_device_nobody() {
+async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
     let (_folder, service) = one_service().await;
     let (study, trials) = finished(&service).await;
     let person = gaitwright_service::access::Caller::person(UserId::fresh(), "Ada", Role::Clinician);

@@ -42,7 +42,7 @@ async fn waits_at_home(service: &Service) -> bool {
 }
 
 #[tokio::test]
-async fn staff_clear_a_rater_report_that_stays_in_the_record() {
+async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     let (_folder, service, study) = started(FeedbackMode::Human, 4).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
