@@ -24,9 +24,9 @@ const ROUNDING_S: f64 = 1e-9;
 const STILL_RAD: f64 = 0.05;
 
 /// The joints of the walker and their columns in Gaitwright's table. Forward lean, flexion and dorsiflexion are
-/// positive; hip angles are relative to the trunk.
+/// positive; hip angles are relative to the torso.
 pub const JOINTS: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
-/// Each joint as a signed sum of columns of OpenSim's gait models. Hips and trunk have two columns.
+/// Each joint as a signed sum of columns of OpenSim's gait models. Hips and torso have two columns.
 const OPENSIM: [(&str, &[(&str, f64)]); 7] = [
     ("torso", &[("pelvis_tilt", -1.0), ("lumbar_extension", -1.0)]),
     ("hip_L", &[("hip_flexion_l", 1.0), ("lumbar_extension", -1.0)]),
@@ -82,7 +82,7 @@ impl JointRecording {
             for (column, sign) in columns {
                 let values = match file.table.find(column) {
                     Some(values) => values,
-                    // Without a lumbar joint, the pelvis stands for the trunk.
+                    // Without a lumbar joint, the pelvis stands for the torso.
                     None if *column == "lumbar_extension" => continue,
                     None => return None,
                 };

@@ -108,6 +108,9 @@ impl TunedBounds {
             };
             let (name, value) = item.split_once('=').ok_or_else(|| malformed("expected NAME=VALUE, as in a5=0.013"))?;
             let (name, value) = (name.trim(), value.trim());
+            if !Self::NAMES.contains(&name) {
+                return Err(malformed(&format!("{name:?} is not a bound; the bounds are {}", Self::NAMES.join(", "))));
+            }
             let value: f64 = value.parse().map_err(|_| malformed("the value is not a number"))?;
             if seen.contains(&name) {
                 return Err(malformed("this bound is given twice"));

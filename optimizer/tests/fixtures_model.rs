@@ -117,7 +117,7 @@ fn muscles_match_independent_values() {
 }
 
 #[test]
-fn impacts() {
+fn impacts_match_independent_values() {
     for number in [1, 2] {
         let data = fixture(number);
         let model = WalkerModel::new(&Subject::builtin(number).unwrap(), &Device::ampro3().unwrap()).unwrap();

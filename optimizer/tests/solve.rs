@@ -30,7 +30,7 @@ fn solved(problem: &GaitProblem, warm: Option<&WarmStart>, max_iterations: usize
 static COLD: LazyLock<SolveOutcome> = LazyLock::new(|| solved(&problem(""), None, 400));
 
 #[test]
-fn cold_then_warm() {
+fn warm_start_converges_after_a_cold_solve() {
     let report = &COLD.report;
     assert_eq!((report.status, report.started_from), (SolveStatus::Converged, StartedFrom::Cold));
     assert!(report.max_violation <= 1e-6 && COLD.violations.is_empty());

@@ -352,12 +352,12 @@ mod tests {
     const THING: &str = "/components/schemas/Thing";
 
     #[test]
-    fn nothing_changed_is_no_difference() {
+    fn equal_descriptions_have_no_difference() {
         assert_eq!(compare(&description(), &description()), super::Difference::default());
     }
 
     #[test]
-    fn what_a_client_stumbles_over_is_a_break() {
+    fn incompatible_change_is_a_break() {
         for (place, value, said) in [
             ("/paths/~1things".to_owned(), Value::Null, "the operation is gone"),
             (format!("{OPERATION}/operationId"), json!("make_thing"), "its name"),
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_client_need_not_know_is_an_addition() {
+    fn compatible_change_is_an_addition() {
         for (place, value) in [
             ("/paths/~1more".to_owned(), json!({ "get": {} })),
             (format!("{OPERATION}/responses/409"), json!({})),

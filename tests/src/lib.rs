@@ -5,20 +5,20 @@
 
 pub mod analytic;
 pub mod archives;
-pub mod away;
+pub mod bodies_from_schema;
 pub mod broker;
 pub mod callers;
 pub mod certified;
 pub mod cli;
 pub mod client;
 pub mod compatibility;
-pub mod consistent;
-pub mod drawn;
+pub mod consistent_gaits;
+pub mod engine_without_workers;
 pub mod every_table;
 pub mod explained;
 pub mod large;
 pub mod measured;
-pub mod orders;
+pub mod read_allocations;
 pub mod scripted;
 pub mod service;
 pub mod skipped;

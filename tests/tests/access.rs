@@ -150,7 +150,7 @@ const PAGES: [(&str, Option<Right>); 72] = [
 ];
 
 #[tokio::test]
-async fn every_page_is_shown_to_those_who_may_see_it() {
+async fn every_page_is_shown_to_users_with_its_right() {
     let listed = include_str!("../../server/http/src/pages/mod.rs");
     let (_folder, service) = service().await;
     let callers = everybody(&service).await;
@@ -208,7 +208,7 @@ fn form_of(fields: &[(String, String)]) -> String {
 }
 
 #[tokio::test]
-async fn answer_after_the_end_of_the_sign_in_session_is_neither_stored_nor_lost() {
+async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     let (_folder, mut service) = service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 3)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -258,7 +258,7 @@ async fn answer_after_the_end_of_the_sign_in_session_is_neither_stored_nor_lost(
 }
 
 #[tokio::test]
-async fn a_refusal_offers_no_way_that_is_closed() {
+async fn error_page_links_only_to_permitted_pages() {
     let (_folder, service) = service().await;
     let main = |page: &str| page.contains("<nav aria-label=\"Main\">");
     for (role, staff) in [(Role::Rater, false), (Role::Clinician, true)] {
@@ -276,7 +276,7 @@ async fn a_refusal_offers_no_way_that_is_closed() {
 }
 
 #[tokio::test]
-async fn a_link_signs_in_once_and_a_password_after_that() {
+async fn sign_in_link_works_once_and_then_the_password() {
     let (_folder, service) = service().await;
     let (_, link) = user(&service, "Ada", Role::Admin).await;
     let path = format!("/sign-in/{link}");
@@ -312,7 +312,7 @@ async fn a_link_signs_in_once_and_a_password_after_that() {
 }
 
 #[tokio::test]
-async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
+async fn password_change_requires_the_old_password_or_a_recent_link() {
     let (_folder, service) = service().await;
     let (id, link) = user(&service, "Ada", Role::Clinician).await;
     let come = |link: &str| {
@@ -362,7 +362,7 @@ async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
 }
 
 #[tokio::test]
-async fn wrong_passwords_wait_longer_and_longer_and_leave_their_mark() {
+async fn wrong_passwords_wait_longer_each_time_and_are_audited() {
     let (_folder, service) = service().await;
     let (id, _) = user(&service, "Ada", Role::Clinician).await;
     let hashed = secret::hash_password("correct horse battery").unwrap();
@@ -385,7 +385,7 @@ async fn wrong_passwords_wait_longer_and_longer_and_leave_their_mark() {
 }
 
 #[tokio::test]
-async fn sessions_end_when_idle_when_disabled_and_tokens_when_revoked() {
+async fn sessions_end_if_idle_or_disabled_and_tokens_if_revoked() {
     let (_folder, mut service) = service().await;
     let admin = signed_in(&service, Role::Admin).await;
     let clinician = signed_in(&service, Role::Clinician).await;
@@ -423,7 +423,7 @@ async fn sessions_end_when_idle_when_disabled_and_tokens_when_revoked() {
 }
 
 #[tokio::test]
-async fn a_signed_in_browser_that_hides_its_origin_may_not_change_anything() {
+async fn signed_in_browser_without_an_origin_cannot_change_anything() {
     let (_folder, service) = service().await;
     let As::Session(secret) = signed_in(&service, Role::Admin).await else { panic!() };
     for (header_name, value, expected) in [
@@ -445,7 +445,7 @@ async fn a_signed_in_browser_that_hides_its_origin_may_not_change_anything() {
 }
 
 #[tokio::test]
-async fn every_answer_carries_the_security_headers() {
+async fn every_response_has_the_security_headers() {
     let (_folder, service) = service().await;
     for path in ["/sign-in", "/", "/api/v1/studies", "/static/gaitwright.css", "/nothing"] {
         let answer = send(&service, &As::Nobody, &Method::GET, path, "", "").await;
@@ -472,7 +472,7 @@ async fn every_answer_carries_the_security_headers() {
 }
 
 #[tokio::test]
-async fn guesses_at_the_same_time_are_as_few_as_one_after_the_other() {
+async fn parallel_guesses_are_limited_like_sequential_ones() {
     let (_folder, service) = service().await;
     let (_, _) = user(&service, "Ada", Role::Admin).await;
     let guess = |number: u32| {
@@ -487,14 +487,14 @@ async fn guesses_at_the_same_time_are_as_few_as_one_after_the_other() {
 }
 
 #[tokio::test]
-async fn programs_are_not_sent_to_a_form() {
+async fn programs_are_not_redirected_to_the_sign_in_form() {
     let (_folder, service) = service().await;
     let figures = service.fetch("/metrics").await;
     assert_eq!((figures.status, figures.content_type()), (StatusCode::UNAUTHORIZED, "application/problem+json"));
 }
 
 #[tokio::test]
-async fn two_users_do_not_have_names_of_one_person() {
+async fn users_cannot_have_names_that_look_alike() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let add = async |name: &str| service.post("/api/v1/users", &json!({"name": name, "role": "rater"})).await;

@@ -70,7 +70,7 @@ async fn with_study() -> (TempDir, Service, StudyId) {
 }
 
 #[tokio::test]
-async fn every_route_that_shows_subject_data_leaves_a_row() {
+async fn every_view_of_subject_data_is_logged() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let routes = read_routes();
@@ -102,7 +102,7 @@ async fn every_route_that_shows_subject_data_leaves_a_row() {
 }
 
 #[tokio::test]
-async fn every_change_that_answers_with_subject_data_leaves_a_row() {
+async fn every_change_that_returns_subject_data_is_logged() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let changes: Vec<_> = operations().into_iter().filter(|(method, _)| *method != Method::GET).collect();
@@ -126,7 +126,7 @@ async fn every_change_that_answers_with_subject_data_leaves_a_row() {
 }
 
 #[tokio::test]
-async fn token_that_may_not_read_is_logged_when_a_change_shows_it_a_study() {
+async fn token_without_read_right_is_logged_when_a_change_returns_a_study() {
     let (_folder, service, study) = with_study().await;
     let runs = token(&service, &[Right::Run]).await;
     let subject = service.subject().await;
@@ -153,7 +153,7 @@ async fn token_that_may_not_read_is_logged_when_a_change_shows_it_a_study() {
 }
 
 #[tokio::test]
-async fn views_exports_and_refusals_name_who_what_and_whose() {
+async fn log_rows_name_caller_object_and_subject() {
     let (_folder, service, study) = with_study().await;
     let (clinician, admin) = (signed_in(&service, Role::Clinician).await, signed_in(&service, Role::Admin).await);
     let script = token(&service, &[Right::Rate]).await;
@@ -224,7 +224,7 @@ async fn views_exports_and_refusals_name_who_what_and_whose() {
 }
 
 #[tokio::test]
-async fn every_spelling_refused_forms_and_second_subjects_are_logged() {
+async fn every_spelling_of_an_identifier_every_refused_form_and_every_second_subject_is_logged() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let first = service.study(|new| new.trial_budget = 2).await;
@@ -272,7 +272,7 @@ fn answer_is_success(status: StatusCode) -> bool {
 }
 
 #[tokio::test]
-async fn views_are_written_within_seconds_without_being_asked_for() {
+async fn views_are_logged_within_seconds() {
     let (_folder, service, study) = with_study().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     send(&service, &clinician, &Method::GET, &format!("/studies/{study}"), FORM, "").await;
@@ -287,7 +287,7 @@ async fn views_are_written_within_seconds_without_being_asked_for() {
 }
 
 #[tokio::test]
-async fn access_log_is_append_only_and_pruned_by_age_alone() {
+async fn access_log_is_append_only_and_pruned_by_age_only() {
     let (_folder, service, study) = with_study().await;
     let mut writer = service.store.write().await.unwrap();
     for days in [400, 399, 10] {
@@ -325,7 +325,7 @@ fn view(study: StudyId, object: &str) -> Access {
 }
 
 #[tokio::test]
-async fn command_line_export_and_backup_leave_rows_also_while_the_service_runs() {
+async fn command_line_export_and_backup_are_logged_while_the_service_runs() {
     let (folder, service, study) = with_study().await;
     let run = |words: &str| {
         let arguments: Vec<&str> = words.split(' ').collect();
@@ -346,7 +346,7 @@ async fn command_line_export_and_backup_leave_rows_also_while_the_service_runs()
 }
 
 #[tokio::test]
-async fn corrected_height_and_mass_reach_new_studies_only() {
+async fn corrected_height_and_mass_apply_to_new_studies_only() {
     let (_folder, service, study) = with_study().await;
     let admin = signed_in(&service, Role::Admin).await;
     let subject = service.subject().await;

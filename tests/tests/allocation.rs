@@ -16,8 +16,8 @@ use gaitwright_store::{
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, signed_in, token};
-use gaitwright_tests::consistent::Consistent;
-use gaitwright_tests::orders::{gait_one_first, sides};
+use gaitwright_tests::consistent_gaits::Consistent;
+use gaitwright_tests::read_allocations::{gait_one_first, sides};
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::skipped::skipped;
 use gaitwright_tests::sources;
@@ -127,7 +127,7 @@ fn leads(orders: &[bool]) -> Vec<i32> {
 }
 
 #[tokio::test]
-async fn sessions_planned_walked_and_unblinded_in_turn_stay_balanced() {
+async fn sessions_unblinded_one_after_another_stay_balanced() {
     let (_folder, service) = one_service().await;
     let (study, _) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -155,7 +155,7 @@ async fn sessions_planned_walked_and_unblinded_in_turn_stay_balanced() {
 
 /// Minutes, so only with `GAITWRIGHT_LONG_TESTS=1`.
 #[tokio::test]
-async fn orders_of_10_000_sessions_are_balanced_whether_or_not_they_are_unblinded_in_turn() {
+async fn allocations_of_10_000_sessions_are_balanced_in_any_order_of_unblinding() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
         skipped("set GAITWRIGHT_LONG_TESTS=1");
         return;
@@ -192,7 +192,7 @@ async fn orders_of_10_000_sessions_are_balanced_whether_or_not_they_are_unblinde
 
 /// Four sessions are open together, and all but one are unblinded.
 #[tokio::test]
-async fn unblinded_session_says_nothing_about_one_that_is_still_concealed() {
+async fn unblinded_session_reveals_nothing_about_a_concealed_one() {
     let (_folder, service) = one_service().await;
     let (study, _) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -223,7 +223,7 @@ async fn unblinded_session_says_nothing_about_one_that_is_still_concealed() {
 }
 
 #[tokio::test]
-async fn sides_of_10_000_pairs_are_balanced_and_follow_from_no_earlier_pair() {
+async fn sides_of_10_000_pairs_are_balanced_and_independent_of_earlier_pairs() {
     let (_folder, service) = one_service().await;
     let (study, trials) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -256,7 +256,7 @@ async fn sides_of_10_000_pairs_are_balanced_and_follow_from_no_earlier_pair() {
 }
 
 #[tokio::test]
-async fn allocations_do_not_follow_from_the_seed() {
+async fn allocations_do_not_depend_on_the_seed() {
     let (_folder, service) = one_service().await;
     let mut first_sessions = Vec::new();
     for _ in 0..24 {
@@ -342,7 +342,7 @@ fn guesses(seen: &Seen, table: &str) -> Vec<(String, Vec<bool>)> {
 }
 
 #[tokio::test]
-async fn program_that_reads_all_but_allocations_guesses_1_000_allocations_at_chance() {
+async fn program_that_reads_everything_else_guesses_1_000_allocations_at_chance() {
     let (_folder, service) = one_service().await;
     let (study, _) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -410,7 +410,7 @@ fn by_hash(sha256: &str, session: &str, created_at: &str) -> Option<bool> {
 }
 
 #[tokio::test]
-async fn best_guesser_who_sees_every_unblinded_allocation_is_right_four_times_of_seven() {
+async fn best_guesser_with_all_unblinded_allocations_is_right_in_four_of_seven() {
     let (_folder, service) = one_service().await;
     let (study, _) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
@@ -621,7 +621,7 @@ async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() 
 }
 
 #[tokio::test]
-async fn archive_omits_blinded_allocations_and_a_session_without_one_cannot_be_unblinded() {
+async fn archive_omits_concealed_allocations_and_a_session_without_one_cannot_be_unblinded() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let (study, trials) = finished(&service).await;
@@ -666,7 +666,7 @@ async fn archive_omits_blinded_allocations_and_a_session_without_one_cannot_be_u
 }
 
 #[tokio::test]
-async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_device_is_not() {
+async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_device_is_not() {
     let (_folder, service) = callers::service().await;
     let (study, trials) = finished(&service).await;
     let clinician = signed_in(&service, Role::Clinician).await;
@@ -718,7 +718,7 @@ async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_dev
 }
 
 #[tokio::test]
-async fn file_that_a_token_fetched_leaves_nobody_blind_and_the_devices_own_leaves_everybody_so() {
+async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
     let (_folder, service) = one_service().await;
     let (study, trials) = finished(&service).await;
     let person = gaitwright_service::access::Caller::person(UserId::fresh(), "Ada", Role::Clinician);
@@ -742,7 +742,7 @@ async fn file_that_a_token_fetched_leaves_nobody_blind_and_the_devices_own_leave
 }
 
 #[tokio::test]
-async fn person_who_fetched_a_controller_file_rates_that_study_not_blind() {
+async fn answers_of_a_person_who_fetched_a_controller_file_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -765,7 +765,7 @@ async fn person_who_fetched_a_controller_file_rates_that_study_not_blind() {
 }
 
 #[tokio::test]
-async fn a_controller_file_is_refused_alike_for_both_walks_whichever_gait_is_refused() {
+async fn refused_controller_file_does_not_reveal_which_gait_is_unsafe() {
     let (_folder, service) = one_service().await;
     let (study, trials) = finished(&service).await;
     let plan = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
@@ -783,7 +783,7 @@ async fn a_controller_file_is_refused_alike_for_both_walks_whichever_gait_is_ref
 }
 
 #[tokio::test]
-async fn no_motion_of_a_rater_has_the_bytes_of_an_earlier_one() {
+async fn every_motion_for_a_rater_has_different_bytes() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 14)).await;
     let rater = rater_of(&service, &[study]).await;
@@ -830,7 +830,7 @@ async fn no_motion_of_a_rater_has_the_bytes_of_an_earlier_one() {
 }
 
 #[tokio::test]
-async fn anonymous_callers_cannot_see_what_is_solved() {
+async fn anonymous_callers_cannot_see_running_solves() {
     let (_folder, service) = callers::service().await;
     let health = get(&service, &As::Nobody, "/health").await.json();
     let fields: Vec<_> = health.as_object().unwrap().keys().collect();
@@ -845,7 +845,7 @@ async fn anonymous_callers_cannot_see_what_is_solved() {
 }
 
 #[test]
-fn only_the_modules_of_allocations_name_their_tables() {
+fn only_allocation_modules_name_the_allocation_tables() {
     let allowed = ["allocations/mod.rs", "archived_allocations.rs", "archive.rs", "seals.rs"];
     let allowed = allowed.map(|file| format!("store/src/{file}"));
     let mut read = 0;

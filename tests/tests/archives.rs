@@ -11,7 +11,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{Store, StudyId, now};
 use gaitwright_tests::archives::{exported, import, import_trusting};
 use gaitwright_tests::cli;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -417,7 +417,7 @@ const FORGERIES: [Forgery; 68] = [
     (
         "an answer by a name with spaces around it",
         |r| of_source(r, "clinician")["author"] = " Nina".into(),
-        "which is not a name without surrounding spaces",
+        "which has leading or trailing spaces",
     ),
     (
         "an answer by an invisible name",
@@ -530,7 +530,7 @@ const MORE: [Forgery; 9] = [
 ];
 
 #[tokio::test]
-async fn a_review_from_a_clock_that_was_ahead_does_not_cover_later_reports() {
+async fn review_made_with_a_fast_clock_does_not_cover_later_reports() {
     let (folder, service, study, _) = study().await;
     let listed = format!("/api/v1/studies/{study}/safety-reports");
     let gait = service.fetch(&listed).await.items()[0]["trial_id"].as_str().unwrap().to_owned();
@@ -563,7 +563,7 @@ async fn a_review_from_a_clock_that_was_ahead_does_not_cover_later_reports() {
 }
 
 #[tokio::test]
-async fn forged_archives_are_refused_by_name_and_change_nothing() {
+async fn forged_archive_is_refused_with_the_wrong_row_and_changes_nothing() {
     let (folder, service, study, file) = study().await;
     service.stop().await;
     let whole = Rows::of(&file);
@@ -586,7 +586,7 @@ async fn forged_archives_are_refused_by_name_and_change_nothing() {
 
 /// Forgeries that no rule can detect: only a signature vouches for answers.
 #[tokio::test]
-async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_marked() {
+async fn only_a_trusted_signature_confirms_answers_and_an_unsigned_study_is_marked() {
     let (folder, service, study, file) = study().await;
     let key = SigningKey::read(&SigningKey::generate().unwrap()).unwrap();
     let (own, other) = (key.public(), SigningKey::read(&SigningKey::generate().unwrap()).unwrap().public());
@@ -667,7 +667,7 @@ fn with_end_of(rows: &[u8], other: &[u8]) -> Vec<u8> {
 }
 
 #[tokio::test]
-async fn rows_without_their_gait_are_counted_and_rows_that_are_not_their_hash_are_refused() {
+async fn archive_rows_without_gait_are_counted_and_rows_with_a_wrong_hash_are_refused() {
     let (folder, service, study, file) = study().await;
     service.stop().await;
     let mut rows = Rows::of(&file);
@@ -690,7 +690,7 @@ async fn rows_without_their_gait_are_counted_and_rows_that_are_not_their_hash_ar
 }
 
 #[tokio::test]
-async fn an_entity_that_is_known_with_other_content_is_refused_by_name() {
+async fn archive_with_different_content_for_a_known_identifier_is_refused() {
     let (folder, service, study, file) = study().await;
     let person = service.subject().await;
     service.stop().await;
@@ -723,7 +723,7 @@ async fn an_entity_that_is_known_with_other_content_is_refused_by_name() {
 }
 
 #[tokio::test]
-async fn study_of_a_built_in_subject_is_imported_into_a_record_that_has_it_already() {
+async fn study_of_a_built_in_subject_is_imported_into_a_record_with_that_subject() {
     let (folder, service, study, file) = study().await;
     let there = service.subject().await;
     service.stop().await;
@@ -740,7 +740,7 @@ async fn study_of_a_built_in_subject_is_imported_into_a_record_that_has_it_alrea
 }
 
 #[tokio::test]
-async fn a_row_that_was_changed_by_another_hand_is_not_exported() {
+async fn row_changed_by_another_program_is_not_exported() {
     let (_folder, service, study, _) = study().await;
     let path = service.store.path().to_owned();
     service.stop().await;
@@ -800,7 +800,7 @@ const GIGABYTE: usize = 1 << 30;
 
 #[cfg(target_os = "linux")]
 #[tokio::test]
-async fn bombs_are_refused_within_bounded_memory() {
+async fn decompression_bombs_are_refused_within_bounded_memory() {
     let (folder, service, _, file) = study().await;
     service.stop().await;
     let whole = Rows::of(&file);
@@ -978,7 +978,7 @@ async fn bombs_are_refused_within_bounded_memory() {
 }
 
 #[tokio::test]
-async fn the_command_line_signs_and_trusts() {
+async fn command_line_signs_archives_and_checks_trusted_keys() {
     let (folder, service, study, _) = study().await;
     service.stop().await;
     let run = |arguments: &[&str]| {

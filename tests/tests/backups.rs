@@ -63,7 +63,7 @@ async fn damaged_record_is_not_backed_up_and_a_damaged_backup_is_not_restored() 
 }
 
 #[tokio::test]
-async fn scheduled_backup_of_a_damaged_record_fails_and_keeps_the_last_good_one() {
+async fn scheduled_backup_of_a_damaged_record_fails_and_keeps_the_last_good_backup() {
     let folder = tempfile::tempdir().unwrap();
     let (database, out) = (folder.path().join("a.db"), tempfile::tempdir().unwrap());
     record(&database).await;
@@ -153,7 +153,7 @@ async fn second_anchor_that_is_another_file_is_refused_and_left_alone() {
 }
 
 #[tokio::test]
-async fn file_that_takes_the_place_of_an_open_anchor_is_not_overwritten() {
+async fn file_that_replaced_an_open_anchor_is_not_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let (database, elsewhere) = (folder.path().join("a.db"), folder.path().join("b.anchor"));
     let store = Store::open_anchored(&database, Some(&elsewhere)).await.unwrap();
@@ -189,7 +189,7 @@ async fn leftovers_of_killed_backups_are_removed_by_the_next_backup_to_the_same_
 }
 
 #[tokio::test]
-async fn full_disk_of_a_backup_is_named_and_not_taken_for_that_of_the_record() {
+async fn full_backup_disk_is_not_reported_as_a_full_record_disk() {
     let (folder, database) = filled().await;
     std::fs::create_dir(folder.path().join("full")).unwrap();
     let script = format!(

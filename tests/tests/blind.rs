@@ -12,7 +12,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{self, As, member, rater_of, send, signed_in};
-use gaitwright_tests::orders::sides;
+use gaitwright_tests::read_allocations::sides;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -122,7 +122,7 @@ async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &s
 }
 
 #[tokio::test]
-async fn every_answer_of_a_rater_reaches_the_learner_repeats_included() {
+async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let (_folder, service) = callers::service().await;
     let (rater, admin) = (rater_of(&service, &[]).await, signed_in(&service, Role::Admin).await);
     // One pair in ten is a repeat, by chance: one study in sixty has none.
@@ -165,7 +165,7 @@ async fn every_answer_of_a_rater_reaches_the_learner_repeats_included() {
 }
 
 #[tokio::test]
-async fn rater_answer_counts_for_the_gait_shown_on_that_side() {
+async fn rater_answer_counts_for_the_gait_shown_on_its_side() {
     let (_folder, service) = callers::service().await;
     let rater = signed_in(&service, Role::Rater).await;
     let mut swapped = std::collections::BTreeSet::new();
@@ -210,7 +210,7 @@ impl Evaluate for Tall {
 }
 
 #[tokio::test]
-async fn each_side_of_a_pair_is_the_motion_of_the_gait_that_was_drawn_for_it() {
+async fn each_side_shows_the_gait_drawn_for_it() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Tall(Analytic::default()), 1).await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 24)).await;
@@ -243,7 +243,7 @@ async fn each_side_of_a_pair_is_the_motion_of_the_gait_that_was_drawn_for_it() {
 }
 
 #[tokio::test]
-async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
+async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 40)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -275,7 +275,7 @@ async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
 }
 
 #[tokio::test]
-async fn a_rater_who_was_a_clinician_before_is_recorded_as_not_blind() {
+async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -301,7 +301,7 @@ async fn a_rater_who_was_a_clinician_before_is_recorded_as_not_blind() {
 }
 
 #[tokio::test]
-async fn a_rater_who_may_read_by_the_time_of_the_answer_is_recorded_as_not_blind() {
+async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -318,7 +318,7 @@ async fn a_rater_who_may_read_by_the_time_of_the_answer_is_recorded_as_not_blind
 }
 
 #[tokio::test]
-async fn skipped_pairs_are_not_asked_again_and_unsafe_gaits_are_not_shown_again() {
+async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
     let (_folder, service, study) = waiting(12).await;
     let mut unsafe_trial = None;
     let mut turn = 0;
@@ -360,7 +360,7 @@ async fn skipped_pairs_are_not_asked_again_and_unsafe_gaits_are_not_shown_again(
 }
 
 #[tokio::test]
-async fn unblinding_needs_a_reason_is_in_the_audit_trail_and_marks_what_follows() {
+async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -395,7 +395,7 @@ async fn unblinding_needs_a_reason_is_in_the_audit_trail_and_marks_what_follows(
 }
 
 #[tokio::test]
-async fn the_last_answer_can_be_retracted_once_and_counts_no_more() {
+async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
     const FORM: &str = "application/x-www-form-urlencoded";
     let (_folder, service, study) = waiting(6).await;
     let pair = next(&service, study).await;

@@ -189,7 +189,7 @@ fn named(headers: &HeaderMap) -> Vec<(String, String)> {
 }
 
 #[tokio::test]
-async fn a_pair_that_is_asked_again_looks_like_a_new_one_even_where_others_answer_the_same() {
+async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
     let (_folder, service) = service().await;
     let study = waiting(&service, 40).await;
     let (rater, clinician) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Clinician).await);
@@ -252,7 +252,7 @@ async fn answer_too(service: &Service, clinician: &As, study: StudyId, shown: &P
 }
 
 #[tokio::test]
-async fn taking_back_what_somebody_else_took_back_is_no_matter_of_its_kind() {
+async fn rater_retracts_an_answer_that_a_clinician_retracted_and_sees_no_difference() {
     let (_folder, service) = service().await;
     let study = waiting(&service, 6).await;
     let (rater, clinician) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Clinician).await);

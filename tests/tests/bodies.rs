@@ -28,7 +28,7 @@ fn form(changes: &[(&str, &str)]) -> String {
 }
 
 #[tokio::test]
-async fn a_device_is_made_of_another_one_and_errors_stand_at_their_field() {
+async fn device_is_copied_from_another_and_errors_appear_at_their_field() {
     let (_folder, service) = service().await;
     let before = service.fetch("/api/v1/devices").await.items();
     let path = format!("/devices/{}", before[0]["id"].as_str().unwrap());
@@ -69,7 +69,7 @@ async fn a_device_is_made_of_another_one_and_errors_stand_at_their_field() {
 }
 
 #[tokio::test]
-async fn muscles_of_a_person_are_written_down_and_new_studies_take_them_up() {
+async fn new_studies_use_the_recorded_muscles_of_their_subject() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
     let before = service.study(|new| new.trial_budget = 1).await;

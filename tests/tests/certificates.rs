@@ -33,7 +33,7 @@ fn refused(folder: &Path, arguments: &[&str], expected: &str) {
 }
 
 #[test]
-fn a_gait_is_solved_certified_and_converted() {
+fn commands_solve_certify_and_convert_a_gait() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let solve = ["solve", "--muscles", "off", "--mesh", "2,2,3,5", "--certify", "--json", "--out", "gait.json"];
@@ -79,7 +79,7 @@ fn a_gait_is_solved_certified_and_converted() {
 }
 
 #[test]
-fn files_that_are_no_gaits_or_recordings_are_refused() {
+fn files_other_than_gaits_and_recordings_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     refused(folder, &["certify", "nowhere.json"], "Cannot read nowhere.json");
@@ -98,7 +98,7 @@ fn files_that_are_no_gaits_or_recordings_are_refused() {
 }
 
 #[tokio::test]
-async fn a_trial_gets_its_certificate_once() {
+async fn trial_is_certified_once() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
     let study = service
@@ -132,7 +132,7 @@ async fn a_trial_gets_its_certificate_once() {
     let controller = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
     assert_eq!(controller.json()["certificate_passed"], certificate.json()["passed"]);
     assert_eq!(ControllerFile::from_json(&controller.text).unwrap().domains.len(), 8);
-    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("device-trial-1.json"));
+    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("controller-trial-1.json"));
     let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json?rate_hz=1", trial.id)).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
     assert!(refused.text.contains("rate_hz") && page.contains("/controller.json"), "{}", refused.text);

@@ -76,7 +76,7 @@ fn elsewhere(trial: &Trial) -> f64 {
 }
 
 #[tokio::test]
-async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
+async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let folder = tempfile::tempdir().unwrap();
     let scene = Scene::set(folder.path()).await;
     let Scene { service, finished, draft, script, human } = &scene;
@@ -200,7 +200,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     };
     let header = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad".to_owned();
     let recording = std::iter::once(header).chain((0..440).map(row)).collect::<Vec<_>>().join("\n");
-    let reference = json!({"name": "R", "form": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
+    let reference = json!({"name": "R", "format": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
     scene.one(done, "post /reference-gaits", &format!("{api}/reference-gaits"), reference).await;
 
     let plan = format!("{api}/studies/{finished}/lab-sessions");
@@ -274,7 +274,7 @@ fn essence(trials: &[Trial], heard: &[FeedbackRow]) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn form_rest_and_unattended_loop_leave_the_same_rows_for_the_same_answers() {
+async fn form_rest_and_unattended_run_write_the_same_rows_for_the_same_answers() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let automatic = service.study(|new| new.trial_budget = 12).await;

@@ -12,7 +12,7 @@ use gaitwright_tests::well_formed::WellFormed;
 use serde_json::json;
 
 #[tokio::test]
-async fn a_report_after_a_review_closes_the_gait_although_the_clock_was_set_back() {
+async fn report_after_a_review_applies_although_the_clock_was_set_back() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, WellFormed::default(), 1).await;

@@ -10,14 +10,14 @@ use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::cli;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::measured::motion;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::time::Duration;
 
 #[tokio::test]
-async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
+async fn withdrawal_stops_all_writes_and_exports() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(20)), 1).await;
     let person = service.subject().await;
@@ -198,7 +198,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
 }
 
 #[tokio::test]
-async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
+async fn subject_page_records_and_withdraws_consent() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(20)), 1).await;
     let running = service.study(|new| new.trial_budget = 50).await;
@@ -230,7 +230,7 @@ async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
 }
 
 #[tokio::test]
-async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() {
+async fn studies_of_a_withdrawn_subject_cannot_be_exported_or_imported() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let person = service.subject().await;
@@ -266,7 +266,7 @@ async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() 
 }
 
 #[tokio::test]
-async fn answers_kept_for_repeated_requests_are_not_given_out_after_withdrawal() {
+async fn saved_responses_of_repeated_requests_are_withheld_after_withdrawal() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let finished = service.study(|new| new.trial_budget = 3).await;

@@ -42,7 +42,7 @@ fn begins_formula(cell: &str) -> bool {
 }
 
 #[tokio::test]
-async fn no_csv_endpoint_gives_a_formula() {
+async fn csv_endpoints_return_no_formulas() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Mixed)).await;

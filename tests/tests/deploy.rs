@@ -42,7 +42,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn the_container_gets_everything_that_is_built_and_nothing_that_is_not_there() {
+fn container_file_copies_every_source_folder_and_only_existing_ones() {
     let root = root();
     let copied = copied();
     for path in &copied {
@@ -86,7 +86,7 @@ fn the_container_gets_everything_that_is_built_and_nothing_that_is_not_there() {
 }
 
 #[test]
-fn the_container_runs_what_it_builds() {
+fn container_runs_the_program_that_it_builds() {
     let build = lines("RUN").into_iter().find(|words| words[0] == "cargo").unwrap();
     assert_eq!(build, ["cargo", "build", "--release", "--locked", "--package", "gaitwright"]);
     let built = lines("COPY").into_iter().find(|words| words[0] == "--from=build").unwrap();
@@ -102,7 +102,7 @@ fn the_container_runs_what_it_builds() {
 }
 
 #[test]
-fn default_container_command_starts_with_an_empty_volume_and_lets_the_administrator_in() {
+fn default_container_command_starts_on_an_empty_volume_and_prints_a_sign_in_link() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = lines("CMD").remove(0);
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
@@ -128,7 +128,7 @@ fn default_container_command_starts_with_an_empty_volume_and_lets_the_administra
 }
 
 #[test]
-fn the_unit_starts_the_program_with_settings_that_it_knows() {
+fn unit_starts_the_program_with_known_settings() {
     let setting = |name: &str| UNIT.lines().find_map(|line| line.strip_prefix(name)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("gaitwright.toml"), "").unwrap();
@@ -150,7 +150,7 @@ fn the_unit_starts_the_program_with_settings_that_it_knows() {
 }
 
 #[test]
-fn systemd_finds_no_fault_in_the_unit() {
+fn systemd_accepts_the_unit() {
     let folder = tempfile::tempdir().unwrap();
     let unit = folder.path().join("gaitwright.service");
     std::fs::write(&unit, UNIT.replace("/usr/local/bin/gaitwright", BINARY)).unwrap();

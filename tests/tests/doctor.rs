@@ -35,7 +35,7 @@ async fn change(database: &Path, sql: &str) {
 }
 
 #[test]
-fn healthy_machine_without_a_record_is_described_and_nothing_is_made() {
+fn doctor_describes_a_machine_without_a_record_and_creates_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let (code, lines) = doctor(folder.path(), &[]);
     assert_eq!(code, Some(0), "{lines:?}");
@@ -47,7 +47,7 @@ fn healthy_machine_without_a_record_is_described_and_nothing_is_made() {
 }
 
 #[tokio::test]
-async fn clock_that_was_set_back_is_named() {
+async fn doctor_reports_a_clock_that_was_set_back() {
     let (folder, database) = filled().await;
     let (code, lines) = doctor(folder.path(), &["--database", "a.db"]);
     assert_eq!(code, Some(0), "{lines:?}");
@@ -62,7 +62,7 @@ async fn clock_that_was_set_back_is_named() {
 }
 
 #[tokio::test]
-async fn changed_row_is_named() {
+async fn doctor_reports_a_changed_row() {
     let (folder, database) = filled().await;
     change(&database, "update subjects set notes = 'forged'").await;
     let record = trouble(doctor(folder.path(), &["--database", "a.db"]));
@@ -70,7 +70,7 @@ async fn changed_row_is_named() {
 }
 
 #[test]
-fn unreachable_broker_and_missing_folder_are_named() {
+fn doctor_reports_an_unreachable_broker_and_a_missing_folder() {
     let folder = tempfile::tempdir().unwrap();
     let broker = trouble(doctor(folder.path(), &["--nats", "nats://127.0.0.1:1"]));
     assert!(broker.contains("The NATS broker failed"), "{broker}");
@@ -79,7 +79,7 @@ fn unreachable_broker_and_missing_folder_are_named() {
 }
 
 #[test]
-fn reachable_broker_is_named_with_its_version() {
+fn doctor_reports_the_version_of_a_reachable_broker() {
     let Some(broker) = Broker::start() else { return };
     let folder = tempfile::tempdir().unwrap();
     // The process may not listen yet.

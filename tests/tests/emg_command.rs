@@ -30,7 +30,7 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
 const BY_NORMAL: [&str; 5] = ["walk.csv", "--normal", "normal.csv", "--heel-strike-column", "heel"];
 
 #[test]
-fn a_walk_is_measured_by_normal_walking() {
+fn emg_command_compares_a_walk_with_normal_walking() {
     let folder = recordings();
     insta::assert_snapshot!("emg", done(folder.path(), &BY_NORMAL));
     let files = ["--json", "--cycles", "cycles.csv", "--envelopes", "envelopes.csv"];
@@ -76,7 +76,7 @@ fn columns(path: &Path) -> Vec<(String, Vec<f64>)> {
 }
 
 #[test]
-fn columns_and_filters_can_be_named_and_an_opensim_file_gives_the_same() {
+fn named_columns_and_an_opensim_file_give_the_same_result() {
     let folder = recordings();
     let at = |name: &str| folder.path().join(name);
     let text = electromyogram(1.0);
@@ -85,7 +85,7 @@ fn columns_and_filters_can_be_named_and_an_opensim_file_gives_the_same() {
     let names = "time\te1\te2\te3\te4\te5\te6\tswitch";
     std::fs::write(at("walk.sto"), format!("{head}{names}\n{}\n", rows.join("\n"))).unwrap();
     let filters = ["--json", "--band-low-hz", "30", "--band-high-hz", "400", "--envelope-hz", "5", "--order", "2"];
-    let channels = ["--channels", "TA_L=e2,GAS_L=e4", "--heel-strike-column", "switch", "--form", "opensim"];
+    let channels = ["--channels", "TA_L=e2,GAS_L=e4", "--heel-strike-column", "switch", "--format", "opensim"];
     let sto = done(folder.path(), &[&["walk.sto"], &channels[..], &filters].concat());
     let same = ["--channels", "TA_L=TA_L,GAS_L=GAS_L", "--heel-strike-column", "heel"];
     let csv = done(folder.path(), &[&["normal.csv"], &same[..], &filters].concat());

@@ -9,7 +9,7 @@ use gaitwright_service::access::Role;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::callers::{As, rater_of, send, service, signed_in};
-use gaitwright_tests::orders::gait_one_first;
+use gaitwright_tests::read_allocations::gait_one_first;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;

@@ -103,7 +103,7 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
 }
 
 #[tokio::test]
-async fn an_explanation_is_made_once_for_whoever_asks() {
+async fn repeated_requests_give_one_explanation() {
     let folder = tempfile::tempdir().unwrap();
     let (explainer, solver) = (Clearance::default(), Analytic::slow(Duration::from_millis(20)));
     let counts = explainer.counts.clone();
@@ -248,7 +248,7 @@ async fn refused_explanation_states_its_reason_and_is_not_retried() {
 
 /// The service and the command line give the same explanation, in the same words.
 #[tokio::test]
-async fn the_real_explanation_is_that_of_the_command_line() {
+async fn service_and_command_line_give_the_same_explanation() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
         skipped("set GAITWRIGHT_LONG_TESTS=1");
         return;

@@ -32,7 +32,7 @@ fn linked(page: &str, ending: &str) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn every_figure_of_a_page_is_there_in_every_form() {
+async fn every_figure_of_a_page_is_served_in_every_format() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let mut studies = Vec::new();
@@ -119,10 +119,10 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
 }
 
 #[tokio::test]
-async fn a_reference_of_several_strides_has_its_band_and_one_without_says_so() {
+async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let recording = json!({"name": "S03, level", "form": "csv", "recording": four_strides(100)});
+    let recording = json!({"name": "S03, level", "format": "csv", "recording": four_strides(100)});
     let imported = service.post("/api/v1/reference-gaits", &recording).await;
     assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
     let deviation = imported.json()["definition"]["standard_deviation_rad"][50][3].as_f64().unwrap();
@@ -161,7 +161,7 @@ async fn a_reference_of_several_strides_has_its_band_and_one_without_says_so() {
 }
 
 #[tokio::test]
-async fn a_running_solve_has_its_figure_and_keeps_it_when_it_has_ended() {
+async fn chart_of_a_running_solve_remains_after_its_end() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(std::time::Duration::from_millis(60));
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;

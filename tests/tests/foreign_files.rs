@@ -19,7 +19,7 @@ const LIST: &str = "create table _sqlx_migrations (version bigint primary key, d
                     execution_time bigint not null)";
 
 #[tokio::test]
-async fn the_database_of_another_program_is_refused_and_left_as_it_is() {
+async fn database_of_another_program_is_refused_and_unchanged() {
     let users = format!("{LIST}; insert into _sqlx_migrations values (1, 'users', '2026-01-01', true, x'00', 1)");
     let users: &'static str = users.leak();
     for (sql, why) in [("create table notes (text)", "has the table \"notes\""), (users, "has its own migrations")] {
@@ -50,7 +50,7 @@ async fn the_database_of_another_program_is_refused_and_left_as_it_is() {
 
 /// The file that remains if a process is killed while creating a record.
 #[tokio::test]
-async fn a_record_that_was_hardly_begun_is_made_to_the_end() {
+async fn interrupted_creation_of_a_record_is_completed() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("new.db");
     write(&file, LIST).await;
@@ -58,7 +58,7 @@ async fn a_record_that_was_hardly_begun_is_made_to_the_end() {
 }
 
 #[tokio::test]
-async fn a_link_to_a_record_in_use_is_in_use() {
+async fn link_to_a_record_in_use_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("a.db");
     let store = Store::open(&file).await.unwrap();

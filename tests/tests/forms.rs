@@ -40,7 +40,7 @@ fn is_page(answer: &Answer, status: StatusCode, holds: &str) {
 }
 
 #[tokio::test]
-async fn errors_in_the_browser_are_pages_and_problem_documents_for_programs() {
+async fn browsers_get_error_pages_and_programs_problem_documents() {
     let (_folder, service) = service().await;
     let (study, _, _) = finished(&service).await;
     for (path, status) in [
@@ -63,7 +63,7 @@ async fn errors_in_the_browser_are_pages_and_problem_documents_for_programs() {
 }
 
 #[tokio::test]
-async fn a_body_that_is_too_large_is_called_that() {
+async fn oversized_body_is_refused_as_too_large() {
     let (_folder, service) = service().await;
     let text = "x".repeat((1 << 20) + 1);
     let answer = service.post_text("/api/v1/subjects", "application/json", &text).await;
@@ -74,7 +74,7 @@ async fn a_body_that_is_too_large_is_called_that() {
 }
 
 #[tokio::test]
-async fn a_name_that_suddenly_means_this_machine_is_refused() {
+async fn requests_with_an_unknown_host_are_refused() {
     let (_folder, service) = service().await;
     let with_host = |host: &str| {
         let request = axum::http::Request::get("/api/v1/subjects").header("host", host);
@@ -92,7 +92,7 @@ async fn a_name_that_suddenly_means_this_machine_is_refused() {
 }
 
 #[tokio::test]
-async fn pseudonyms_that_deceive_are_refused() {
+async fn deceptive_pseudonyms_are_refused() {
     let (_folder, service) = service().await;
     let add = async |pseudonym: &str| {
         let body = json!({"pseudonym": pseudonym, "height_m": 1.8, "body_mass_kg": 70.5});
@@ -118,7 +118,7 @@ async fn pseudonyms_that_deceive_are_refused() {
 }
 
 #[tokio::test]
-async fn the_form_for_a_study_takes_no_field_for_granted() {
+async fn study_form_checks_every_field() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
     let send = async |change: (&str, &str)| {
@@ -176,7 +176,7 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
 }
 
 #[tokio::test]
-async fn an_answer_is_retracted_from_its_link_and_in_its_own_study_only() {
+async fn answer_is_retracted_through_its_link_in_its_own_study_only() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let (other, _, _) = finished(&service).await;
@@ -226,7 +226,7 @@ async fn form_sent_twice_with_another_answer_shows_the_recorded_one() {
 }
 
 #[tokio::test]
-async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retracted() {
+async fn second_answer_of_the_same_person_is_refused_until_the_first_is_retracted() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let path = format!("/studies/{study}/compare");
@@ -262,7 +262,7 @@ async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retrac
 }
 
 #[tokio::test]
-async fn answers_of_others_are_shown_with_the_own_one() {
+async fn answers_of_others_are_shown_beside_the_own_answer() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let give = format!("/api/v1/studies/{study}/preferences");
@@ -281,7 +281,7 @@ async fn answers_of_others_are_shown_with_the_own_one() {
 }
 
 #[tokio::test]
-async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
+async fn comparison_page_shows_both_gaits_and_keeps_the_input() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
     let path = format!("/studies/{study}/compare");
@@ -309,7 +309,7 @@ async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
 }
 
 #[tokio::test]
-async fn without_answers_no_action_is_called_the_best() {
+async fn study_without_answers_has_no_best_action() {
     let (_folder, service) = service().await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -325,7 +325,7 @@ async fn without_answers_no_action_is_called_the_best() {
 }
 
 #[tokio::test]
-async fn a_cancelled_trial_is_no_progress() {
+async fn cancelled_trial_does_not_count_as_progress() {
     let folder = tempfile::tempdir().unwrap();
     let slow = Analytic::slow(Duration::from_millis(20));
     let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
@@ -346,7 +346,7 @@ async fn a_cancelled_trial_is_no_progress() {
 }
 
 #[tokio::test]
-async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_side() {
+async fn best_line_starts_at_the_first_gait_with_parallel_trials() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(2)), 3).await;
     for budget in [3, 9] {
@@ -382,7 +382,7 @@ async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_sid
 }
 
 #[tokio::test]
-async fn a_gait_page_explains_its_lines() {
+async fn gait_page_explains_its_lines() {
     let (_folder, service) = service().await;
     let (study, a, _) = finished(&service).await;
     let page = service.fetch(&format!("/trials/{a}")).await.text;
@@ -398,7 +398,7 @@ async fn a_gait_page_explains_its_lines() {
 }
 
 #[tokio::test]
-async fn the_list_of_studies_goes_on_beyond_its_first_page() {
+async fn study_list_has_further_pages() {
     let (_folder, service) = service().await;
     for seed in 0..103 {
         service.study(|new| (new.seed, new.start, new.name) = (seed, false, Some(format!("number {seed}.")))).await;
@@ -504,7 +504,7 @@ async fn refused_forms_name_fields_by_their_labels() {
     let other = "pseudonym=S08&height_m=17.2&body_mass_kg=70";
     let refused = service.post_text("/subjects", FORM, other).await;
     is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Height, m\u{201d} is 17.2; it must be 1.4 to 2.2.");
-    let other = "name=x&form=csv&recording=y&strikes=ends&height_m=tall";
+    let other = "name=x&format=csv&recording=y&strikes=ends&height_m=tall";
     let refused = service.post_text("/reference-gaits", FORM, other).await;
     is_page(
         &refused,
@@ -550,7 +550,7 @@ async fn script_trial_without_a_gait_offers_no_gait() {
 }
 
 #[tokio::test]
-async fn a_study_that_has_ended_gets_more_trials_from_its_page() {
+async fn ended_study_is_extended_on_its_page() {
     let (_folder, service) = service().await;
     let (study, _, _) = finished(&service).await;
     let page = service.fetch(&format!("/studies/{study}")).await.text;
@@ -570,7 +570,7 @@ async fn a_study_that_has_ended_gets_more_trials_from_its_page() {
 }
 
 #[tokio::test]
-async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_field() {
+async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_field() {
     let (_folder, service) = service().await;
     let send = async |body: &str| service.post_text("/users", FORM, body).await;
     assert!(send("act=add_user&name=K1&role=clinician").await.status.is_success());

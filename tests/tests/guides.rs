@@ -208,11 +208,18 @@ async fn every_guide_is_served_with_images_and_links_that_work() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let contents = service.fetch("/help").await;
-    let guides = std::fs::read_dir(repository().join("docs")).unwrap().map(|entry| entry.unwrap().path());
-    let mut followed = 0;
-    for guide in guides.filter(|path| path.extension().is_some_and(|e| e == "md")) {
+    let listed: BTreeSet<String> = contents
+        .text
+        .split("href=\"/help/")
+        .skip(1)
+        .map(|rest| format!("/help/{}", rest.split('"').next().unwrap()))
+        .collect();
+    for guide in std::fs::read_dir(repository().join("docs")).unwrap().map(|entry| entry.unwrap().path()) {
         let address = format!("/help/{}", guide.file_stem().unwrap().to_str().unwrap());
-        assert!(contents.text.contains(&address), "{address} is not in the table of contents");
+        assert!(guide.is_dir() || listed.contains(&address), "{address} is not in the table of contents");
+    }
+    let mut followed = 0;
+    for address in listed {
         let page = service.fetch(&address).await;
         assert_eq!(page.status, StatusCode::OK, "{address}");
         for target in page.text.split("href=\"").chain(page.text.split("src=\"")).skip(1) {
@@ -242,7 +249,9 @@ fn every_link_of_a_page_to_a_guide_has_its_section() {
             if guide.contains('{') {
                 continue;
             }
-            let guide_text = std::fs::read_to_string(repository().join(format!("docs/{guide}.md"))).unwrap();
+            let file =
+                if guide == "data-files" { "optimizer/data/README.md".to_owned() } else { format!("docs/{guide}.md") };
+            let guide_text = std::fs::read_to_string(repository().join(file)).unwrap();
             assert!(section.is_empty() || anchors(&guide_text).contains(section), "{}: {target}", template.display());
             sections += u32::from(!section.is_empty());
             linked.insert(guide.to_owned());

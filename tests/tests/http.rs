@@ -50,7 +50,7 @@ async fn health_is_ready() {
 }
 
 #[tokio::test]
-async fn subjects_are_made_listed_and_refused() {
+async fn subjects_are_created_listed_and_refused() {
     let (_folder, service) = service().await;
     let body = json!({"pseudonym": "S01", "height_m": 1.8, "body_mass_kg": 70.5, "notes": "left-handed"});
     let made = service.post("/api/v1/subjects", &body).await;
@@ -102,7 +102,7 @@ async fn subjects_are_made_listed_and_refused() {
 }
 
 #[tokio::test]
-async fn unknown_things_are_not_found() {
+async fn unknown_objects_are_not_found() {
     let (_folder, service) = service().await;
     let unknown = "01890000-0000-7000-8000-000000000000";
     for path in [
@@ -131,7 +131,7 @@ async fn unknown_things_are_not_found() {
 }
 
 #[tokio::test]
-async fn a_study_is_made_run_and_read_as_json_and_csv() {
+async fn study_is_created_run_and_read_as_json_and_csv() {
     let (_folder, service) = service().await;
     let body = json!({"subject_id": service.subject().await, "trial_budget": 5, "seed": 3, "name": "First"});
     let made = service.post("/api/v1/studies", &body).await;
@@ -167,7 +167,7 @@ async fn a_study_is_made_run_and_read_as_json_and_csv() {
 }
 
 #[tokio::test]
-async fn studies_that_cannot_be_are_refused_by_field() {
+async fn invalid_study_is_refused_with_the_field() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
@@ -211,7 +211,7 @@ async fn studies_that_cannot_be_are_refused_by_field() {
 }
 
 #[tokio::test]
-async fn preferences_are_given_read_back_and_taken_back() {
+async fn preferences_are_created_read_and_retracted() {
     let (_folder, service) = service().await;
     let study = finished(&service, 4).await;
     let trials = service.trials(study).await;
@@ -259,7 +259,7 @@ async fn preferences_are_given_read_back_and_taken_back() {
 }
 
 #[tokio::test]
-async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_effect() {
+async fn study_with_human_answers_waits_for_each_and_page_and_rest_have_the_same_effect() {
     let (_folder, service) = service().await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
     let mut through_form = false;
@@ -303,7 +303,7 @@ async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_ef
 }
 
 #[tokio::test]
-async fn a_study_is_paused_resumed_and_stopped_and_refuses_what_makes_no_sense() {
+async fn study_is_paused_resumed_and_stopped_and_refuses_invalid_changes_of_state() {
     let folder = tempfile::tempdir().unwrap();
     let slow = Analytic::slow(std::time::Duration::from_millis(10));
     let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
@@ -323,7 +323,7 @@ async fn a_study_is_paused_resumed_and_stopped_and_refuses_what_makes_no_sense()
 }
 
 #[tokio::test]
-async fn a_reason_without_end_is_refused() {
+async fn overlong_reason_is_refused() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.start = false).await;
     let path = format!("/api/v1/studies/{study}/start");
@@ -334,7 +334,7 @@ async fn a_reason_without_end_is_refused() {
 }
 
 #[tokio::test]
-async fn a_trial_is_cancelled_and_run_again() {
+async fn trial_is_cancelled_and_retried() {
     let folder = tempfile::tempdir().unwrap();
     let slow = Analytic::slow(std::time::Duration::from_millis(20));
     let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
@@ -361,7 +361,7 @@ async fn a_trial_is_cancelled_and_run_again() {
 }
 
 #[tokio::test]
-async fn pages_answer_and_let_nothing_in_from_elsewhere() {
+async fn pages_are_served_without_external_resources() {
     let (_folder, service) = service().await;
     let empty = service.fetch("/").await;
     assert!(empty.text.contains("No studies yet"));
@@ -390,7 +390,7 @@ async fn pages_answer_and_let_nothing_in_from_elsewhere() {
 }
 
 #[tokio::test]
-async fn the_form_for_a_new_study_comes_back_with_what_was_wrong() {
+async fn refused_study_form_is_shown_again_with_its_errors() {
     let (_folder, service) = service().await;
     let form = |height: &str, trials: &str| {
         format!(
@@ -413,7 +413,7 @@ async fn the_form_for_a_new_study_comes_back_with_what_was_wrong() {
 }
 
 #[tokio::test]
-async fn another_site_in_the_same_browser_may_not_change_anything() {
+async fn requests_from_another_site_cannot_change_anything() {
     let (_folder, service) = service().await;
     let send = |headers: &[(&str, &str)]| {
         let mut request = axum::http::Request::post("/api/v1/subjects").header("content-type", "application/json");
@@ -439,7 +439,7 @@ async fn another_site_in_the_same_browser_may_not_change_anything() {
 }
 
 #[tokio::test]
-async fn a_page_size_that_cannot_be_is_refused_with_the_range() {
+async fn invalid_page_size_is_refused_with_the_range() {
     let (_folder, service) = service().await;
     let study = finished(&service, 2).await;
     let lists = [
@@ -473,7 +473,7 @@ async fn stream_of(service: &Service, study: StudyId, last_seen: Option<i64>) ->
 }
 
 #[tokio::test]
-async fn events_are_replayed_after_the_last_one_that_was_seen() {
+async fn events_after_the_last_received_one_are_replayed() {
     let (_folder, service) = service().await;
     let study = finished(&service, 2).await;
     let recorded = events::after(&mut service.store.read().await.unwrap(), study, 0, 100).await.unwrap();
@@ -491,7 +491,7 @@ async fn events_are_replayed_after_the_last_one_that_was_seen() {
 }
 
 #[tokio::test]
-async fn event_stream_of_an_ended_study_says_so_and_resumes_with_it() {
+async fn event_stream_reports_the_end_of_a_study_and_resumes_with_it() {
     let (_folder, service) = service().await;
     let study = finished(&service, 2).await;
     let path = format!("/api/v1/studies/{study}");

@@ -11,7 +11,7 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Store, StudyId, TrialId, certificates, commit, gaits, trials};
 use gaitwright_tests::archives::{exported, import, import_trusting};
 use gaitwright_tests::certified::certificate;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::scripted;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -104,7 +104,7 @@ async fn imported_trial_without_its_gait_is_not_walkable() {
 }
 
 #[tokio::test]
-async fn report_closes_the_same_motion_in_an_imported_study() {
+async fn report_covers_the_same_motion_in_an_imported_study() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let study = service.study(|new| new.trial_budget = 6).await;

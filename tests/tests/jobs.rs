@@ -66,7 +66,7 @@ async fn listed(service: &Service, kind: &str) -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn a_certificate_is_a_job_that_leads_to_its_result() {
+async fn certificate_job_links_to_its_result() {
     let (_folder, service, study, _) = service().await;
     let trial = first(&service, study, TrialState::Converged).await;
     let certificate = format!("/api/v1/trials/{trial}/certificate");
@@ -86,7 +86,7 @@ async fn a_certificate_is_a_job_that_leads_to_its_result() {
 }
 
 #[tokio::test]
-async fn a_certificate_that_is_cancelled_is_not_made() {
+async fn cancelled_certificate_is_not_computed() {
     let (_folder, service, study, _) = service().await;
     let trial = first(&service, study, TrialState::Converged).await;
     let certificate = format!("/api/v1/trials/{trial}/certificate");
@@ -100,7 +100,7 @@ async fn a_certificate_that_is_cancelled_is_not_made() {
 }
 
 #[tokio::test]
-async fn a_certificate_that_was_requested_is_made_after_a_restart_unless_it_was_cancelled() {
+async fn requested_certificate_is_computed_after_a_restart_unless_cancelled() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let certifier = |pause| Verdicts { pause, passes: |_: &Gait| true };
@@ -134,7 +134,7 @@ async fn a_certificate_that_was_requested_is_made_after_a_restart_unless_it_was_
 }
 
 #[tokio::test]
-async fn an_explanation_is_a_job_that_stops_and_begins_again() {
+async fn explanation_job_stops_and_starts_again() {
     let (_folder, service, study, watched) = service().await;
     let trial = first(&service, study, TrialState::NotConverged).await;
     let explanation = format!("/api/v1/trials/{trial}/explanation");
@@ -154,7 +154,7 @@ async fn an_explanation_is_a_job_that_stops_and_begins_again() {
 }
 
 #[tokio::test]
-async fn a_backup_is_a_job_that_leads_to_its_result() {
+async fn backup_job_links_to_its_result() {
     let (folder, service, ..) = service().await;
     let job = address(&service.post("/api/v1/backups", &json!({})).await);
     let done = wait_for(&service, &job, "done").await;
@@ -167,7 +167,7 @@ async fn a_backup_is_a_job_that_leads_to_its_result() {
 }
 
 #[tokio::test]
-async fn a_backup_that_is_cancelled_or_interrupted_leaves_no_file() {
+async fn cancelled_or_interrupted_backup_leaves_no_file() {
     let (folder, service, ..) = service().await;
     let state = service.state();
     let (store, runners) = (&service.store, state.runners());
@@ -204,7 +204,7 @@ async fn a_backup_that_is_cancelled_or_interrupted_leaves_no_file() {
 }
 
 #[tokio::test]
-async fn a_solve_is_a_job_whose_end_is_that_of_its_trial() {
+async fn solve_job_ends_in_the_state_of_its_trial() {
     let (_folder, service, study, _) = service().await;
     let trial = first(&service, study, TrialState::Running).await;
     let job = format!("/api/v1/jobs/solve-{trial}");

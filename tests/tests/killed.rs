@@ -130,7 +130,7 @@ fn labels(address: &str, study: &str) -> usize {
 }
 
 #[test]
-fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_write_is_lost() {
+fn killed_service_loses_no_acknowledged_write_and_finishes_with_the_same_trials() {
     let kills: u32 = std::env::var("GAITWRIGHT_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(12);
     let folder = tempfile::tempdir().unwrap();
 
@@ -194,7 +194,7 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
 }
 
 #[test]
-fn a_second_process_is_refused_while_the_first_owns_the_file() {
+fn second_process_is_refused_while_the_first_owns_the_record() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let _first = Process::start(&database);

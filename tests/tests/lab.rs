@@ -13,9 +13,9 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{LabSessionId, Store, StudyId, audit, lab_sessions};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::archives::{exported, import};
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::measured::{electromyogram, motion};
-use gaitwright_tests::orders::gait_one_first;
+use gaitwright_tests::read_allocations::gait_one_first;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
 use serde_json::{Value, json};
@@ -54,7 +54,7 @@ fn id(session: &Value) -> &str {
 }
 
 #[tokio::test]
-async fn lab_session_is_walked_in_order_closed_and_unblinded() {
+async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
@@ -263,7 +263,7 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
 }
 
 #[tokio::test]
-async fn unsafe_walk_closes_both_gaits_until_unblinding() {
+async fn unsafe_walk_excludes_both_gaits_until_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let (lab, session) = walked(&service, study, &trials).await;
     let said = json!({"number": 1, "answer": "unsafe_second", "note": "stumbled"});
@@ -298,7 +298,7 @@ async fn unsafe_walk_closes_both_gaits_until_unblinding() {
 }
 
 #[tokio::test]
-async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
+async fn lab_session_requires_two_converged_gaits_of_its_study() {
     let (_folder, service, study, trials) = finished().await;
     let gaits = converged(&trials);
     let other = service.study(|new| new.trial_budget = 1).await;
@@ -347,7 +347,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
 }
 
 #[tokio::test]
-async fn the_form_of_a_session_offers_each_motion_once_and_no_gait_reported_as_unsafe() {
+async fn lab_session_form_offers_each_motion_once_and_no_unsafe_gait() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service
@@ -373,7 +373,7 @@ async fn the_form_of_a_session_offers_each_motion_once_and_no_gait_reported_as_u
 }
 
 #[tokio::test]
-async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
+async fn archive_preserves_the_lab_sessions_of_its_study() {
     let (folder, service, study, trials) = finished_by(Consistent::default()).await;
     let session = planned(&service, study, &trials).await;
     service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
@@ -421,7 +421,7 @@ fn with_heel(walk: u8, recording: &str) -> Value {
 }
 
 #[tokio::test]
-async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_anew() {
+async fn emg_recordings_are_compared_with_normal_walking_and_can_be_reprocessed() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
@@ -485,7 +485,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
 }
 
 #[tokio::test]
-async fn a_recording_is_given_out_as_it_was_brought() {
+async fn measurement_file_is_downloaded_unchanged() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
@@ -528,8 +528,8 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         ),
         (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel_strikes_s is 99"),
         (json!({"walk": 1, "recording": whole, "reading": {"channels": {"XX": "TA_L"}}}), "RF_L, TA_L, BF_L"),
-        (json!({"walk": 1, "recording": whole, "reading": {"form": "opensim"}}), "endheader"),
-        (json!({"walk": 1, "recording": whole, "reading": {"form": "c3d"}}), "form"),
+        (json!({"walk": 1, "recording": whole, "reading": {"format": "opensim"}}), "endheader"),
+        (json!({"walk": 1, "recording": whole, "reading": {"format": "c3d"}}), "format"),
     ] {
         let refused = service.post(&format!("{api}/measurement-files/emg"), &body).await;
         assert!(refused.status.is_client_error(), "{expected}: {}", refused.text);
@@ -547,7 +547,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         assert!(refused.status.is_client_error() && refused.text.contains(expected), "{expected}: {}", refused.text);
     }
     let page = format!("/lab-sessions/{}", id(&session));
-    let form = "walk=1&form=csv&recording=time_s%2CTA_L&heel_strike_column=heel&channels=TA";
+    let form = "walk=1&format=csv&recording=time_s%2CTA_L&heel_strike_column=heel&channels=TA";
     let refused = service.post_text(&format!("{page}/measurement-files/emg"), FORM, form).await;
     assert!(refused.text.contains("CHANNEL=COLUMN"), "{}", refused.text);
     for typed in ["<details open>", ">time_s,TA_L</textarea>", "value=\"heel\"", "value=\"TA\""] {
@@ -556,17 +556,17 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
     for (kind, form, expected) in [
         (
             "emg",
-            "walk=1&form=opensim&recording=x&rate_hz=1000",
+            "walk=1&format=opensim&recording=x&rate_hz=1000",
             "\u{201c}Sampling rate, Hz\u{201d} is 1000.0; it must be omitted",
         ),
         (
             "emg",
-            "walk=1&form=csv&recording=x&rate_hz=fast",
+            "walk=1&format=csv&recording=x&rate_hz=fast",
             "\u{201c}Sampling rate, Hz\u{201d} is \u{201c}fast\u{201d}; it must be a number",
         ),
         (
             "motion",
-            "walk=1&form=csv&recording=x&cutoff_hz=fast",
+            "walk=1&format=csv&recording=x&cutoff_hz=fast",
             "\u{201c}Low-pass cut-off, Hz\u{201d} is \u{201c}fast\u{201d}",
         ),
     ] {
@@ -581,7 +581,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
 }
 
 #[tokio::test]
-async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
+async fn limit_cycles_are_drawn_over_the_gait_after_unblinding() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     let (api, page) = (format!("/api/v1/lab-sessions/{}", id(&session)), format!("/lab-sessions/{}", id(&session)));
@@ -590,7 +590,7 @@ async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
     }
     let recording = motion().replace('\n', "%0A").replace(',', "%2C");
     for walk in 1..=2 {
-        let form = format!("walk={walk}&form=csv&unit=&cutoff_hz=6&recording=%23 walk {walk}%0A{recording}");
+        let form = format!("walk={walk}&format=csv&unit=&cutoff_hz=6&recording=%23 walk {walk}%0A{recording}");
         let kept = service.post_text(&format!("{page}/measurement-files/motion"), FORM, &form).await;
         assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     }
@@ -598,9 +598,9 @@ async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
     let joints: Vec<_> = cycles[1]["joints"].as_array().unwrap().iter().map(|joint| &joint["joint"]).collect();
     assert_eq!((joints, &cycles[1]["cutoff_hz"]), (vec![&json!("knee_R"), &json!("ankle_R")], &json!(6.0)));
     let before = service.fetch(&page).await.text;
-    assert!(before.contains("Right knee, walk 2") && !before.contains("orbit of the gait"), "{before}");
+    assert!(before.contains("Right knee, walk 2") && !before.contains("limit cycle of the gait"), "{before}");
     service.post(&format!("{api}/unblind"), &json!({"reason": "all were walked"})).await;
     let after = service.fetch(&page).await.text;
-    assert!(after.contains("orbit of the gait") && !after.contains("Right knee, walk 2"), "{after}");
+    assert!(after.contains("limit cycle of the gait") && !after.contains("Right knee, walk 2"), "{after}");
     service.stop().await;
 }

@@ -56,7 +56,7 @@ async fn rate(service: &Service, token: &str, answer: &str) -> Answer {
 }
 
 #[tokio::test]
-async fn a_rater_reports_a_gait_of_a_pair_that_is_already_answered() {
+async fn rater_reports_a_gait_of_an_answered_pair() {
     let (_folder, service) = service().await;
     let (study, token) = pair(&service).await;
     assert_eq!(rate(&service, &token, "first").await.status, StatusCode::OK);
@@ -76,7 +76,7 @@ async fn a_rater_reports_a_gait_of_a_pair_that_is_already_answered() {
 }
 
 #[tokio::test]
-async fn a_rater_reports_a_gait_of_a_pair_that_was_withdrawn_or_retracted() {
+async fn rater_reports_a_gait_of_a_retracted_pair() {
     let (_folder, service) = service().await;
     let (study, token) = pair(&service).await;
     assert_eq!(rate(&service, &token, "first").await.status, StatusCode::OK);
@@ -89,7 +89,7 @@ async fn a_rater_reports_a_gait_of_a_pair_that_was_withdrawn_or_retracted() {
 }
 
 #[tokio::test]
-async fn a_report_that_is_repeated_counts_once_until_staff_clear_the_gait() {
+async fn repeated_report_counts_once_until_staff_clear_the_gait() {
     let (_folder, service) = service().await;
     let (study, token) = pair(&service).await;
     for _ in 0..2 {
@@ -116,7 +116,7 @@ async fn a_report_that_is_repeated_counts_once_until_staff_clear_the_gait() {
 }
 
 #[tokio::test]
-async fn the_form_of_a_comparison_reports_a_gait_after_it_was_sent_with_another_answer() {
+async fn comparison_form_reports_a_gait_after_another_answer() {
     let (_folder, service) = service().await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -186,7 +186,7 @@ impl Lab {
 }
 
 #[tokio::test]
-async fn a_report_takes_the_place_of_the_answer_of_a_blinded_session() {
+async fn report_replaces_the_answer_of_a_blinded_session() {
     let (_folder, service) = service().await;
     let lab = Lab::walked(&service).await;
     assert_eq!(lab.answer(&service, 1, "first").await, StatusCode::OK);
@@ -206,7 +206,7 @@ async fn a_report_takes_the_place_of_the_answer_of_a_blinded_session() {
 }
 
 #[tokio::test]
-async fn a_second_report_of_a_session_is_recorded_beside_the_first() {
+async fn second_report_of_a_session_is_also_recorded() {
     let (_folder, service) = service().await;
     let lab = Lab::walked(&service).await;
     assert_eq!(lab.answer(&service, 1, "unsafe_first").await, StatusCode::OK);
@@ -226,7 +226,7 @@ async fn a_second_report_of_a_session_is_recorded_beside_the_first() {
 }
 
 #[tokio::test]
-async fn an_unsafe_walk_is_reported_after_the_session_was_closed() {
+async fn unsafe_walk_is_reported_after_the_session_closed() {
     let (_folder, service) = service().await;
     let lab = Lab::walked(&service).await;
     assert_eq!(lab.post(&service, "close", &json!({})).await.status, StatusCode::OK);
@@ -239,7 +239,7 @@ async fn an_unsafe_walk_is_reported_after_the_session_was_closed() {
 }
 
 #[tokio::test]
-async fn an_unsafe_walk_is_reported_after_answer_and_unblinding() {
+async fn unsafe_walk_is_reported_after_answer_and_unblinding() {
     let (_folder, service) = service().await;
     let lab = Lab::walked(&service).await;
     assert_eq!(lab.answer(&service, 1, "first").await, StatusCode::OK);
@@ -251,7 +251,7 @@ async fn an_unsafe_walk_is_reported_after_answer_and_unblinding() {
 }
 
 #[tokio::test]
-async fn whoever_walked_with_a_fetched_file_reports_before_any_walk_is_recorded() {
+async fn unsafe_walk_with_a_fetched_file_is_reported_before_a_walk_is_recorded() {
     let (_folder, service) = service().await;
     let lab = Lab::planned(&service).await;
     let offered = async || service.fetch(&format!("/lab/{}", lab.id)).await.text.contains("A walk was unsafe");

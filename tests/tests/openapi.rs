@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 #[test]
-fn the_committed_description_is_that_of_the_code() {
+fn committed_description_matches_the_code() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/openapi.json");
     let text = openapi::text().unwrap();
     let committed = std::fs::read_to_string(&file).unwrap();
@@ -73,7 +73,7 @@ fn takes_key(operation: &Value) -> bool {
 }
 
 #[tokio::test]
-async fn every_change_sent_twice_with_a_key_happens_once_or_refuses_the_key_as_described() {
+async fn repeated_change_with_a_key_happens_once_or_refuses_the_key_as_described() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Mixed)).await;
@@ -173,7 +173,7 @@ async fn settings_at_the_ends_of_their_described_ranges_are_accepted() {
 }
 
 #[tokio::test]
-async fn the_description_is_served_and_its_page_needs_nothing_from_elsewhere() {
+async fn description_is_served_and_its_page_has_no_external_resources() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let served = service.fetch("/api/openapi.json").await;
@@ -406,7 +406,7 @@ fn every_list_has_the_same_envelope_and_the_same_parameters() {
 
 /// Generators make a method of each: `list_studies`, `withdraw_consent`.
 #[test]
-fn every_operation_has_an_identifier_of_its_own() {
+fn operation_identifiers_are_unique() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut known = BTreeSet::new();
     for (path, item) in document["paths"].as_object().unwrap() {
@@ -473,7 +473,7 @@ impl Drawn {
 }
 
 #[tokio::test]
-async fn devices_and_muscles_are_accepted_exactly_where_they_fit_the_description() {
+async fn devices_and_muscles_are_accepted_if_and_only_if_they_match_the_description() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let subject = service.subject().await;

@@ -16,7 +16,7 @@ use gaitwright_store::{Store, certificates, commit, explanations, gaits, members
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::certified::certificate;
-use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::explained::explanation;
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
@@ -37,7 +37,7 @@ async fn posterior(service: &Service, study: gaitwright_store::StudyId) -> Vec<(
 }
 
 #[tokio::test]
-async fn an_exported_study_gives_the_same_posterior_elsewhere() {
+async fn exported_study_gives_the_same_posterior_in_another_record() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
@@ -100,7 +100,7 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
 }
 
 #[tokio::test]
-async fn old_trajectories_are_dropped_and_the_best_kept() {
+async fn prune_drops_old_trajectories_and_keeps_the_best() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_without_certificates(&database, Analytic::default()).await;
@@ -145,7 +145,7 @@ async fn old_trajectories_are_dropped_and_the_best_kept() {
 }
 
 #[tokio::test]
-async fn figures_for_prometheus_count_requests_by_route() {
+async fn metrics_count_requests_by_route() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 2).await;
     let study = service.study(|new| new.trial_budget = 2).await;
@@ -184,7 +184,7 @@ fn gaitwright(folder: &Path, arguments: &[&str]) -> (bool, String) {
 }
 
 #[tokio::test]
-async fn a_copy_is_restored_and_the_present_record_is_kept_beside_it() {
+async fn restore_keeps_the_present_record_beside_the_backup() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("gaitwright.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
@@ -223,7 +223,7 @@ async fn studies_in(file: &Path) -> usize {
 }
 
 #[tokio::test]
-async fn a_copy_takes_the_place_of_a_damaged_and_of_a_newer_record_and_none_that_was_there_is_lost() {
+async fn restore_replaces_a_damaged_or_newer_record_and_keeps_it() {
     let folder = tempfile::tempdir().unwrap();
     let (database, copy) = (folder.path().join("gaitwright.db"), folder.path().join("copy.db"));
     let service = Service::start(&copy, Analytic::default(), 1).await;
@@ -256,7 +256,7 @@ async fn a_copy_takes_the_place_of_a_damaged_and_of_a_newer_record_and_none_that
 }
 
 #[tokio::test]
-async fn a_copy_is_restored_with_what_is_in_its_log() {
+async fn restore_includes_the_log_of_the_backup() {
     let folder = tempfile::tempdir().unwrap();
     let live = folder.path().join("live.db");
     let service = Service::start(&live, Analytic::default(), 1).await;
@@ -273,7 +273,7 @@ async fn a_copy_is_restored_with_what_is_in_its_log() {
 }
 
 #[tokio::test]
-async fn a_record_with_two_names_is_refused() {
+async fn record_with_a_hard_link_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     Service::start(&database, Analytic::default(), 1).await.stop().await;
@@ -287,7 +287,7 @@ async fn a_record_with_two_names_is_refused() {
 }
 
 #[tokio::test]
-async fn settings_show_where_each_value_comes_from() {
+async fn config_shows_the_origin_of_each_value() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("gaitwright.toml"), "idle_minutes = 15\n").unwrap();
     let (done, text) = gaitwright(folder.path(), &["config", "show", "--workers", "3"]);
@@ -301,7 +301,7 @@ async fn settings_show_where_each_value_comes_from() {
 }
 
 #[tokio::test]
-async fn every_command_takes_record_and_second_anchor_from_the_settings_file() {
+async fn every_command_reads_record_and_second_anchor_from_the_settings_file() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| gaitwright(folder.path(), arguments);
     let verified = || run(&["audit", "verify"]);
@@ -363,7 +363,7 @@ fn anchor_in_a_folder_that_does_not_exist_is_refused() {
 }
 
 #[tokio::test]
-async fn restricted_study_is_restricted_where_it_is_imported() {
+async fn restricted_study_stays_restricted_after_import() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let restricted = service.study(|new| (new.trial_budget, new.restricted) = (2, true)).await;

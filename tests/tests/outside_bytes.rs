@@ -121,7 +121,7 @@ fn operations() -> Vec<(Method, String)> {
 }
 
 #[tokio::test]
-async fn bodies() {
+async fn malformed_bodies_are_refused_without_server_errors() {
     let target = Target::set().await;
     let operations = operations();
     let bytes = prop::collection::vec(any::<u8>(), 0..120);
@@ -146,7 +146,7 @@ async fn bodies() {
 }
 
 #[tokio::test]
-async fn forms() {
+async fn malformed_forms_are_refused_without_server_errors() {
     let target = Target::set().await;
     let study = &target.study;
     let paths = [
@@ -175,7 +175,7 @@ async fn forms() {
 }
 
 #[tokio::test]
-async fn headers() {
+async fn malformed_headers_are_refused_without_server_errors() {
     let mut target = Target::set().await;
     let trials = format!("/api/v1/studies/{}/trials", target.study);
     let post = "/api/v1/subjects";
@@ -218,7 +218,7 @@ async fn headers() {
 }
 
 #[tokio::test]
-async fn cursors_and_identifiers() {
+async fn malformed_cursors_and_identifiers_are_refused_without_server_errors() {
     let target = Target::set().await;
     let study = &target.study;
     let paths = [
@@ -256,7 +256,7 @@ async fn cursors_and_identifiers() {
 }
 
 #[tokio::test]
-async fn archives() {
+async fn malformed_archives_are_refused_without_server_errors() {
     let target = Target::set().await;
     let study = target.study.parse().unwrap();
     let whole = exported(&target.service.store, study).await;

@@ -51,7 +51,7 @@ fn redacted(value: &Value) -> Value {
 }
 
 #[test]
-fn one_gait_cold_and_warm_and_a_table_of_them() {
+fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let cold = json_of(&gaitwright(folder, &[&["solve", "--json", "--out", "gait.json"][..], &COARSE].concat()));
@@ -117,7 +117,7 @@ fn ancestor(figures: &Value) -> Value {
 }
 
 #[test]
-fn a_gait_names_those_it_came_from() {
+fn gait_file_lists_its_ancestors() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let solve = |arguments: &[&str]| {
@@ -164,7 +164,7 @@ fn a_gait_names_those_it_came_from() {
 }
 
 #[test]
-fn settings_of_the_solver_are_taken_from_a_file() {
+fn solver_settings_are_read_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     std::fs::write(folder.join("solver.json"), r#"{"bound_push": 0.01, "bound_fraction": 0.01}"#).unwrap();
@@ -182,7 +182,7 @@ fn settings_of_the_solver_are_taken_from_a_file() {
 
 /// If the output folder is removed during the solve, the figures are still printed.
 #[test]
-fn the_figures_outlive_the_file() {
+fn figures_are_printed_although_the_gait_file_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path().join("place");
     std::fs::create_dir(&place).unwrap();
@@ -202,7 +202,7 @@ fn the_figures_outlive_the_file() {
 /// A command does not overwrite its own input, nor the output file of a stopped solve.
 #[cfg(unix)]
 #[test]
-fn a_file_that_is_there_is_not_lost() {
+fn solve_does_not_overwrite_its_input_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let solved = gaitwright(folder, &[&["solve", "--out", "gait.json"][..], &COARSE].concat());
@@ -242,7 +242,7 @@ fn a_file_that_is_there_is_not_lost() {
 }
 
 #[test]
-fn a_study_of_three_trials() {
+fn tune_runs_a_study_of_three_trials() {
     let folder = tempfile::tempdir().unwrap();
     let tune = ["tune", "--muscles", "off", "--trials", "3", "--seed", "2", "--workers", "1", "--json"];
     let summary = json_of(&gaitwright(folder.path(), &tune));
@@ -288,7 +288,7 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
 /// study only.
 #[cfg(unix)]
 #[tokio::test]
-async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone() {
+async fn tune_continues_an_interrupted_study_and_ignores_studies_of_another_kind() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("gaitwright.db");
     let of_people = study_in(&database, |new| new.feedback_mode = FeedbackMode::Human).await;
@@ -358,7 +358,7 @@ async fn failed_trial_sets_the_exit_code() {
 
 /// Rows are written as they are computed, so a killed process leaves the finished rows.
 #[test]
-fn a_killed_sweep_leaves_its_rows() {
+fn killed_sweep_keeps_its_rows() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let action = "a5=0.013";
@@ -383,7 +383,7 @@ fn a_killed_sweep_leaves_its_rows() {
 /// A real result with muscles, with many more iterations than solves take, beside the 1 MiB that a NATS broker takes in
 /// one message unless told otherwise.
 #[test]
-fn a_result_with_muscles_fits_through_a_broker() {
+fn broker_delivers_a_result_with_muscles() {
     let problem = GaitProblem {
         subject: Subject::builtin(1).unwrap(),
         device: Device::ampro3().unwrap(),
@@ -408,7 +408,7 @@ fn a_result_with_muscles_fits_through_a_broker() {
 }
 
 #[test]
-fn long_a_gait_with_muscles() {
+fn long_solve_of_a_gait_with_muscles_converges() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
         skipped("set GAITWRIGHT_LONG_TESTS=1");
         return;

@@ -34,7 +34,7 @@ async fn recommendation(service: &Service, study: StudyId) -> Value {
 }
 
 #[tokio::test]
-async fn a_study_without_a_gait_has_no_best_trial() {
+async fn study_without_a_gait_has_no_recommendation() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let without_gait = TunedBounds::parse("a5=0.039,a6=0").unwrap();
@@ -69,7 +69,7 @@ async fn a_study_without_a_gait_has_no_best_trial() {
 }
 
 #[tokio::test]
-async fn failed_certificate_is_stated_in_the_recommendation() {
+async fn recommendation_states_a_failed_certificate() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 6).await;
@@ -111,7 +111,7 @@ async fn failed_certificate_is_stated_in_the_recommendation() {
 }
 
 #[tokio::test]
-async fn passed_certificate_is_reported_as_passed() {
+async fn recommendation_states_a_passed_certificate() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 3).await;
@@ -176,7 +176,7 @@ async fn ended_study_certifies_its_ten_best_gaits_in_order() {
 }
 
 #[tokio::test]
-async fn studies_that_ended_before_the_start_are_certified_until_one_gait_passes() {
+async fn studies_that_ended_before_a_restart_are_certified_until_one_gait_passes() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_without_certificates(&database, Analytic::default()).await;
@@ -206,7 +206,7 @@ async fn studies_that_ended_before_the_start_are_certified_until_one_gait_passes
 }
 
 #[tokio::test]
-async fn a_recommendation_that_is_asked_for_while_the_study_runs_is_certified_beside_its_solves() {
+async fn requested_recommendation_of_a_running_study_is_certified_during_its_solves() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(Duration::from_millis(20));
     let passes = Verdicts { pause: Duration::from_millis(20), passes: |_: &Gait| true };

@@ -9,6 +9,7 @@ use gaitwright_store::studies::StudyState;
 use gaitwright_store::{Store, StoreError, backup, read_only};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use std::path::Path;
@@ -39,7 +40,7 @@ async fn intruder(database: &Path) -> SqlitePool {
 }
 
 #[tokio::test]
-async fn a_repeated_request_has_one_effect_and_the_same_answer() {
+async fn repeated_request_has_one_effect_and_the_same_response() {
     let (_folder, service) = service().await;
     let body = json!({"pseudonym": "S01", "height_m": 1.8, "body_mass_kg": 70.0});
     let first = post_with_key(&service, "/api/v1/subjects", "key-1", &body).await;
@@ -72,7 +73,7 @@ async fn a_repeated_request_has_one_effect_and_the_same_answer() {
 }
 
 #[tokio::test]
-async fn every_change_leaves_exactly_one_row_in_the_audit_trail() {
+async fn every_change_writes_exactly_one_row_of_the_audit_trail() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
     let study = service.study(|new| new.trial_budget = 3).await;
@@ -120,7 +121,7 @@ async fn every_change_leaves_exactly_one_row_in_the_audit_trail() {
 }
 
 #[tokio::test]
-async fn one_changed_byte_in_the_audit_trail_is_found() {
+async fn audit_verify_finds_one_changed_byte_of_the_audit_trail() {
     let (folder, service) = service().await;
     for number in 0..5 {
         let body = json!({"pseudonym": format!("S{number}"), "height_m": 1.8, "body_mass_kg": 70.0});
@@ -140,7 +141,7 @@ async fn one_changed_byte_in_the_audit_trail_is_found() {
 }
 
 #[tokio::test]
-async fn evidence_is_append_only_even_for_other_programs() {
+async fn evidence_tables_are_append_only_for_other_programs() {
     let (folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -173,7 +174,7 @@ async fn evidence_is_append_only_even_for_other_programs() {
 }
 
 #[tokio::test]
-async fn a_newer_schema_is_refused_and_left_alone() {
+async fn newer_schema_is_refused_and_unchanged() {
     let (folder, service) = service().await;
     service.stop().await;
     let database = folder.path().join("a.db");
@@ -192,7 +193,7 @@ async fn a_newer_schema_is_refused_and_left_alone() {
 }
 
 #[tokio::test]
-async fn a_copy_made_while_the_service_runs_is_whole_and_goes_on() {
+async fn backup_of_a_running_service_is_complete_and_usable() {
     let (folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 10).await;
     service.wait_for_trials(study, 3).await;
@@ -213,4 +214,12 @@ async fn a_copy_made_while_the_service_runs_is_whole_and_goes_on() {
     again.stop().await;
     std::fs::write(&copy, b"not a database at all").unwrap();
     assert!(read_only::check(&copy).await.is_err());
+}
+
+/// SQL needs the crate `sqlx`.
+#[test]
+fn only_the_store_contains_sql() {
+    for (file, text) in sources::of_server() {
+        assert!(file.starts_with("store/") || !text.contains("sqlx"), "{file}");
+    }
 }

@@ -15,7 +15,7 @@ fn recording() -> String {
 }
 
 fn new(name: &str, height_m: f64) -> Value {
-    json!({"name": name, "form": "csv", "recording": recording(), "height_m": height_m, "body_mass_kg": 66.0})
+    json!({"name": name, "format": "csv", "recording": recording(), "height_m": height_m, "body_mass_kg": 66.0})
 }
 
 async fn service() -> (tempfile::TempDir, Service) {
@@ -25,7 +25,7 @@ async fn service() -> (tempfile::TempDir, Service) {
 }
 
 #[tokio::test]
-async fn a_recording_becomes_the_reference_of_a_study() {
+async fn imported_recording_becomes_the_reference_of_a_study() {
     let (_folder, service) = service().await;
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await;
     assert_eq!(far.status, StatusCode::CREATED, "{}", far.text);
@@ -64,7 +64,7 @@ async fn a_recording_becomes_the_reference_of_a_study() {
 }
 
 #[tokio::test]
-async fn incomplete_archive_imports_nothing_and_names_the_place() {
+async fn incomplete_archive_is_refused_with_the_place() {
     let (_folder, service) = service().await;
     let before = service.fetch("/api/v1/reference-gaits").await.items();
     let text = recording();
@@ -73,13 +73,13 @@ async fn incomplete_archive_imports_nothing_and_names_the_place() {
         (json!({"recording": half}), "recording, line 102"),
         (json!({"recording": text.replace("\n1.5,0.1,", "\n1.5,x,")}), "recording, line 152"),
         (json!({"recording": text.replace("hip_R_rad", "hip_rad")}), "hip_R_rad"),
-        (json!({"form": "opensim"}), "endheader"),
+        (json!({"format": "opensim"}), "endheader"),
         (json!({"strikes": "force"}), "the recording has no force under the right foot"),
         (json!({"heel_strikes_s": [0.5, 99.0]}), "heel_strikes_s is 99;"),
         (json!({"height_m": 17.2}), "height_m is 17.2; it must be 1.4 to 2.2."),
         (json!({"recording": format!("# {}\n{text}", "x".repeat(30_000))}), "at most 20000 bytes of comments"),
         (json!({"name": " "}), "1 to 200 printable characters"),
-        (json!({"form": "c3d"}), "form"),
+        (json!({"format": "c3d"}), "format"),
     ] {
         let mut body = new("x", 1.7);
         body.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
@@ -92,12 +92,12 @@ async fn incomplete_archive_imports_nothing_and_names_the_place() {
 }
 
 #[tokio::test]
-async fn the_form_imports_and_comes_back_as_it_was_typed() {
+async fn import_form_imports_and_keeps_the_input_after_an_error() {
     let (_folder, service) = service().await;
     let kind = "application/x-www-form-urlencoded";
     let form = |recording: &str, height: &str| {
         let recording = recording.replace('\n', "%0D%0A").replace(',', "%2C");
-        format!("name=S03%2C+level&form=csv&strikes=kinematics&height_m={height}&body_mass_kg=&recording={recording}")
+        format!("name=S03%2C+level&format=csv&strikes=kinematics&height_m={height}&body_mass_kg=&recording={recording}")
     };
     let refused = service.post_text("/reference-gaits", kind, &form(&recording(), "tall")).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
@@ -141,7 +141,7 @@ fn between(rows: &[Vec<f64>], column: usize, time: f64) -> f64 {
 }
 
 #[tokio::test]
-async fn the_table_of_a_gait_comes_back_as_the_same_curves() {
+async fn exported_gait_table_is_imported_as_the_same_curves() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 1).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -152,7 +152,7 @@ async fn the_table_of_a_gait_comes_back_as_the_same_curves() {
         table.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(0.0)).collect()).collect();
     rows.dedup_by_key(|row| row[0].to_bits());
     let end = rows.last().unwrap()[0];
-    let body = json!({"name": "our own", "form": "csv", "recording": table, "strikes": "ends"});
+    let body = json!({"name": "our own", "format": "csv", "recording": table, "strikes": "ends"});
     let imported = service.post("/api/v1/reference-gaits", &body).await;
     assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
     let angles = imported.json()["definition"]["angles_rad"].clone();
@@ -179,7 +179,7 @@ fn body_with(body: &Value, recording: &str) -> Value {
 }
 
 #[tokio::test]
-async fn a_new_study_takes_the_reference_gait_nearest_to_its_subject() {
+async fn new_study_uses_the_reference_gait_nearest_to_its_subject() {
     let (_folder, service) = service().await;
     let near = service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json();
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await.json();

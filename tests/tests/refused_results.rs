@@ -26,7 +26,7 @@ fn job(number: u32) -> Assignment {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn result_that_is_never_recorded_is_delivered_ten_times_and_left_out() {
+async fn unrecordable_result_is_delivered_ten_times_and_then_dropped() {
     let Some(broker) = Broker::start() else { return };
     let engine = JetStream::connect(&broker.url(), QUEUE, 1, Duration::from_millis(200)).await.unwrap();
     let context = async_nats::jetstream::new(async_nats::connect(broker.url()).await.unwrap());
@@ -53,7 +53,7 @@ async fn result_that_is_never_recorded_is_delivered_ten_times_and_left_out() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn worker_whose_results_are_refused_gives_up_and_takes_the_next_job() {
+async fn worker_gives_up_a_refused_result_and_takes_the_next_job() {
     let Some(broker) = Broker::start() else { return };
     let context = async_nats::jetstream::new(async_nats::connect(broker.url()).await.unwrap());
     let results = |largest| Config {

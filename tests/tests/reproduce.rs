@@ -13,7 +13,7 @@ use gaitwright_tests::skipped::skipped;
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
 #[test]
-fn nonsense_is_refused_before_anything_is_solved() {
+fn invalid_arguments_are_refused_before_the_first_solve() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, expected) in [
         (["reproduce", "--trials", "0"], "must be a whole number from 1 to 10000"),
@@ -54,7 +54,7 @@ async fn failed_trials_are_reported_with_their_own_exit_code() {
 }
 
 #[tokio::test]
-async fn the_report_draws_the_band_of_a_reference_that_has_one_and_says_where_there_is_none() {
+async fn report_has_a_deviation_band_or_states_that_it_has_none() {
     let folder = tempfile::tempdir().unwrap();
     let plain = ReferenceGait { standard_deviation_rad: None, ..ReferenceGait::builtin().unwrap() };
     std::fs::write(folder.path().join("plain.json"), serde_json::to_string(&plain).unwrap()).unwrap();
@@ -94,7 +94,7 @@ async fn the_report_draws_the_band_of_a_reference_that_has_one_and_says_where_th
 }
 
 #[test]
-fn a_short_comparison_ends_in_a_report_that_stands_alone() {
+fn short_comparison_writes_a_self_contained_report() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
         skipped("set GAITWRIGHT_LONG_TESTS=1");
         return;

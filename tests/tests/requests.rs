@@ -36,7 +36,7 @@ async fn rename(service: &Service, path: &str, if_match: &[&str]) -> Answer {
 }
 
 #[tokio::test]
-async fn a_change_is_made_from_one_of_the_revisions_that_it_names_or_not_at_all() {
+async fn change_with_an_outdated_revision_is_refused() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.start = false).await;
     let path = format!("/api/v1/studies/{study}");
@@ -86,7 +86,7 @@ async fn event_listener_with_an_unknown_last_id_receives_new_events() {
 }
 
 #[tokio::test]
-async fn a_parameter_that_no_list_knows_is_refused() {
+async fn unknown_parameter_of_a_list_is_refused() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.start = false).await;
     let of_study = format!("studies/{study}");
@@ -99,7 +99,7 @@ async fn a_parameter_that_no_list_knows_is_refused() {
 }
 
 #[tokio::test]
-async fn a_field_of_the_wrong_type_is_named_with_its_value_and_what_would_be_read() {
+async fn field_of_the_wrong_type_is_refused_with_its_value_and_the_expected_type() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
     for (path, body, field, value, allowed) in [
@@ -119,7 +119,7 @@ async fn a_field_of_the_wrong_type_is_named_with_its_value_and_what_would_be_rea
 }
 
 #[test]
-fn the_answers_of_raters_are_described_as_they_are_taken() {
+fn description_of_rater_answers_matches_the_accepted_ones() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let answer = &document["components"]["schemas"]["RaterAnswer"]["properties"]["answer"];
     let words = answer["enum"].as_array().unwrap();
@@ -176,7 +176,7 @@ async fn timeouts_panics_and_bare_statuses_are_problem_documents() {
 }
 
 #[tokio::test]
-async fn every_refusal_of_the_service_names_its_request_and_every_problem_type_has_a_page() {
+async fn refusals_have_request_identifiers_and_problem_types_have_pages() {
     let (_folder, service) = service().await;
     for (answer, status, kind) in [
         (service.fetch("/api/v1/nothing").await, 404, "/problems/not-found"),
@@ -211,7 +211,7 @@ async fn every_refusal_of_the_service_names_its_request_and_every_problem_type_h
 }
 
 #[tokio::test]
-async fn a_request_without_exactly_one_host_is_refused() {
+async fn request_without_exactly_one_host_is_refused() {
     let (_folder, service) = service().await;
     let router = router(service.state());
     let status = async |hosts: &[&str], version: Version, uri: &str| {
@@ -234,7 +234,7 @@ async fn a_request_without_exactly_one_host_is_refused() {
 }
 
 #[tokio::test]
-async fn a_request_with_two_idempotency_keys_is_refused() {
+async fn request_with_two_idempotency_keys_is_refused() {
     let (_folder, service) = service().await;
     let body = json!({"pseudonym": "S1", "height_m": 1.8, "body_mass_kg": 70}).to_string();
     let request = Request::post("/api/v1/subjects").header(header::CONTENT_TYPE, "application/json");
@@ -268,7 +268,7 @@ const PROXY: &str = "127.0.0.1:50000";
 const STRANGER: &str = "192.0.2.7:50000";
 
 #[tokio::test]
-async fn cookies_and_origins_follow_what_a_trusted_proxy_says() {
+async fn cookies_and_origins_follow_the_headers_of_a_trusted_proxy() {
     let (_folder, service, router) = behind_a_proxy().await;
     let (_, link) = callers::user(&service, "Ada", Role::Admin).await;
     let send = async |request: Request<Body>| Answer::of(router.clone().oneshot(request).await.unwrap()).await;
@@ -300,7 +300,7 @@ async fn cookies_and_origins_follow_what_a_trusted_proxy_says() {
 }
 
 #[tokio::test]
-async fn forwarded_headers_of_strangers_change_nothing() {
+async fn forwarded_headers_of_untrusted_proxies_are_ignored() {
     let (_folder, service, router) = behind_a_proxy().await;
     let send = async |request: Request<Body>| Answer::of(router.clone().oneshot(request).await.unwrap()).await;
     let lie = [("host", "gait.example"), ("x-forwarded-proto", "https"), ("x-forwarded-for", "127.0.0.1")];
@@ -338,7 +338,7 @@ async fn service_without_sign_in_refuses_forwarded_requests() {
 }
 
 #[tokio::test]
-async fn an_absent_body_replaces_nothing() {
+async fn missing_body_replaces_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let muscles = format!("/api/v1/subjects/{}/muscles", service.subject().await);
@@ -352,7 +352,7 @@ async fn an_absent_body_replaces_nothing() {
 }
 
 #[tokio::test]
-async fn searches_and_keys_are_accepted_exactly_as_described() {
+async fn searches_and_keys_are_accepted_if_and_only_if_they_match_the_description() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     for list in ["audit", "access-log"] {

@@ -25,7 +25,7 @@ async fn counts(service: &Service) -> Vec<(String, i64)> {
 }
 
 #[tokio::test]
-async fn expired_keys_sessions_and_links_are_dropped_and_nothing_else() {
+async fn only_expired_keys_sessions_and_links_are_deleted() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| new.trial_budget = 3).await;

@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn health_answers_while_eight_requests_compute() {
+async fn health_responds_while_eight_requests_compute() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
@@ -69,7 +69,7 @@ async fn set(service: &Service, pragma: &str) {
 }
 
 #[tokio::test]
-async fn full_disk_is_answered_with_507_and_the_service_goes_on_when_there_is_room() {
+async fn service_refuses_with_507_on_a_full_disk_and_continues_when_there_is_space() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     // A file that may not grow, in place of a disk that is full.
@@ -117,7 +117,7 @@ impl Drop for SmallDisk {
 }
 
 #[tokio::test]
-async fn full_file_system_loses_nothing_acknowledged_and_is_reported() {
+async fn full_file_system_is_reported_and_loses_no_acknowledged_change() {
     let Some(disk) = SmallDisk::mount() else {
         println!("skipped: a small disk cannot be mounted here");
         return;
@@ -168,7 +168,7 @@ async fn full_file_system_loses_nothing_acknowledged_and_is_reported() {
 }
 
 #[tokio::test]
-async fn not_ready_while_the_record_takes_no_changes() {
+async fn service_is_not_ready_while_the_record_accepts_no_changes() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     assert_eq!(service.fetch("/ready").await.text, "ready");
@@ -181,7 +181,7 @@ async fn not_ready_while_the_record_takes_no_changes() {
 }
 
 #[tokio::test]
-async fn studies_are_refused_and_answers_taken_when_space_runs_short() {
+async fn low_disk_space_stops_new_studies_but_not_answers() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = json!({"subject_id": service.subject().await, "muscles": false, "trial_budget": 2});
@@ -235,7 +235,7 @@ impl Dispatch for Breaks {
 }
 
 #[tokio::test]
-async fn a_panic_of_a_task_is_reported_and_the_task_begun_again() {
+async fn panicking_task_is_reported_and_restarted() {
     let folder = tempfile::tempdir().unwrap();
     let broken = Arc::new(AtomicBool::new(true));
     let inner = InProcess::new(1, Arc::new(Analytic::default()));
@@ -259,7 +259,7 @@ async fn a_panic_of_a_task_is_reported_and_the_task_begun_again() {
 }
 
 #[tokio::test]
-async fn page_of_a_study_with_7300_answers_stays_small_and_fast() {
+async fn study_page_with_7300_answers_stays_small_and_fast() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
@@ -286,7 +286,7 @@ async fn page_of_a_study_with_7300_answers_stays_small_and_fast() {
 }
 
 #[tokio::test]
-async fn study_form_is_checked_while_a_change_holds_the_only_writer() {
+async fn study_form_is_checked_while_another_change_holds_the_writer() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let studies = service.fetch("/api/v1/studies").await.text;

@@ -42,7 +42,7 @@ async fn waits_at_home(service: &Service) -> bool {
 }
 
 #[tokio::test]
-async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
+async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     let (_folder, service, study) = started(FeedbackMode::Human, 4).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
@@ -100,7 +100,7 @@ async fn safety_report_of_a_rater_is_lifted_by_staff_and_stays_in_the_record() {
 }
 
 #[tokio::test]
-async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
+async fn gait_cleared_by_staff_is_recommended_again() {
     let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
     let recommended = async || service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     let best = recommended().await["trial_id"].clone();
@@ -147,7 +147,7 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
 }
 
 #[tokio::test]
-async fn lifted_safety_report_of_a_walk_opens_anew_at_unblinding() {
+async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
     let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
     let gaits = converged(&service, study).await;
     let sessions = format!("/api/v1/studies/{study}/lab-sessions");
@@ -175,7 +175,7 @@ async fn lifted_safety_report_of_a_walk_opens_anew_at_unblinding() {
 }
 
 #[tokio::test]
-async fn order_of_reviews_survives_a_renumbering_of_their_rows() {
+async fn renumbered_rows_keep_the_order_of_reviews() {
     let (_folder, service, study) = started(FeedbackMode::Automatic, 4).await;
     let gait = converged(&service, study).await[0];
     service.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "stumbled"})).await;

@@ -47,7 +47,7 @@ async fn run(service: &Service, study: StudyId, worker: &str, trials: usize) -> 
 }
 
 #[tokio::test]
-async fn a_script_asks_and_tells_until_the_study_is_finished_and_twice_gives_the_same() {
+async fn lab_script_finishes_a_study_and_two_runs_give_the_same_trials() {
     let (_folder, service) = service().await;
     let first = script_study(&service, 8, 1).await;
     let done = run(&service, first, "rig", 8).await;
@@ -85,7 +85,7 @@ async fn the_octave_script_runs_a_study_to_its_end() {
 }
 
 #[tokio::test]
-async fn a_suggestion_is_sticky_and_each_worker_has_its_own() {
+async fn proposal_stays_with_its_worker() {
     let (_folder, service) = service().await;
     let study = script_study(&service, 10, 2).await;
     let ask = format!("/api/v1/studies/{study}/ask");
@@ -136,7 +136,7 @@ async fn send(service: &Service, method: Method, path: &str, tag: Option<&str>, 
 }
 
 #[tokio::test]
-async fn a_change_made_from_an_old_reading_is_refused() {
+async fn change_based_on_an_old_revision_is_refused() {
     let (_folder, service) = service().await;
     let study = service.study(|new| (new.trial_budget, new.start) = (3, false)).await;
     let path = format!("/api/v1/studies/{study}");
@@ -158,7 +158,7 @@ async fn a_change_made_from_an_old_reading_is_refused() {
 }
 
 #[tokio::test]
-async fn a_finished_study_is_extended_forked_and_compared() {
+async fn finished_study_is_extended_forked_and_compared() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -187,7 +187,7 @@ async fn a_finished_study_is_extended_forked_and_compared() {
 }
 
 #[tokio::test]
-async fn time_and_a_settled_best_end_a_study() {
+async fn study_ends_by_solve_time_or_unchanged_best_action() {
     let (_folder, service) = service().await;
     // Every analytic solve reports 0.01 s; a budget is at least one second.
     let timed = service.study(|new| (new.trial_budget, new.solve_seconds_budget) = (400, Some(1.0))).await;
@@ -202,7 +202,7 @@ async fn time_and_a_settled_best_end_a_study() {
 }
 
 #[tokio::test]
-async fn people_compare_what_a_script_walked() {
+async fn people_compare_trials_of_a_lab_script() {
     let (_folder, service) = service().await;
     let study = service
         .study(|new| {
@@ -229,7 +229,7 @@ async fn people_compare_what_a_script_walked() {
 }
 
 #[tokio::test]
-async fn a_trial_that_did_not_converge_counts_in_its_batch_and_is_compared_with_nothing() {
+async fn trial_without_convergence_counts_in_its_batch_and_is_not_compared() {
     let (_folder, service) = service().await;
     // Batches of three, each action compared with the others of its batch and the newest before it.
     let study = service

@@ -42,7 +42,7 @@ async fn touched(database: &Path, sql: &str) -> PathBuf {
 }
 
 #[tokio::test]
-async fn a_row_that_another_hand_changed_added_or_took_away_is_found() {
+async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted() {
     let (_folder, database) = filled().await;
     assert!(matches!(verify(&database).await, SealCheck::Whole { .. }));
     for sealed in seals::TABLES {
@@ -86,7 +86,7 @@ async fn a_row_that_another_hand_changed_added_or_took_away_is_found() {
 }
 
 #[tokio::test]
-async fn seals_and_audit_rows_that_are_missing_are_found_at_the_end_too() {
+async fn audit_verify_finds_missing_seals_and_audit_rows_at_the_end() {
     let (_folder, database) = filled().await;
     let SealCheck::Whole { seals: count, .. } = verify(&database).await else { panic!("whole") };
     let count = i64::try_from(count).unwrap();
@@ -136,7 +136,7 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
 }
 
 #[tokio::test]
-async fn a_forged_row_of_any_table_keeps_the_record_from_opening() {
+async fn record_with_a_forged_row_is_not_opened() {
     let (_folder, database) = filled().await;
     let (mut tables, mut found) = (0, 0);
     for sealed in seals::TABLES.iter().chain(seals::CHECKED) {
@@ -158,7 +158,7 @@ async fn a_forged_row_of_any_table_keeps_the_record_from_opening() {
 }
 
 #[tokio::test]
-async fn a_changed_or_deleted_row_and_a_changed_schema_keep_the_record_from_opening() {
+async fn record_with_a_changed_or_deleted_row_or_schema_is_not_opened() {
     let (_folder, database) = filled().await;
     let mut statements = vec![
         "delete from audit where seq = 2".to_owned(),
@@ -228,7 +228,7 @@ async fn unnoticed(store: &Store, table: &str, sql: &str) {
 }
 
 #[tokio::test]
-async fn a_row_that_another_program_wrote_is_not_sealed_by_a_later_change() {
+async fn later_change_does_not_seal_a_row_of_another_program() {
     let (folder, database) = filled().await;
     let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'admin', '')";
     for (table, sql, change) in [
@@ -293,7 +293,7 @@ async fn append_seal(database: &Path, table: &str, key: &str) {
 }
 
 #[tokio::test]
-async fn a_seal_of_a_retired_table_that_no_migration_left_is_found() {
+async fn audit_verify_finds_a_forged_seal_of_a_retired_table() {
     let (_folder, database) = filled().await;
     for (retired, copy, column) in [
         ("remarks", "assessments", "id"),
@@ -314,7 +314,7 @@ async fn a_seal_of_a_retired_table_that_no_migration_left_is_found() {
 }
 
 #[tokio::test]
-async fn a_row_can_be_added_changed_and_deleted_several_times_in_one_change() {
+async fn one_change_can_add_change_and_delete_a_row_repeatedly() {
     let (_folder, database) = filled().await;
     let store = Store::open(&database).await.unwrap();
     let link = "insert into sign_in_links (hash, user_id, created_at, expires_at) \
@@ -342,7 +342,7 @@ async fn a_row_can_be_added_changed_and_deleted_several_times_in_one_change() {
 }
 
 #[tokio::test]
-async fn a_changed_row_of_a_table_with_checksums_is_found() {
+async fn audit_verify_finds_a_changed_row_of_a_table_with_checksums() {
     let (_folder, database) = filled().await;
     store_verify::file(&database, &[]).await.unwrap();
     for (sql, table) in [

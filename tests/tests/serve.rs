@@ -68,7 +68,7 @@ impl Drop for Process {
 }
 
 #[test]
-fn the_first_start_prints_a_link_that_signs_in_once() {
+fn first_start_prints_a_sign_in_link_that_works_once() {
     let folder = tempfile::tempdir().unwrap();
     let process = Process::start(folder.path(), &[], "sign in");
     let line = process.said.last().unwrap();
@@ -154,7 +154,7 @@ fn failing_scheduled_backups_are_shown() {
 }
 
 #[test]
-fn logs_are_json_where_that_is_set() {
+fn log_format_json_writes_json_lines() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("gaitwright.toml"), "log_format = \"json\"\n").unwrap();
     let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
@@ -317,13 +317,13 @@ async fn busy_connections_leave_health_answering(addresses: std::ops::RangeInclu
 
 #[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread")]
-async fn busy_connections_of_nine_addresses_leave_another_address_room() {
+async fn busy_connections_of_nine_addresses_leave_capacity_for_another_address() {
     busy_connections_leave_health_answering(2..=10).await;
 }
 
 #[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread")]
-async fn connections_for_which_there_is_no_room_do_not_hold_up_those_of_another_address() {
+async fn refused_connections_do_not_delay_those_of_another_address() {
     // All are below the limit of one address.
     busy_connections_leave_health_answering(2..=19).await;
 }
@@ -340,7 +340,7 @@ async fn nobody_administers(folder: &Path) {
 }
 
 #[tokio::test]
-async fn service_starts_and_lets_an_administrator_in_when_all_are_disabled() {
+async fn service_prints_a_sign_in_link_if_all_administrators_are_disabled() {
     for arguments in [&[][..], &["--sign-in-link"]] {
         let folder = tempfile::tempdir().unwrap();
         nobody_administers(folder.path()).await;
@@ -352,7 +352,7 @@ async fn service_starts_and_lets_an_administrator_in_when_all_are_disabled() {
 }
 
 #[tokio::test]
-async fn users_link_on_the_command_line_lets_its_owner_in() {
+async fn users_link_command_prints_a_working_sign_in_link() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), arguments);
     let nothing = run(&["users", "link", "Ada"]);

@@ -89,7 +89,7 @@ fn standing_at(at: Instant) -> Arc<Access> {
 }
 
 #[tokio::test]
-async fn bodies_of_callers_who_are_not_signed_in_are_small() {
+async fn bodies_of_anonymous_callers_are_limited_in_size() {
     let (_folder, mut service) = service().await;
     service.access = Arc::new(Access::by_sign_in(3600.0));
     let token = token(&service, &[Right::Run]).await;
@@ -177,7 +177,7 @@ async fn right_password_is_accepted_while_others_fail_elsewhere() {
 }
 
 #[tokio::test]
-async fn known_browser_does_not_wait_for_others_in_its_network() {
+async fn known_browser_is_not_delayed_by_others_in_its_network() {
     let (_folder, mut service) = service().await;
     service.access = standing_still();
     with_password(&service, "Ada", Role::Clinician, RIGHT).await;
@@ -206,7 +206,7 @@ async fn known_browser_does_not_wait_for_others_in_its_network() {
 }
 
 #[tokio::test]
-async fn guesses_from_many_ipv6_networks_of_one_site_wait() {
+async fn guesses_from_many_ipv6_networks_of_one_site_are_delayed() {
     let (_folder, mut service) = service().await;
     service.access = standing_still();
     with_password(&service, "Ada", Role::Clinician, RIGHT).await;
@@ -223,7 +223,7 @@ async fn guesses_from_many_ipv6_networks_of_one_site_wait() {
 }
 
 #[tokio::test]
-async fn guesses_from_many_networks_wait_a_few_seconds_and_known_browsers_do_not() {
+async fn guesses_from_many_networks_are_delayed_and_known_browsers_are_not() {
     let (folder, mut service) = service().await;
     let at = now().plus_seconds(3600);
     service.access = standing_at(at);
@@ -273,7 +273,7 @@ async fn cookie_of_a_known_browser_allows_no_more_guesses_than_many_networks() {
 }
 
 #[tokio::test]
-async fn ten_thousand_aborted_sign_ins_with_fresh_names_do_not_erase_the_failures_of_an_account() {
+async fn ten_thousand_aborted_sign_ins_do_not_erase_the_failures_of_an_account() {
     let (folder, service) = service().await;
     with_password(&service, "Ada", Role::Admin, RIGHT).await;
     for _ in 0..5 {
@@ -305,7 +305,7 @@ async fn ten_thousand_aborted_sign_ins_with_fresh_names_do_not_erase_the_failure
 }
 
 #[tokio::test]
-async fn own_sign_in_does_not_clear_the_count_of_guesses_at_other_names() {
+async fn sign_in_with_another_name_does_not_reset_the_count_of_failures() {
     let (_folder, mut service) = service().await;
     service.access = standing_still();
     with_password(&service, "admin", Role::Admin, RIGHT).await;
@@ -321,7 +321,7 @@ async fn own_sign_in_does_not_clear_the_count_of_guesses_at_other_names() {
 }
 
 #[tokio::test]
-async fn thirty_thousand_attempts_are_visible_with_their_number() {
+async fn audit_trail_shows_the_number_of_thirty_thousand_attempts() {
     let (_folder, service) = service().await;
     let admin = signed_in(&service, Role::Admin).await;
     abort_attempts(&service, "192.0.2.66", (0..30_000).map(|_| "admin".to_owned())).await;
@@ -346,7 +346,7 @@ async fn thirty_thousand_attempts_are_visible_with_their_number() {
 }
 
 #[tokio::test]
-async fn passwords_that_are_easily_guessed_are_refused() {
+async fn account_page_refuses_easily_guessed_passwords() {
     let (_folder, service) = service().await;
     let (_, link) = user(&service, "Ada Lovelace", Role::Clinician).await;
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
@@ -393,7 +393,7 @@ async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
 }
 
 #[tokio::test]
-async fn role_changes_hold_from_the_next_request_and_are_audited() {
+async fn role_changes_apply_from_the_next_request_and_are_audited() {
     let (_folder, service) = service().await;
     let admin = signed_in(&service, Role::Admin).await;
     let (ada, link) = user(&service, "Ada", Role::Rater).await;
@@ -439,7 +439,7 @@ async fn token_by(service: &Service, id: UserId, name: &str, role: Role) -> As {
 }
 
 #[tokio::test]
-async fn tokens_and_sessions_end_with_the_user_who_made_them() {
+async fn disabling_a_user_ends_their_tokens_and_sessions() {
     let (_folder, service) = service().await;
     let root = signed_in(&service, Role::Admin).await;
     with_password(&service, "Dee", Role::Admin, RIGHT).await;
@@ -543,7 +543,7 @@ fn access(limits: Limits, offset: &Arc<AtomicI64>) -> Arc<Access> {
 const LIMITS: Limits = Limits { idle_seconds: 3600.0, lifetime_seconds: 8.0 * 3600.0 };
 
 #[tokio::test]
-async fn sessions_in_use_end_after_their_lifetime() {
+async fn active_sessions_end_after_their_lifetime() {
     let (_folder, mut service) = service().await;
     let offset = Arc::new(AtomicI64::new(0));
     service.access = access(LIMITS, &offset);
@@ -624,7 +624,7 @@ async fn listen(service: &Service, who: &As, path: &str) -> axum::body::BodyData
 }
 
 #[tokio::test]
-async fn event_streams_end_with_what_allowed_them() {
+async fn event_streams_end_when_their_authorization_ends() {
     let (_folder, mut service) = service().await;
     let offset = Arc::new(AtomicI64::new(0));
     service.access = access(LIMITS, &offset);
@@ -680,7 +680,7 @@ async fn event_streams_end_with_what_allowed_them() {
 }
 
 #[test]
-fn event_streams_are_made_in_one_place_that_asks_who_listens() {
+fn one_module_creates_event_streams_and_checks_the_caller() {
     let found = sources::of_server();
     let makes = |text: &str| ["Sse::new", "Body::from_stream", "StreamBody"].iter().any(|way| text.contains(way));
     let makers: Vec<&str> = found.iter().filter(|(_, text)| makes(text)).map(|(path, _)| path.as_str()).collect();
@@ -692,7 +692,7 @@ fn event_streams_are_made_in_one_place_that_asks_who_listens() {
 }
 
 #[tokio::test]
-async fn way_in_is_a_new_administrator_when_all_are_disabled() {
+async fn new_administrator_is_created_if_all_are_disabled() {
     let (_folder, service) = service().await;
     let mut writer = service.store.write().await.unwrap();
     let add = NewUser { name: "admin".to_owned(), role: Role::Admin };

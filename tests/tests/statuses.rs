@@ -1,7 +1,7 @@
 //! The statuses in the description are those of the operations. Every refusal that does not depend on the state of the
 //! record is provoked here, for every operation.
 //!
-//! Rights are in `access.rs`, withdrawn consent is in `consent.rs`, bodies beyond the description in `drawn_bodies.rs`.
+//! Rights are in `access.rs`, withdrawn consent is in `consent.rs`, bodies beyond the description in `random_bodies.rs`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -121,7 +121,7 @@ impl Scene {
 const UNKNOWN: &str = "01890000-0000-7000-8000-000000000000";
 
 #[tokio::test]
-async fn refusals_that_are_described_are_given() {
+async fn described_refusals_occur() {
     let scene = Scene::set().await;
     let json_body = [("content-type", "application/json")];
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();

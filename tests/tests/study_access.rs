@@ -113,7 +113,7 @@ const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "reference-gaits"];
 
 /// Every operation of the description and every page that names something of a study: method, address with placeholders,
 /// and the start that says what it names.
-fn doors() -> Vec<(Method, String, String)> {
+fn entry_points() -> Vec<(Method, String, String)> {
     let mut all = Vec::new();
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     for (path, item) in document["paths"].as_object().unwrap() {
@@ -147,8 +147,8 @@ fn without_identifiers(answer: &Answer, id: &str) -> (StatusCode, String) {
     (answer.status, answer.text.replace(id, "ID").replace(request, "REQUEST"))
 }
 
-/// What is sent to a door, and a body that it may or may not accept.
-async fn knock(service: &Service, who: &As, method: &Method, path: &str, id: &str) -> Answer {
+/// Calls an entry point with a body that it may refuse.
+async fn call(service: &Service, who: &As, method: &Method, path: &str, id: &str) -> Answer {
     let address = path.replace("{id}", id).replace("{file}", "rmse.csv");
     let (kind, body) = if path.starts_with("/api/") { (JSON, "{}") } else { (FORM, "") };
     send(service, who, method, &address, kind, if *method == Method::GET { "" } else { body }).await
@@ -161,20 +161,20 @@ async fn newest_act(service: &Service) -> String {
 }
 
 #[tokio::test]
-async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() {
+async fn every_entry_point_reports_a_restricted_study_as_unknown_to_non_members() {
     let closed = Closed::new().await;
     let outsiders = closed.outsiders().await;
     let before = newest_act(&closed.service).await;
-    let doors = doors();
-    assert!(doors.len() > 100, "{}", doors.len());
+    let entry_points = entry_points();
+    assert!(entry_points.len() > 100, "{}", entry_points.len());
     let mut refused = BTreeMap::new();
-    for (method, path, start) in &doors {
-        let what = || panic!("{path}: say in this test what it names, or that it is shared");
+    for (method, path, start) in &entry_points {
+        let what = || panic!("{path}: add what it names to `names`, or add it to `SHARED`");
         let id = closed.names.get(start.as_str()).unwrap_or_else(what);
         for (who, name, ..) in &outsiders {
-            let there = knock(&closed.service, who, method, path, id).await;
+            let there = call(&closed.service, who, method, path, id).await;
             let unknown = if path.contains("/jobs/") { format!("solve-{UNKNOWN}") } else { UNKNOWN.to_owned() };
-            let nowhere = knock(&closed.service, who, method, path, &unknown).await;
+            let nowhere = call(&closed.service, who, method, path, &unknown).await;
             let said = format!("{method} {path} as {name}: {} {}", there.status, there.text);
             assert!(matches!(there.status, StatusCode::NOT_FOUND | StatusCode::FORBIDDEN), "{said}");
             assert_eq!(without_identifiers(&there, id), without_identifiers(&nowhere, &unknown), "{said}");
@@ -185,18 +185,18 @@ async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() 
     assert!(refused.values().all(|count| *count > 0) && refused["a clinician"] > 90, "{refused:?}");
     assert_eq!(newest_act(&closed.service).await, before, "nothing was changed");
 
-    // The same callers as members: every door that their rights open lets them through.
+    // The same callers as members: every entry point that their rights cover accepts them.
     for (_, _, kind, name) in &outsiders {
         member(&closed.service, closed.study, *kind, name).await;
     }
-    for (method, path, start) in doors.iter().filter(|(method, ..)| *method == Method::GET) {
+    for (method, path, start) in entry_points.iter().filter(|(method, ..)| *method == Method::GET) {
         for (who, name, ..) in &outsiders {
             if path.ends_with("/events") {
                 continue;
             }
-            let there = knock(&closed.service, who, method, path, &closed.names[start.as_str()]).await;
+            let there = call(&closed.service, who, method, path, &closed.names[start.as_str()]).await;
             let unknown = if path.contains("/jobs/") { format!("solve-{UNKNOWN}") } else { UNKNOWN.to_owned() };
-            let nowhere = knock(&closed.service, who, method, path, &unknown).await;
+            let nowhere = call(&closed.service, who, method, path, &unknown).await;
             let said = format!("{method} {path} as {name}: {} {}", there.status, there.text);
             let same =
                 without_identifiers(&there, &closed.names[start.as_str()]) == without_identifiers(&nowhere, UNKNOWN);
@@ -213,11 +213,11 @@ async fn studies_of_a_subject_who_withdrew_cannot_be_changed_except_by_removing_
     let subject = service.subject().await;
     post(service, admin, &format!("/api/v1/subjects/{subject}/withdraw"), &json!({"reason": "moved away"})).await;
     let before = newest_act(service).await;
-    let changing = doors().into_iter().filter(|(method, ..)| *method != Method::GET);
+    let changing = entry_points().into_iter().filter(|(method, ..)| *method != Method::GET);
     let removal = ["/api/v1/study-members/{id}/remove", "/studies/{id}/members"];
     let mut refused = 0;
     for (method, path, start) in changing.filter(|(_, path, _)| !removal.contains(&path.as_str())) {
-        let answer = knock(service, admin, &method, &path, &closed.names[start.as_str()]).await;
+        let answer = call(service, admin, &method, &path, &closed.names[start.as_str()]).await;
         assert_eq!(answer.status, StatusCode::CONFLICT, "{method} {path}: {}", answer.text);
         assert!(answer.text.contains("withdrew consent"), "{method} {path}: {}", answer.text);
         refused += 1;
@@ -259,7 +259,7 @@ async fn members_are_removed_on_the_page_of_a_study_whose_subject_withdrew() {
 }
 
 #[tokio::test]
-async fn lists_show_a_restricted_study_to_its_members_alone() {
+async fn lists_show_a_restricted_study_to_members_only() {
     let closed = Closed::new().await;
     let service = &closed.service;
     let open = service.study(|new| new.trial_budget = 2).await;
@@ -328,7 +328,7 @@ async fn asking() -> (TempDir, Service, StudyId, As) {
 }
 
 #[tokio::test]
-async fn rater_reaches_assigned_studies_alone_until_removed() {
+async fn rater_accesses_assigned_studies_only_until_removed() {
     let (_folder, service, study, rater) = asking().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
@@ -351,12 +351,12 @@ async fn rater_reaches_assigned_studies_alone_until_removed() {
     assert!(list.text.contains(&format!("/rate/{study}")), "{}", list.text);
     let pair = post(&service, &rater, &next, &json!({})).await;
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
-    let doors = [
+    let addresses = [
         (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/first")),
         (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/second")),
         (Method::GET, format!("/rate/pair/{token}")),
     ];
-    for (method, path) in &doors {
+    for (method, path) in &addresses {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::OK, "{path}");
     }
 
@@ -367,7 +367,7 @@ async fn rater_reaches_assigned_studies_alone_until_removed() {
     assert_eq!(twice.status, StatusCode::CONFLICT, "{}", twice.text);
     let (answer, body) = (format!("/api/v1/blind-pairs/{token}/answer"), r#"{"answer": "first"}"#);
     let form = format!("/rate/pair/{token}");
-    for (method, path) in &doors {
+    for (method, path) in &addresses {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::NOT_FOUND, "{path}");
     }
     assert_eq!(send(&service, &rater, &Method::POST, &answer, JSON, body).await.status, StatusCode::NOT_FOUND);
@@ -415,7 +415,7 @@ async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restrict
 }
 
 #[tokio::test]
-async fn event_stream_ends_for_whoever_is_removed() {
+async fn event_stream_of_a_removed_member_ends() {
     let (_folder, service, study, _) = asking().await;
     let admin = signed_in(&service, Role::Admin).await;
     let As::Session(secret) = signed_in(&service, Role::Clinician).await else { panic!("a session") };
@@ -475,7 +475,7 @@ async fn rater_is_invited_with_assignment_and_link_in_one_step() {
 }
 
 #[tokio::test]
-async fn study_that_is_made_restricted_is_never_open() {
+async fn study_created_as_restricted_is_never_open() {
     let (_folder, service) = service().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let other = token(&service, &[Right::Read, Right::Run]).await;
@@ -512,7 +512,7 @@ async fn answered_by_people(service: &Service) -> (StudyId, Vec<String>) {
 }
 
 #[tokio::test]
-async fn one_person_answers_a_pair_once_however_the_name_is_written() {
+async fn person_answers_a_pair_once_under_any_spelling_of_the_name() {
     let (_folder, service) = service().await;
     let script = token(&service, &[Right::Read, Right::Answer]).await;
     let clinician = signed_in(&service, Role::Clinician).await;
@@ -540,7 +540,7 @@ async fn one_person_answers_a_pair_once_however_the_name_is_written() {
 }
 
 #[tokio::test]
-async fn trial_of_another_study_is_answered_as_one_that_does_not_exist() {
+async fn trial_of_another_study_looks_unknown() {
     let (_folder, service) = service().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let (study, gaits) = answered_by_people(&service).await;

@@ -20,7 +20,7 @@ async fn heard(service: &Service, study: StudyId) -> Vec<Feedback> {
 }
 
 #[tokio::test]
-async fn the_learner_hears_a_suggestion_until_it_is_taken_back() {
+async fn learner_uses_a_suggestion_until_it_is_retracted() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Mixed)).await;
@@ -67,7 +67,7 @@ async fn the_learner_hears_a_suggestion_until_it_is_taken_back() {
 }
 
 #[tokio::test]
-async fn suggestion_counts_once_for_each_person_and_not_against_their_own_answer() {
+async fn suggestion_counts_once_for_each_person_and_not_besides_their_answer() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
@@ -142,7 +142,7 @@ async fn queued_jobs_and_workers_are_listed() {
 }
 
 #[tokio::test]
-async fn a_copy_is_made_and_checked_on_request() {
+async fn requested_backup_is_made_and_checked() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let copied = service.backed_up().await;
@@ -155,7 +155,7 @@ async fn a_copy_is_made_and_checked_on_request() {
 }
 
 #[tokio::test]
-async fn copies_that_are_asked_for_together_are_made_one_after_the_other() {
+async fn simultaneous_backup_requests_run_one_after_another() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let asked = (0..6).map(|_| service.backed_up());

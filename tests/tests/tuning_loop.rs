@@ -13,7 +13,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, trials};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
-use gaitwright_tests::away::Away;
+use gaitwright_tests::engine_without_workers::Away;
 use gaitwright_tests::service::Service;
 use serde_json::json;
 use std::collections::HashMap;
@@ -111,14 +111,14 @@ async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
 }
 
 #[tokio::test]
-async fn the_same_seed_gives_the_same_trials_and_another_one_others() {
+async fn equal_seeds_give_equal_trials_and_different_seeds_different_ones() {
     let first = undisturbed(7, 12).await;
     assert_eq!(first, undisturbed(7, 12).await);
     assert_ne!(first, undisturbed(8, 12).await);
 }
 
 #[tokio::test]
-async fn a_study_stopped_in_the_middle_of_solves_goes_on_to_the_same_trials() {
+async fn study_interrupted_during_solves_continues_with_the_same_trials() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let slow = || Analytic::slow(Duration::from_millis(2));
@@ -169,7 +169,7 @@ async fn three_failures_in_a_row_pause_a_study() {
 }
 
 #[tokio::test]
-async fn several_workers_and_studies_share_the_pool_without_doing_anything_twice() {
+async fn workers_and_studies_share_the_pool_without_repeated_jobs() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 3).await;
     let mut studies = Vec::new();
@@ -201,7 +201,7 @@ async fn handed_over(engine: &Away, jobs: usize) -> Vec<Attempt> {
 }
 
 #[tokio::test]
-async fn higher_priorities_go_first_and_equal_ones_share() {
+async fn higher_priorities_run_first_and_equal_ones_share() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     // Made while nothing is handed out, so that the first plan sees all of them.
@@ -232,7 +232,7 @@ async fn higher_priorities_go_first_and_equal_ones_share() {
 }
 
 #[tokio::test]
-async fn pausing_withdraws_jobs_that_no_worker_began() {
+async fn pause_cancels_jobs_that_have_not_started() {
     let folder = tempfile::tempdir().unwrap();
     let engine = Away { size: 2, ..Away::default() };
     let service = Service::start_with(&folder.path().join("a.db"), Arc::new(engine.clone())).await;
@@ -251,7 +251,7 @@ async fn pausing_withdraws_jobs_that_no_worker_began() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_cancelled_solve_stops_within_one_iteration() {
+async fn cancelled_solve_stops_within_one_iteration() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(Duration::from_millis(100));
     let made = Arc::clone(&solver.made);
@@ -270,7 +270,7 @@ async fn a_cancelled_solve_stops_within_one_iteration() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn trial_whose_workers_vanish_is_lost_and_can_be_retried() {
+async fn trial_of_vanished_workers_is_lost_and_can_be_retried() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic { hangs: 3, ..Analytic::default() };
     let engine = InProcess::new(1, Arc::new(solver)).with_lease(Duration::from_millis(600));

@@ -108,7 +108,7 @@ async fn assert_upgraded(database: &Path, old: &Path) {
 }
 
 #[test]
-fn a_record_of_the_present_form_is_kept_for_the_next_upgrade() {
+fn record_with_the_present_schema_is_stored_for_the_next_upgrade() {
     assert_eq!(RECORDS.last().unwrap().0, SCHEMA_VERSION, "write one with the example every_table");
 }
 
@@ -158,7 +158,7 @@ fn lines(archive: &[u8]) -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn archive_of_an_upgraded_record_omits_the_orders_of_the_baseline() {
+async fn archive_of_an_upgraded_record_omits_the_allocations_of_the_baseline() {
     let (_folder, database) = unpacked(V1);
     let store = Store::open(&database).await.unwrap();
     let mut reader = store.read().await.unwrap();
@@ -180,7 +180,7 @@ async fn archive_of_an_upgraded_record_omits_the_orders_of_the_baseline() {
 }
 
 #[tokio::test]
-async fn upgrade_keeps_one_copy_of_the_record_as_it_was() {
+async fn upgrade_keeps_a_copy_of_the_old_record() {
     let (folder, database) = unpacked(V1);
     let old = folder.path().join("old.db");
     std::fs::copy(&database, &old).unwrap();
@@ -203,7 +203,7 @@ async fn upgrade_keeps_one_copy_of_the_record_as_it_was() {
 }
 
 #[tokio::test]
-async fn an_upgrade_that_is_killed_is_made_by_the_next_start() {
+async fn killed_upgrade_is_repeated_by_the_next_start() {
     let old_folder = tempfile::tempdir().unwrap();
     let old = old_folder.path().join("old.db");
     std::fs::write(&old, zstd::decode_all(V1).unwrap()).unwrap();
@@ -238,7 +238,7 @@ async fn an_upgrade_that_is_killed_is_made_by_the_next_start() {
 }
 
 #[tokio::test]
-async fn a_row_forged_in_an_old_record_is_not_sealed_by_the_upgrade() {
+async fn upgrade_does_not_seal_a_forged_row() {
     let (_folder, database) = unpacked(V1);
     let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(&database)).await.unwrap();
     sqlx::query("insert into consents (subject_id, kind, note, actor, created_at) select id, 'given', 'x', 'x', '' from subjects limit 1")
@@ -252,7 +252,7 @@ async fn a_row_forged_in_an_old_record_is_not_sealed_by_the_upgrade() {
 }
 
 #[tokio::test]
-async fn record_with_a_gap_in_its_list_of_migrations_is_refused() {
+async fn record_with_a_missing_migration_is_refused() {
     let (_, newest) = RECORDS[RECORDS.len() - 1];
     for missing in 1..=SCHEMA_VERSION {
         let (_folder, database) = unpacked(newest);

@@ -1,8 +1,8 @@
 // @ts-check
 // The animated stick figure of a gait, or of two on one clock. The server computes the positions.
 
-import { mayMove, showStrips } from "./strips.mjs";
-import { Clocks } from "./two_clocks.mjs";
+import { mayMove, showStrips } from "./reduced_motion.mjs";
+import { Clocks } from "./stride_clock.mjs";
 
 /**
  * @typedef {[number, number]} Place
@@ -243,7 +243,7 @@ class Player {
     });
     const pace = /** @type {HTMLSelectElement | null} */ (controls.querySelector("[data-pace]"));
     pace?.addEventListener("change", () => {
-      this.clocks.keep(/** @type {import("./two_clocks.mjs").Pace} */ (pace.value));
+      this.clocks.keep(/** @type {import("./stride_clock.mjs").Pace} */ (pace.value));
       this.draw();
     });
     for (const scene of scenes) new ResizeObserver(() => this.draw()).observe(scene.canvas);

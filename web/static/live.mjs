@@ -3,7 +3,7 @@
 // Sorting and filtering the trials changes the address and loads only the table.
 // Without this script the page is current after a reload, and sorting and filtering reload it.
 
-import { holdsEdits } from "./edited.mjs";
+import { holdsEdits } from "./edited_fields.mjs";
 
 const live = /** @type {HTMLElement | null} */ (document.getElementById("live"));
 

@@ -1,8 +1,8 @@
 // @ts-check
 // Two motions, synchronised by gait cycle or by time, with the same scale and colours. The server computes the positions.
 
-import { mayMove, showStrips } from "./strips.mjs";
-import { Clocks } from "./two_clocks.mjs";
+import { mayMove, showStrips } from "./reduced_motion.mjs";
+import { Clocks } from "./stride_clock.mjs";
 
 /** @typedef {[number, number]} Place */
 
@@ -108,7 +108,7 @@ if (box) {
       label();
       clocks.place = Number(scrub.value) / 100;
     });
-    pace.addEventListener("change", () => clocks.keep(/** @type {import("./two_clocks.mjs").Pace} */ (pace.value)));
+    pace.addEventListener("change", () => clocks.keep(/** @type {import("./stride_clock.mjs").Pace} */ (pace.value)));
     const took = /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms"));
     // Runs before the form data are collected.
     form.addEventListener("submit", () => (took.value = String(Math.round(performance.now() - begun))), { capture: true });

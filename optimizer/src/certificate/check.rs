@@ -27,12 +27,17 @@ impl Check {
 
     /// The value as text.
     pub fn value_in_words(&self) -> String {
-        self.value.map_or_else(|| "not determined".to_owned(), |value| format!("{} {}", figure(value), self.unit))
+        self.value.map_or_else(|| "not determined".to_owned(), |value| self.in_unit(value))
     }
 
     /// The limit as text.
     pub fn limit_in_words(&self) -> String {
-        self.limit.map_or_else(|| "reported only".to_owned(), |limit| format!("{} {}", figure(limit), self.unit))
+        self.limit.map_or_else(|| "no limit (reported only)".to_owned(), |limit| self.in_unit(limit))
+    }
+
+    /// A figure with the unit, if there is one.
+    fn in_unit(&self, value: f64) -> String {
+        format!("{} {}", figure(value), self.unit).trim_end().to_owned()
     }
 }
 
@@ -40,14 +45,15 @@ impl Check {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CheckLocation<'a> {
     pub(super) domain: &'a str,
-    pub(super) time_s: f64,
+    /// Time of the stride; `None` for a value of the whole stride.
+    pub(super) time_s: Option<f64>,
 }
 
 impl<'a> CheckLocation<'a> {
     /// At a fraction of the duration of a domain.
     pub(super) fn within(trajectory: &'a DomainTrajectory, share: f64) -> Self {
         let start = trajectory.time_s.first().copied().unwrap_or(0.0);
-        Self { domain: &trajectory.name, time_s: start + share * trajectory.duration_s }
+        Self { domain: &trajectory.name, time_s: Some(start + share * trajectory.duration_s) }
     }
 }
 
@@ -76,7 +82,10 @@ impl Worst {
     /// Adds a value. A value that is not finite counts as undetermined and is the worst.
     pub(super) fn note(&mut self, quantity: Quantity, value: f64, place: CheckLocation<'_>) {
         let value = value.is_finite().then_some(value);
-        let words = || format!("{}, {:.4} s", place.domain, place.time_s);
+        let words = || match place.time_s {
+            Some(time_s) => format!("{}, {time_s:.4} s", place.domain),
+            None => place.domain.to_owned(),
+        };
         match self.checks.iter_mut().find(|c| c.name == quantity.name) {
             Some(check) => {
                 let worse = match (value, check.value) {

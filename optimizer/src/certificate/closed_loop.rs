@@ -32,11 +32,11 @@ pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Chec
         x = walker.after_stride(&x)?;
         let distance = x - start;
         let name = format!("stride {stride}");
-        let place = CheckLocation { domain: &name, time_s: 0.0 };
+        let place = CheckLocation { domain: &name, time_s: None };
         worst.note(ORBIT_ANGLE, distance.rows(2, 7).amax(), place);
         worst.note(ORBIT_RATE, distance.rows(9, 9).amax(), place);
     }
-    Ok(worst.into_checks(": closed loop"))
+    Ok(worst.into_checks(", closed loop"))
 }
 
 /// Measures the periodic stride at every step of the integration.
@@ -55,7 +55,7 @@ pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: 
     let mut worst = Worst::default();
     for (d, time, x) in &samples {
         let control = &walker.controls[*d];
-        let place = CheckLocation { domain: control.domain.name(), time_s: starts[*d] + time };
+        let place = CheckLocation { domain: control.domain.name(), time_s: Some(starts[*d] + time) };
         let (q, qd) = split(x);
         let phase = control.constraints.phase(&q, &qd, &[0.0; 9]);
         let plan = instant(&gait.domains[*d], phase.s).u;
@@ -82,9 +82,9 @@ pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: 
     for (d, passage) in passages.iter().enumerate() {
         let opens = CYCLE[(d + 1) % CYCLE.len()];
         if let (Some(impact), Some(row)) = (&passage.impact, opens.landing_row()) {
-            let place = CheckLocation { domain: opens.name(), time_s: starts[d] + passage.duration };
+            let place = CheckLocation { domain: opens.name(), time_s: Some(starts[d] + passage.duration) };
             worst.note(IMPULSE, -impact.impulse[row], place);
         }
     }
-    Ok(worst.into_checks(": closed loop"))
+    Ok(worst.into_checks(", closed loop"))
 }

@@ -24,7 +24,7 @@ pub(super) struct AllowedRanges {
 /// Violations at one instant, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LimitExcess {
-    /// Joint and trunk angles, rad.
+    /// Joint and torso angles, rad.
     pub(super) angle: f64,
     /// Velocities, rad/s and m/s.
     pub(super) speed: f64,

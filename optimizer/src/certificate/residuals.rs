@@ -40,7 +40,7 @@ const IMPULSE_SIZE: Quantity = Quantity::judged("C3 impulses beyond their limit"
 const IMPACT_FRICTION: Quantity = Quantity::judged("C3 friction cone of heel strikes", "N s", 1e-4);
 const RESET: Quantity = Quantity::judged("C2 continuity of the stride", "rad", 3e-6);
 const TOUCHDOWN: Quantity = Quantity::judged("C3 touchdown speed", "m/s", 1e-6);
-const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "m, s", 1e-6);
+const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "", 1e-6);
 
 /// Largest absolute value.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
@@ -273,7 +273,7 @@ impl DomainResiduals<'_> {
 /// C4 over the whole stride.
 fn stride(gait: &Gait, worst: &mut Findings) {
     let (limits, bounds) = (&gait.settings.limits, &gait.bounds);
-    let place = CheckLocation { domain: "stride", time_s: 0.0 };
+    let place = CheckLocation { domain: "stride", time_s: None };
     let mut range = |value: f64, low: f64, high: f64| worst.other.note(STRIDE, (low - value).max(value - high), place);
     for velocity in gait.hip_velocity_m_s {
         range(velocity, bounds.a3, bounds.a4);

@@ -108,7 +108,7 @@ fn accelerations_satisfy_contacts_and_output_dynamics() {
 }
 
 #[test]
-fn map_predicts_the_response_to_a_change_of_speed() {
+fn return_map_predicts_the_response_to_a_change_of_speed() {
     let model = model();
     let walker = HybridWalker::new(&model, gait());
     let start = join(&gait().domains[0].q[0], &gait().domains[0].qd[0]);

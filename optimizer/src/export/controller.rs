@@ -50,7 +50,7 @@ const FIELDS: [(&str, &str); 29] = [
     ("domains.phase_end_m", "p at the end of the domain"),
     ("domains.hip_velocity_m_s", "set point of the rate of p, m/s; null in underactuated domains, in which p is free"),
     ("domains.outputs", "joints that the controller drives along a curve y(s)"),
-    ("domains.outputs.joint", "name of the joint; torso is the lean of the trunk"),
+    ("domains.outputs.joint", "name of the joint; torso stands for the torso lean"),
     ("domains.outputs.bezier_rad", "coefficients a_0..a_5 of y(s) = sum of a_i C(5,i) s^i (1-s)^(5-i), rad"),
     ("trajectory", "set points of the prosthetic joints over one stride, for proportional-derivative tracking in time"),
     ("trajectory.rate_hz", "samples per second; the last sample is the end of the stride"),

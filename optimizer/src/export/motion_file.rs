@@ -1,7 +1,7 @@
 //! OpenSim motion files (.mot) with the coordinate names of the planar gait models (gait10dof18musc).
 //!
 //! In OpenSim, pelvis_tilt and lumbar_extension are positive backwards and knee_angle is negative in flexion. The
-//! walker has one link for pelvis and trunk, so lumbar_extension is 0, and hip_flexion is the hip angle of the walker.
+//! walker has one link for pelvis and torso, so lumbar_extension is 0, and hip_flexion is the hip angle of the walker.
 
 use super::samples::samples;
 use crate::gait::Gait;

@@ -111,7 +111,9 @@ impl MotionRecording {
                 format!(" (angles from {}, forces from {})", span(&self.time_s), span(&force.time_s))
             });
             let hint = match how {
-                HeelStrikes::Kinematics => "; for a recording of exactly one stride, use its ends",
+                HeelStrikes::Kinematics => {
+                    "; for a recording of exactly one stride, take its first and last row (`ends`)"
+                }
                 _ => "",
             };
             let reason = format!("right heel strikes found: {}{recorded}; a stride needs two{hint}", found.len());

@@ -8,7 +8,7 @@ const HEIGHT_UNIT_M: f64 = 0.10;
 /// Unit of the difference in body mass, kg: about one standard deviation of adults.
 const MASS_UNIT_KG: f64 = 15.0;
 
-/// Distance of a reference gait from a subject: `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. `None` if the height or mass
+/// Distance from a subject to a reference gait: `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. `None` if the height or mass
 /// of the recorded person is unknown.
 pub fn distance(subject: &Subject, reference: &ReferenceGait) -> Option<f64> {
     let height = (reference.height_m? - subject.height_m) / HEIGHT_UNIT_M;

@@ -77,10 +77,10 @@ impl MotionRecording {
             .filter(|(start, end)| (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start)))
             .filter(|(start, end)| self.is_whole(*start, *end))
             .collect();
-        let kept = format!("{} to {} s, without a gap of {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
+        let kept = format!("{} to {} s, without gaps above {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
             let (shortest, longest) = STRIDE_RANGE_S;
-            let reason = format!("no stride without a gap of {LONGEST_GAP_S} s lasts {shortest} to {longest} s");
+            let reason = format!("no stride without gaps above {LONGEST_GAP_S} s lasts {shortest} to {longest} s");
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let count = strides.len() as f64;

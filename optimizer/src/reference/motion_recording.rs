@@ -105,7 +105,7 @@ impl MotionRecording {
 
     /// Parses Gaitwright's table: `time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad`, optionally
     /// `knee_R_rad` and `right_force_n`. Forward lean, flexion and dorsiflexion are positive; hip angles are relative
-    /// to the trunk. Lines that begin with `#` before the names become provenance.
+    /// to the torso. Lines that begin with `#` before the names become provenance.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -137,23 +137,23 @@ impl MotionRecording {
         let angle = |name: &str| table.column(name).map(|c| c.into_iter().map(|v| v * scale).collect::<Vec<f64>>());
         let pelvis = angle("pelvis_tilt")?;
         let lumbar = if let Some(column) = table.find("lumbar_extension") {
-            steps.push("trunk lean = -(pelvis_tilt + lumbar_extension)".to_owned());
-            steps.push("hip relative to the trunk = hip_flexion - lumbar_extension".to_owned());
+            steps.push("torso lean = -(pelvis_tilt + lumbar_extension)".to_owned());
+            steps.push("hip relative to the torso = hip_flexion - lumbar_extension".to_owned());
             column.into_iter().map(|v| v * scale).collect()
         } else {
-            steps.push("no column lumbar_extension: the trunk moves with the pelvis, hip = hip_flexion".to_owned());
+            steps.push("no column lumbar_extension: the torso moves with the pelvis, hip = hip_flexion".to_owned());
             vec![0.0; table.len()]
         };
         steps.push("knee flexion = -knee_angle".to_owned());
         let rows = 0..table.len();
-        let from_trunk = |hip: &[f64]| hip.iter().zip(&lumbar).map(|(h, l)| h - l).collect::<Vec<f64>>();
+        let from_torso = |hip: &[f64]| hip.iter().zip(&lumbar).map(|(h, l)| h - l).collect::<Vec<f64>>();
         let flipped = |knee: Vec<f64>| knee.into_iter().map(|k| -k).collect::<Vec<f64>>();
         let angles = [
             rows.map(|k| -(pelvis[k] + lumbar[k])).collect(),
-            from_trunk(&angle("hip_flexion_l")?),
+            from_torso(&angle("hip_flexion_l")?),
             flipped(angle("knee_angle_l")?),
             angle("ankle_angle_l")?,
-            from_trunk(&angle("hip_flexion_r")?),
+            from_torso(&angle("hip_flexion_r")?),
         ];
         let knee = table.find("knee_angle_r").map(|c| c.into_iter().map(|v| -v * scale).collect());
         let force = force_column.map(|name| VerticalForce::of(table, name)).transpose()?;

@@ -1,14 +1,14 @@
-//! Plausibility of a mean stride: impossible curves are errors, unusual ones are warnings in the provenance.
+//! Plausibility of a mean stride: impossible curves are errors, unusual ones give a warning.
 
 use super::reference_gait::{REFERENCE_COLUMNS, ReferenceGait};
 use crate::statistics::{average, correlation, extremes};
 use crate::subject::ModelError;
 
 /// Indices among the angles of a reference gait.
-const TRUNK: usize = 0;
+const TORSO: usize = 0;
 const KNEE: usize = 2;
 const ANKLE: usize = 3;
-/// Largest magnitude of the mean trunk lean, degrees.
+/// Largest magnitude of the mean torso lean, degrees.
 const LARGEST_LEAN_DEG: f64 = 45.0;
 /// Smallest peak of knee flexion, degrees. Nearly straight swing legs reach 30.
 const SMALLEST_KNEE_PEAK_DEG: f64 = 20.0;
@@ -18,7 +18,7 @@ const LARGEST_LEAST_FLEXION_DEG: f64 = 40.0;
 const LARGEST_ANKLE_MEAN_DEG: f64 = 30.0;
 /// Smallest range of motion of the ankle, degrees. Radians taken for degrees give about 0.5.
 const SMALLEST_ANKLE_RANGE_DEG: f64 = 2.0;
-/// Curves that are compared with the built-in reference gait. The shape of the trunk curve differs between people.
+/// Curves that are compared with the built-in reference gait. The shape of the torso curve differs between people.
 const COMPARED: [(usize, &str); 4] = [(1, "left hip"), (KNEE, "left knee"), (ANKLE, "left ankle"), (4, "right hip")];
 /// Smallest usual correlation with the built-in curves. Means of 24 young adults reach 0.88 or more, ankles of single
 /// strides 0.7; a shift by a tenth of a stride gives 0.4 for the ankle.
@@ -26,14 +26,14 @@ const LEAST_CORRELATION: f64 = 0.5;
 
 /// The reason why a mean stride is impossible, if any.
 pub(super) fn no_walker(mean: &[[f64; 5]]) -> Option<String> {
-    trunk(&curve(mean, TRUNK))
-        .map(|reason| (TRUNK, reason))
+    torso(&curve(mean, TORSO))
+        .map(|reason| (TORSO, reason))
         .or_else(|| knee(&curve(mean, KNEE)).map(|reason| (KNEE, reason)))
         .or_else(|| ankle(&curve(mean, ANKLE)).map(|reason| (ANKLE, reason)))
         .map(|(place, reason)| format!("{} {reason}", REFERENCE_COLUMNS[place]))
 }
 
-fn trunk(degrees: &[f64]) -> Option<String> {
+fn torso(degrees: &[f64]) -> Option<String> {
     let lean = average(degrees);
     (lean.abs() > LARGEST_LEAN_DEG).then(|| {
         let reason = format!(
@@ -70,6 +70,16 @@ fn ankle(degrees: &[f64]) -> Option<String> {
     })
 }
 
+impl ReferenceGait {
+    /// The curves that differ in shape from the built-in reference gait, as a warning.
+    ///
+    /// # Errors
+    /// As [`Self::builtin`].
+    pub fn warning(&self) -> Result<Option<String>, ModelError> {
+        unlike_builtin(&self.angles_rad)
+    }
+}
+
 /// A warning if curves differ in shape from those of the built-in reference gait.
 pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelError> {
     let builtin = ReferenceGait::builtin()?.angles_rad;
@@ -82,7 +92,9 @@ pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelE
         })
         .collect();
     let warning = || {
-        format!("unlike the built-in reference: {}; check the sign, the side and the heel strikes", unlike.join(", "))
+        let differ = if unlike.len() == 1 { "differs" } else { "differ" };
+        let (curves, check) = (unlike.join(", "), "check the sign, the side and the heel strikes");
+        format!("{curves} {differ} in shape from the built-in reference gait; {check}")
     };
     Ok((!unlike.is_empty()).then(warning))
 }

@@ -316,12 +316,12 @@ mod tests {
     }
 
     #[test]
-    fn an_early_rise_is_early_on_the_right_and_late_on_the_left() {
+    fn early_rise_is_early_on_the_right_and_late_on_the_left() {
         assert_eq!(GuessTiming::EARLY_RISE.fractions(), [0.0, 0.04, 0.06, 0.15, 0.5, 0.54, 0.56, 0.86, 1.0]);
     }
 
     #[test]
-    fn guesses_are_numbered_through_the_multi_start_and_the_perturbed_ones() {
+    fn guesses_are_numbered_across_multi_start_and_perturbation() {
         let last = InitialGuess::MULTI_START.len();
         assert_eq!(InitialGuess::numbered(1), Some(InitialGuess::MULTI_START[0]));
         assert_eq!(InitialGuess::numbered(last), InitialGuess::MULTI_START.last().copied());
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_label_says_what_was_perturbed() {
+    fn guess_label_names_the_perturbation() {
         assert_eq!(InitialGuess::MULTI_START[4].label(), "cold, muscle tracking, early heel rise");
         assert_eq!(
             InitialGuess::MULTI_START[12].label(),

@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn attempts_add_up() {
+    fn linear_algebra_statistics_are_summed() {
         let one = LinearAlgebra {
             seconds_analysis: 0.25,
             seconds_factorisation: 0.5,

@@ -198,7 +198,7 @@ fn entries<'a>(pattern: &'a SparsityPattern, values: &'a [f64]) -> impl Iterator
 }
 
 #[test]
-fn values() {
+fn values_match_dual_numbers() {
     each_case(|pair, x, _| {
         let (expected, objective) = pair.ordered(x);
         let mut ours = vec![f64::NAN; pair.production.rows()];

@@ -41,7 +41,7 @@ fn unit(i: usize) -> [f64; 9] {
 
 proptest! {
     #[test]
-    fn muscle_curves(x in 0.2..1.8_f64, nu in -1.2..1.2_f64, strain in -0.2..0.12_f64) {
+    fn muscle_curves_match_dual_numbers(x in 0.2..1.8_f64, nu in -1.2..1.2_f64, strain in -0.2..0.12_f64) {
         curve("force over length", force_length(x), muscles::force_length(variable(x)));
         curve("force over velocity", force_velocity(nu), muscles::force_velocity(variable(nu)));
         // The plain form loses digits below the slack length, so derivatives are compared above it only.
@@ -55,7 +55,7 @@ proptest! {
     }
 
     #[test]
-    fn muscle_geometry(q in uniform9(-1.2..1.2_f64)) {
+    fn muscle_geometry_matches_dual_numbers(q in uniform9(-1.2..1.2_f64)) {
         for (muscle, theirs) in MUSCLES.iter().zip(muscles::table()) {
             let mut attachments: Vec<_> = muscle.attachments.iter().flatten().collect();
             attachments.sort_by_key(|a| a.coordinate);
@@ -82,7 +82,7 @@ proptest! {
     }
 
     #[test]
-    fn bezier_curves(alpha in uniform6(-4.0..4.0_f64), s in -0.3..1.3_f64) {
+    fn bezier_curves_match_dual_numbers(alpha in uniform6(-4.0..4.0_f64), s in -0.3..1.3_f64) {
         let along = bezier(&alpha.map(Dual2_64::from), variable(s));
         let weights = basis(s);
         let sum = |order: usize| -> f64 { alpha.iter().zip(&weights[order]).map(|(a, b)| a * b).sum() };
@@ -94,7 +94,7 @@ proptest! {
     }
 
     #[test]
-    fn foot_points(q in uniform9(-1.5..1.5_f64), qd in uniform9(-5.0..5.0_f64), qdd in uniform9(-50.0..50.0_f64)) {
+    fn foot_points_match_dual_numbers(q in uniform9(-1.5..1.5_f64), qd in uniform9(-5.0..5.0_f64), qdd in uniform9(-50.0..50.0_f64)) {
         let (model, walker) = walkers();
         let ours = PointState::new(&q, &qd, &qdd);
         for (index, (point, side)) in [
@@ -120,7 +120,7 @@ proptest! {
     }
 
     #[test]
-    fn equations_of_motion(
+    fn equations_of_motion_match_dual_numbers(
         q in uniform9(-1.5..1.5_f64),
         qd in uniform9(-5.0..5.0_f64),
         qdd in uniform9(-50.0..50.0_f64),

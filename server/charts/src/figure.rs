@@ -185,7 +185,7 @@ fn tree_csv(tree: &Tree) -> CsvTable {
     table
 }
 
-/// `angles`, `Right hip (prosthesis side)` as `angles-right-hip-prosthesis-side`.
+/// `angles`, `Right hip (prosthetic side)` as `angles-right-hip-prosthetic-side`.
 fn file_name(group: &str, title: &str) -> String {
     let words = format!("{group} {title}");
     let words = words.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());

@@ -22,7 +22,7 @@ const ANGLES: [(&str, usize, usize); 5] = [
     ("Left hip", 3, 1),
     ("Left knee", 4, 2),
     ("Left ankle", 5, 3),
-    ("Right hip (prosthesis side)", 6, 4),
+    ("Right hip (prosthetic side)", 6, 4),
 ];
 const JOINTS: [&str; 6] = ["Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 const MUSCLE_GROUPS: [(&str, &[usize]); 3] =

@@ -10,7 +10,7 @@ const HEIGHT: f64 = 190.0;
 const GROUND: f64 = 164.0;
 /// Units of the drawing per metre.
 const SCALE: f64 = 86.0;
-/// Centre of the head, in trunk lengths above the hip, and its radius, m. The model has no head.
+/// Centre of the head, in torso lengths above the hip, and its radius, m. The model has no head.
 const HEAD_AT: f64 = 1.18;
 const HEAD_M: f64 = 0.1;
 
@@ -53,7 +53,7 @@ fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
         line("left", &foot(&figure.left))?;
         line("right", &[figure.hip, figure.right.knee, figure.right.ankle])?;
         line("right", &foot(&figure.right))?;
-        line("trunk", &[figure.hip, figure.shoulder])?;
+        line("torso", &[figure.hip, figure.shoulder])?;
         let along = |i: usize| figure.hip[i] + HEAD_AT * (figure.shoulder[i] - figure.hip[i]);
         let (x, y) = at([along(0), along(1)]);
         write!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{:.1}\"/>", HEAD_M * SCALE)?;

@@ -46,7 +46,7 @@ pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller
     let caller = extensions.get::<Caller>().ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
     match P::NEEDED {
         Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
-            "This needs the right {:?}, which {} does not have. Ask an administrator.",
+            "This requires the right {:?}, which {} does not have. Ask an administrator.",
             needed.as_str(),
             caller.name
         ))),

@@ -114,7 +114,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
         parameters.push(json!({
             "name": "cursor", "in": "query", "required": false,
             "schema": { "type": "string", "minLength": 2, "pattern": "^([0-9a-f]{2})+$" },
-            "description": "`next` of the previous page; omit it for the first page"
+            "description": "The value of `next` from the previous page; omit it for the first page"
         }));
         parameters.push(json!({
             "name": "limit", "in": "query", "required": false,

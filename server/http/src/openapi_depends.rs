@@ -17,11 +17,10 @@ const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise sca
                        `probit`.";
 const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
-const EMG_FILE: &str = "A file in the format that `form` names, with the columns of the muscles, sampled at 100 Hz or more, with one whole \
+const EMG_FILE: &str = "A file in the format that `format` names, with the columns of the muscles, sampled at 100 Hz or more, with one whole \
                         stride or more. It has all columns and heel strikes that are named in the request.";
-const MOTION_FILE: &str = "A file in the format that `form` names, with the angle of one joint or more over several strides, as optimizer/data/README.md \
-                           describes it.";
-const REFERENCE_FILE: &str = "A file in the format that `form` names, with its columns, as optimizer/data/README.md describes it: five \
+const MOTION_FILE: &str = "A file in the format that `format` names, with the angle of one joint or more over several strides, as `/help/data-files` describes it.";
+const REFERENCE_FILE: &str = "A file in the format that `format` names, with its columns, as `/help/data-files` describes it: five \
                               joint angles over at least one whole stride of a walking person. It has all columns and heel \
                               strikes that are named in the request.";
 
@@ -87,7 +86,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_rule_is_of_a_field_that_is_described() {
+    fn every_dependency_rule_names_a_described_field() {
         let document = openapi::value().unwrap();
         let mut fields = BTreeSet::new();
         for (component, field, rule) in RULES {

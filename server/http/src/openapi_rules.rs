@@ -111,7 +111,7 @@ pub(super) fn state(document: &mut Value) {
         for component in ["NewReferenceGait", "NewEmg", "NewMotion"] {
             add(schemas, component, "recording", &json!({ "minLength": 1 }));
         }
-        add(schemas, "NewReferenceGait", "form", &json!({ "default": "opensim" }));
+        add(schemas, "NewReferenceGait", "format", &json!({ "default": "opensim" }));
         add(schemas, "EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
         add(schemas, "MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
         state_emg(schemas);

@@ -63,7 +63,7 @@ pub fn page(template: &impl Template) -> Page {
 
 /// Handles addresses without a route.
 pub(crate) async fn no_such_page(uri: Uri) -> Refusal {
-    Refusal(Error::NotFound { what: "page".to_owned(), id: uri.path().to_owned() })
+    Refusal(Error::NotFound { what: "address".to_owned(), id: uri.path().to_owned() })
 }
 
 /// Handles methods that a route does not have.

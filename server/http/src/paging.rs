@@ -142,7 +142,7 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
 
 fn read_cursor<K: DeserializeOwned>(text: &str) -> Result<K, Error> {
     let key = hex::decode(text).ok().and_then(|key| serde_json::from_slice(&key).ok());
-    key.ok_or_else(|| Error::invalid("cursor", text, "`next` of the previous page"))
+    key.ok_or_else(|| Error::invalid("cursor", text, "the value of `next` from the previous page"))
 }
 
 fn read_limit(text: &str) -> Result<u32, Error> {
@@ -176,21 +176,21 @@ mod tests {
     }
 
     #[test]
-    fn pages_hold_every_entry_once_and_the_last_one_has_no_next() {
+    fn pages_have_every_entry_once_and_the_last_page_has_no_next() {
         assert_eq!(pages(&[5, 4, 3, 2, 1], 2), [vec![5, 4], vec![3, 2], vec![1]]);
         assert_eq!(pages(&[4, 3, 2, 1], 2), [vec![4, 3], vec![2, 1]]);
         assert_eq!(pages(&[], 1), [Vec::<u32>::new()]);
     }
 
     #[test]
-    fn an_entry_that_goes_between_two_pages_takes_no_other_one_with_it() {
+    fn entry_deleted_between_two_pages_hides_no_other_entry() {
         let first = Newest::read("limit=2").unwrap().cut(vec![5, 4, 3, 2], |row| Reverse(*row)).unwrap();
         let second = Newest::read(&format!("limit=2&cursor={}", first.next.unwrap())).unwrap();
         assert_eq!(second.cut(vec![5, 3, 2], |row| Reverse(*row)).unwrap().items, [3, 2]);
     }
 
     #[test]
-    fn what_is_no_page_is_refused() {
+    fn invalid_paging_parameters_are_refused() {
         for query in
             ["limit=0", "limit=1001", "limit=-1", "limit=x", "cursor=x", "cursor=22", "limit=1&limit=2", "other=1"]
         {

@@ -169,7 +169,7 @@ impl Kind {
                 "/problems/learner",
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "The learner failed",
-                "The learner finds no solution for the settings and answers of the study.",
+                "The learner found no solution for the settings and answers of the study.",
                 "Change the learner setting that the detail names.",
             ),
             Self::TooManyAttempts => entry(

@@ -171,14 +171,14 @@ mod tests {
     }
 
     #[test]
-    fn text_becomes_what_is_asked_for() {
+    fn query_values_are_parsed_to_the_types_of_their_fields() {
         let asked: Asked = read(&pairs("number=7&share=0.5&order=descending&contains=12").unwrap(), &[]).unwrap();
         let expected = Asked { number: 7, share: Some(0.5), order: Some(Order::Descending), contains: "12".to_owned() };
         assert_eq!(asked, expected);
     }
 
     #[test]
-    fn errors_name_parameter_value_and_what_is_allowed() {
+    fn errors_name_parameter_value_and_allowed_values() {
         for (query, field, message) in [
             ("number=x", "number", "The query parameter number is \"x\"; it must be a whole number of at least 0."),
             ("number=1&share=half", "share", "The query parameter share is \"half\"; it must be a number."),

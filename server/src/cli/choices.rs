@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn every_choice_is_one_of_the_rest_interface() {
+    fn every_choice_is_a_value_of_the_rest_interface() {
         all_are_known::<JointAngleFormat>(&JOINT_ANGLE_FORMATS);
         all_are_known::<Unit>(&ANGLE_UNITS);
         all_are_known::<Strikes>(&HEEL_STRIKES);

@@ -22,7 +22,7 @@ pub(super) struct Emg {
     normal: Option<PathBuf>,
     /// Format of both files.
     #[arg(long, value_parser = one_of::<MeasurementFormat>(EMG_FORMATS), default_value = "csv")]
-    form: MeasurementFormat,
+    format: MeasurementFormat,
     /// Sampling rate of a CSV file without a column time_s, 100 to 20000.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,
@@ -136,7 +136,7 @@ impl Emg {
 
     fn read(&self, path: &Path, heel_strikes_s: &[f64]) -> Result<(EmgRecording, Vec<f64>), Error> {
         let reading = EmgReading {
-            form: self.form,
+            format: self.format,
             rate_hz: self.rate_hz,
             channels: self.channels.iter().cloned().collect(),
             heel_strikes_s: heel_strikes_s.to_vec(),

@@ -19,7 +19,7 @@ pub(super) struct Reference {
     name: String,
     /// Format of the recording.
     #[arg(long, value_parser = one_of::<JointAngleFormat>(JOINT_ANGLE_FORMATS), default_value = "opensim")]
-    form: JointAngleFormat,
+    format: JointAngleFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     #[arg(long, value_parser = one_of::<Unit>(ANGLE_UNITS))]
     unit: Option<Unit>,
@@ -27,7 +27,7 @@ pub(super) struct Reference {
     /// Camargo 2021).
     #[arg(long, value_name = "NAME")]
     force_column: Option<String>,
-    /// Separate file with the force column: an OpenSim file, or the fp table as CSV with --form camargo. Both files
+    /// Separate file with the force column: an OpenSim file, or the fp table as CSV with --format camargo. Both files
     /// must have the same time axis.
     #[arg(long, value_name = "FILE")]
     forces: Option<PathBuf>,
@@ -52,7 +52,7 @@ impl Reference {
     pub(super) fn run(self) -> Result<(), Error> {
         let new = NewReferenceGait {
             name: self.name,
-            form: self.form,
+            format: self.format,
             recording: read(&self.recording)?,
             unit: self.unit,
             force_column: self.force_column,

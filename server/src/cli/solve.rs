@@ -11,8 +11,8 @@ use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::{
-    BasinChoice, GaitProblem, InitialGuess, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus,
-    StartedFrom, TunedBounds, solve,
+    BasinChoice, GaitProblem, InitialGuess, ModelError, SolveError, SolveOptions, SolveOutcome, SolveReport,
+    SolveStatus, StartedFrom, TunedBounds, solve,
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
@@ -114,6 +114,7 @@ impl Solve {
         let mut options = self.flags.options()?;
         options.initial_guesses = self.initial_guesses.unwrap_or(options.initial_guesses);
         if let Some(within_percent) = self.nearest_within {
+            ModelError::check_range("--nearest-within", within_percent, 0.0, 100.0)?;
             options.basin_choice = BasinChoice::NearestToReference { within_percent };
         }
         options.validate()?;

@@ -57,7 +57,7 @@ impl Sweep {
         // Before there is a file to leave behind.
         let cancel = cancelled_by_signal();
         let out = OutFile::open(&self.out, &inputs)?;
-        tell(&format!("rows so far: {}", out.part().display()));
+        tell(&format!("partial results: {}", out.part().display()));
         let workers = cores_or(self.workers);
         let stopped = cancel.clone();
         let pool = Pool::new(1);

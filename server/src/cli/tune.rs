@@ -30,7 +30,7 @@ pub(super) struct Tune {
     #[command(flatten)]
     files: ProblemFiles,
     /// Number of trials.
-    #[arg(long, default_value = "10", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
+    #[arg(long, default_value = "15", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
     /// Seed of every random draw.
     #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]

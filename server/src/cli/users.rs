@@ -42,8 +42,11 @@ impl Users {
         exists(&settings.database())?;
         let store = match settings.open_record().await {
             Err(StoreError::InUse { .. }) => {
-                let reason = "The service is using this database. Stop it first, or restart it with --sign-in-link.";
-                return Err(Error::conflict(reason));
+                let instead = match self.what {
+                    UsersCommand::List { .. } => "Stop it first, or see the page Users and tokens.",
+                    UsersCommand::Link { .. } => "Stop it first, or restart it with --sign-in-link.",
+                };
+                return Err(Error::conflict(format!("The service is using this database. {instead}")));
             }
             opened => opened?,
         };

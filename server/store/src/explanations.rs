@@ -3,7 +3,7 @@
 use super::audit::Actor;
 use super::members::{binds, reached};
 use super::{Connection, Instant, StoreResult, StudyId, TrialId, json, now};
-use crate::reach::Reach;
+use crate::accessible_studies::Reach;
 use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
 use std::collections::BTreeSet;

@@ -3,7 +3,7 @@
 
 use super::companion::companion;
 use super::error::{StoreError, StoreResult};
-use super::log::Log;
+use super::wal_check::Log;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};

@@ -5,7 +5,7 @@
 
 use super::members::{binds, reached};
 use super::{Connection, Instant, JobId, StoreError, StoreResult, StudyId, TrialId, now};
-use crate::reach::Reach;
+use crate::accessible_studies::Reach;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;

@@ -5,7 +5,7 @@ use super::audit::Actor;
 use super::lab_answers::{self, LabAnswer};
 use super::members::{binds, reached};
 use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
-use crate::reach::Reach;
+use crate::accessible_studies::Reach;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;

@@ -9,6 +9,7 @@
 
 pub mod access_log;
 pub mod access_spool;
+pub mod accessible_studies;
 pub mod allocations;
 pub mod anchor;
 pub mod archive;
@@ -18,9 +19,11 @@ pub mod audit;
 pub mod authors;
 pub mod backup;
 pub mod backup_folder;
+mod borrowed_connection;
 pub mod certificates;
 pub mod clock;
 mod companion;
+mod compressed_columns;
 mod connection;
 pub mod consents;
 pub mod devices;
@@ -38,18 +41,14 @@ pub mod jobs;
 mod json;
 pub mod lab_answers;
 pub mod lab_sessions;
-mod lent;
 pub mod listing;
-mod log;
 mod many_rows;
 pub mod measurement_files;
 pub mod members;
 mod migrations;
 mod ownership;
-mod packed;
 pub mod presentations;
 pub mod quarantine;
-pub mod reach;
 pub mod read_only;
 pub mod reference_gaits;
 pub mod restore;
@@ -73,9 +72,12 @@ pub mod totals;
 pub mod trials;
 pub mod users;
 pub mod verify;
+mod wal_check;
 pub mod whole_file;
 mod writing;
 
+pub use borrowed_connection::{Lent, LentWriter, Reader};
+pub use compressed_columns::{Packed, PackedText};
 pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
@@ -83,8 +85,6 @@ pub use id::{
     MemberId, PresentationId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId,
     TrialId, UserId,
 };
-pub use lent::{Lent, LentWriter, Reader};
-pub use packed::{Packed, PackedText};
 pub use schema_versions::SCHEMA_VERSION;
 pub use space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use time::{Instant, now, set_machine_clock};

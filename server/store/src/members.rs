@@ -1,7 +1,7 @@
 //! Stored members of studies, and restrictions of studies to them.
 
 use super::{Connection, Instant, MemberId, StoreError, StoreResult, StudyId, now};
-use crate::reach::{Principal, Reach};
+use crate::accessible_studies::{Principal, Reach};
 use crate::rights::Role;
 use serde::{Deserialize, Serialize};
 use sqlx::sqlite::SqliteRow;

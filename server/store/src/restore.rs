@@ -172,7 +172,7 @@ mod tests {
 
     /// The process that [`killed_restore_is_finished_or_undone_and_loses_no_acknowledged_change`] starts.
     #[tokio::test]
-    async fn restore_that_is_killed_at_a_step() {
+    async fn restore_is_killed_at_a_step() {
         let Ok(text) = std::env::var(VARIABLE) else { return };
         let parts: Vec<&str> = text.split('|').collect();
         let die = |step: Step| {
@@ -203,7 +203,7 @@ mod tests {
 
             let [copy, record_text, second] = [&copy, &record, &elsewhere].map(|path| path.to_str().unwrap());
             let killed = Command::new(std::env::current_exe().unwrap())
-                .args(["--exact", "restore::tests::restore_that_is_killed_at_a_step"])
+                .args(["--exact", "restore::tests::restore_is_killed_at_a_step"])
                 .env(VARIABLE, format!("{step:?}|{copy}|{record_text}|{second}"))
                 .output()
                 .unwrap();

@@ -4,7 +4,7 @@ use super::members::{binds, reached};
 use super::{
     Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json, now, schema,
 };
-use crate::reach::Reach;
+use crate::accessible_studies::Reach;
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
 use serde::{Deserialize, Serialize};

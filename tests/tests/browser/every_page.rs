@@ -196,7 +196,7 @@ const WIDTHS: [i64; 3] = [1280, 768, 320];
 const PAPER: i64 = 718;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_every_page_fits_and_is_for_everybody() {
+async fn browser_every_page_fits_and_is_accessible() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let pictures = std::env::var_os("GAITWRIGHT_PICTURES").map(PathBuf::from);

@@ -41,7 +41,7 @@ async fn browser_animation_plays_pauses_and_is_scrubbed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_gait_is_shown_whole_and_colours_muscles() {
+async fn browser_gait_is_shown_completely_with_coloured_muscles() {
     let Some(browser) = Chromium::launch().await else { return };
     let (site, trial) = with_a_gait().await;
     let page = browser.open_without_scripts(&site.at(&format!("/trials/{trial}"))).await;
@@ -87,7 +87,7 @@ async fn browser_explains_a_trial_without_a_gait() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_shows_an_explanation_as_soon_as_it_is_made() {
+async fn browser_shows_an_explanation_when_it_is_ready() {
     let Some(browser) = Chromium::launch().await else { return };
     let explainer = Clearance::slow(Duration::from_secs(2));
     let site = Site::start_explaining(Analytic::default(), explainer).await;

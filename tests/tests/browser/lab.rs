@@ -28,7 +28,7 @@ async fn heard(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
+async fn browser_lab_session_records_walks_and_asks_which_was_better() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let (study, session) = planned(&site).await;
@@ -85,7 +85,7 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_in_the_lab_keeps_the_note_over_a_reload_and_while_the_service_is_gone() {
+async fn browser_lab_session_keeps_the_note_over_a_reload_and_an_outage() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let (_, session) = planned(&site).await;
@@ -110,7 +110,7 @@ async fn browser_in_the_lab_keeps_the_note_over_a_reload_and_while_the_service_i
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_in_the_lab_reports_an_unsafe_walk_during_the_walks_and_after_the_answer() {
+async fn browser_lab_session_reports_an_unsafe_walk_before_and_after_the_answer() {
     let Some(browser) = Chromium::launch().await else { return };
     for walks in [1, 3] {
         let site = Site::start(Analytic::default()).await;
@@ -142,7 +142,7 @@ async fn browser_in_the_lab_reports_an_unsafe_walk_during_the_walks_and_after_th
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_in_the_lab_answers_without_scripts_and_in_two_tabs() {
+async fn browser_lab_session_accepts_answers_without_scripts_and_in_two_tabs() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let (study, session) = planned(&site).await;
@@ -171,7 +171,7 @@ async fn browser_in_the_lab_answers_without_scripts_and_in_two_tabs() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_staff_call_a_gait_unsafe_and_cannot_retract_it() {
+async fn browser_staff_report_a_gait_as_unsafe_and_cannot_retract_the_report() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let (study, _) = planned(&site).await;
@@ -205,7 +205,7 @@ async fn browser_staff_call_a_gait_unsafe_and_cannot_retract_it() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_staff_look_at_what_was_called_unsafe_and_decide() {
+async fn browser_staff_review_a_safety_report() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let (study, _) = planned(&site).await;

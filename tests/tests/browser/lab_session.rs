@@ -16,7 +16,7 @@ async fn is_for_everybody(axe: Option<&Axe>, page: &Tab, what: &str) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_clicks_through_a_lab_session_from_plan_to_unblinding() {
+async fn browser_completes_a_lab_session_from_plan_to_unblinding() {
     let Some(browser) = Chromium::launch().await else { return };
     let axe = Axe::find();
     let axe = axe.as_ref();

@@ -35,7 +35,7 @@ async fn at_the_pair(browser: &Chromium, site: &Site) -> Tab {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_answers_with_the_mouse_and_takes_it_back() {
+async fn browser_rater_answers_with_the_mouse_and_retracts_the_answer() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -57,7 +57,7 @@ async fn browser_rater_answers_with_the_mouse_and_takes_it_back() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_sees_everything_on_a_tablet_either_way_up() {
+async fn browser_rater_sees_the_whole_pair_on_a_tablet_in_both_orientations() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -119,7 +119,7 @@ async fn browser_rater_answers_without_scripts() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_reloads_in_the_middle_and_sees_the_same_pair() {
+async fn browser_rater_reloads_the_page_and_sees_the_same_pair() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -136,7 +136,7 @@ async fn browser_rater_reloads_in_the_middle_and_sees_the_same_pair() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_double_clicks_and_one_answer_counts() {
+async fn browser_double_click_of_a_rater_gives_one_answer() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -176,7 +176,7 @@ async fn browser_rater_with_two_tabs_answers_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_who_wants_no_motion_gets_none() {
+async fn browser_rater_with_reduced_motion_sees_no_animation() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     waiting(&site).await;
@@ -199,7 +199,7 @@ async fn browser_rater_who_wants_no_motion_gets_none() {
 const GIVEN: &str = "`${document.querySelector('input:checked')?.value} ${document.querySelector('#note')?.value}`";
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_keeps_choice_and_note_while_the_service_is_gone() {
+async fn browser_rater_keeps_choice_and_note_during_an_outage() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -242,7 +242,7 @@ async fn browser_rater_keeps_choice_and_note_over_a_reload() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_takes_the_newest_answer_back_also_later() {
+async fn browser_rater_retracts_the_newest_answer_later() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -266,7 +266,7 @@ async fn browser_rater_takes_the_newest_answer_back_also_later() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_turns_keys_off_and_keys_leave_other_fields_alone() {
+async fn browser_rater_turns_keys_off_and_keys_do_not_affect_other_fields() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     waiting(&site).await;
@@ -294,7 +294,7 @@ async fn browser_rater_turns_keys_off_and_keys_leave_other_fields_alone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_moves_through_the_stride_by_hand() {
+async fn browser_rater_moves_through_the_stride_with_the_slider() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     waiting(&site).await;

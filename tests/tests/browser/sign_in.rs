@@ -59,7 +59,7 @@ async fn browser_signs_in_by_link_then_by_password() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
+async fn browser_administrator_adds_a_rater_and_a_token_and_reads_the_audit_trail() {
     let Some(browser) = Chromium::launch().await else { return };
     let (site, link) = guarded().await;
     let page = browser.open(&site.at(&format!("/sign-in/{link}"))).await;
@@ -103,7 +103,7 @@ async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_sends_an_answer_after_the_session_has_ended() {
+async fn browser_sends_an_answer_after_the_session_ended() {
     let Some(browser) = Chromium::launch().await else { return };
     let (site, _) = guarded().await;
     let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_from_nothing_to_a_finished_study_in_three_clicks() {
+async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(15))).await;
     let page = browser.open(&site.origin).await;
@@ -54,7 +54,7 @@ async fn browser_follows_a_running_solve() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_leaves_alone_what_is_typed_when_something_is_recorded() {
+async fn browser_updates_do_not_overwrite_edited_fields() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.trial_budget = 6).await;
@@ -119,7 +119,7 @@ async fn browser_sorts_and_filters_trials_with_and_without_scripts() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_shows_what_the_learner_believes_and_where_gaits_grew() {
+async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.trial_budget = 8).await;
@@ -152,7 +152,7 @@ async fn browser_shows_what_the_learner_believes_and_where_gaits_grew() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_checks_a_new_study_while_it_is_typed() {
+async fn browser_checks_the_new_study_form_during_input() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let page = browser.open(&site.at("/studies/new")).await;
@@ -235,7 +235,7 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_hears_of_trials_again_after_the_service_restarted() {
+async fn browser_receives_trial_events_after_a_service_restart() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
     let study = site.service.study(|new| new.trial_budget = 6).await;
@@ -280,7 +280,7 @@ async fn browser_opens_ten_thousand_trials_within_a_second() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_shows_the_values_of_a_point_at_the_pointer() {
+async fn browser_shows_the_values_at_the_pointer() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.trial_budget = 6).await;
@@ -330,7 +330,7 @@ async fn browser_reports_lost_and_restored_connection() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_shows_two_gaits_by_time_and_as_pictures() {
+async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
@@ -344,7 +344,7 @@ async fn browser_shows_two_gaits_by_time_and_as_pictures() {
         .await;
     assert!(page.text("[data-phase]").await.ends_with(" s"));
     // Half a second is half a stride of one second and a quarter of one of two; side by side both are equally far.
-    let places = "import('/static/two_clocks.mjs').then(({ Clocks }) => { const c = new Clocks([1, 2], 1.5); c.at = 0.5; \
+    let places = "import('/static/stride_clock.mjs').then(({ Clocks }) => { const c = new Clocks([1, 2], 1.5); c.at = 0.5; \
                   const both = () => [c.strides(0), c.strides(1)].map(n => n.toFixed(2)); const share = both(); c.pace = 'time'; \
                   return [...share, ...both(), c.round].join(' ') })";
     assert_eq!(page.value(places).await, "0.33 0.33 0.50 0.25 2");
@@ -364,7 +364,7 @@ async fn browser_shows_two_gaits_by_time_and_as_pictures() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_does_not_say_that_an_answered_comparison_is_the_next_one() {
+async fn browser_does_not_offer_an_answered_comparison_as_the_next_one() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;

@@ -44,7 +44,7 @@ pub(super) async fn list(
     path = "/devices",
     operation_id = "create_device",
     tag = "devices",
-    request_body(content = schema::DeviceDefinition, description = "A device file, as `optimizer/data/README.md` describes it"),
+    request_body(content = schema::DeviceDefinition, description = "A device file, as `/help/data-files` describes it"),
     responses(
         (status = 200, description = "Existing device with the same definition", body = Device),
         (status = 201, description = "Device", body = Device)

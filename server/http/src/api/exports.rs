@@ -112,7 +112,7 @@ pub(super) async fn controller(
     let number = gait.number();
     let write = move |pool: &OnPool| gait.controller_file(&trajectory.unpack(pool)?, sampling.rate_hz);
     let text = app.compute(write).await??;
-    Ok(device_file(&format!("device-trial-{number}.json"), text, vec![id]))
+    Ok(device_file(&format!("controller-trial-{number}.json"), text, vec![id]))
 }
 
 /// A controller file, which is sent only if every gait that it may be of is still walkable then.

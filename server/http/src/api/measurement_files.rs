@@ -80,9 +80,9 @@ pub(super) async fn content(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<MeasurementFileId, Read>,
 ) -> Result<Response, Refusal> {
-    let Brought { recording, form, file } = lab::brought(&mut *app.read().await?, id).await?;
+    let Brought { recording, format, file } = lab::brought(&mut *app.read().await?, id).await?;
     let text = app.compute(move |pool| file.text(pool)).await??;
-    let (kind, ending) = match form {
+    let (kind, ending) = match format {
         MeasurementFormat::Csv => ("text/csv; charset=utf-8", "csv"),
         MeasurementFormat::Opensim => ("text/plain; charset=utf-8", "sto"),
     };

@@ -1,7 +1,7 @@
 //! What the learner believes about the search space of a study.
 
-use super::drawn::Drawn;
 use super::format::{self, meaning, percent, signed};
+use super::page_chart::Drawn;
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
@@ -356,7 +356,7 @@ mod tests {
     use super::{LISTED, listed};
 
     #[test]
-    fn the_recommended_trial_is_always_listed() {
+    fn recommended_trial_is_always_listed() {
         assert_eq!(listed(3, Some(1)), [0, 1, 2]);
         assert_eq!(listed(LISTED + 5, Some(0)).len(), LISTED);
         let long = listed(LISTED + 5, Some(LISTED + 2));

@@ -1,7 +1,7 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::drawn::Drawn;
 use super::figures;
+use super::page_chart::Drawn;
 use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;
 use crate::accessible::Id;

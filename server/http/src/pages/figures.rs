@@ -1,6 +1,6 @@
 //! The figures of a study, of a gait, of a lab session: for their pages and as files.
 
-use super::drawn::Drawn;
+use super::page_chart::Drawn;
 use super::side_by_side::Side;
 use super::{lab_charts, study};
 use crate::AppState;

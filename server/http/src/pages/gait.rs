@@ -2,9 +2,9 @@
 
 use super::bound_use::{self, BoundUse};
 use super::certificate;
-use super::drawn::Drawn;
 use super::explanation::NoGait;
 use super::format::{self, words};
+use super::page_chart::Drawn;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::page_error::{Page, page};

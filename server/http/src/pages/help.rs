@@ -1,4 +1,4 @@
-//! The guides of `docs/`, embedded into the binary, so that a lab without internet has them.
+//! The guides of the repository, embedded into the binary, so that a lab without internet has them.
 
 use crate::page_error::{Page, page};
 use crate::problem::Refusal;
@@ -17,18 +17,26 @@ use rust_embed::Embed;
 #[folder = "../../docs"]
 struct Files;
 
-/// The guides in the order of the table of contents, with their titles.
-const GUIDES: [(&str, &str); 9] = [
-    ("clinician", "Guide for clinicians"),
-    ("rater", "Guide for raters"),
-    ("lab-session", "Guide for lab sessions"),
-    ("lab-script", "Guide for lab scripts"),
-    ("unattended", "Guide for unattended runs"),
-    ("administrator", "Guide for administrators"),
-    ("method", "Method"),
-    ("benchmarks", "Benchmarks"),
-    ("glossary", "Glossary"),
+/// The guides in the order of the table of contents: name in addresses, title, and file in the repository.
+const GUIDES: [(&str, &str, &str); 14] = [
+    ("clinician", "Guide for clinicians", "docs/clinician.md"),
+    ("rater", "Guide for raters", "docs/rater.md"),
+    ("lab-session", "Guide for lab sessions", "docs/lab-session.md"),
+    ("lab-script", "Guide for lab scripts", "docs/lab-script.md"),
+    ("unattended", "Guide for unattended runs", "docs/unattended.md"),
+    ("administrator", "Guide for administrators", "docs/administrator.md"),
+    ("data-files", "Data files", DATA_FILES),
+    ("method", "Method", "docs/method.md"),
+    ("learner", "Learner", LEARNER),
+    ("benchmarks", "Benchmarks", "docs/benchmarks.md"),
+    ("benchmarks-optimizer", "Benchmarks of the optimiser", "docs/benchmarks/optimizer.md"),
+    ("benchmarks-learner", "Benchmarks of the learner", "docs/benchmarks/learner.md"),
+    ("benchmarks-service", "Benchmarks of the service", "docs/benchmarks/service.md"),
+    ("glossary", "Glossary", "docs/glossary.md"),
 ];
+
+const DATA_FILES: &str = "optimizer/data/README.md";
+const LEARNER: &str = "learner/README.md";
 
 /// Where the images of the guides are served.
 const IMAGES: &str = "/help/images/";
@@ -41,7 +49,7 @@ struct Help {
     title: String,
     /// HTML made from a guide; empty for the table of contents.
     guide: String,
-    guides: [(&'static str, &'static str); 9],
+    guides: [(&'static str, &'static str, &'static str); 14],
 }
 
 /// `GET /help`.
@@ -54,9 +62,8 @@ pub(super) async fn contents(caller: Option<Extension<Caller>>) -> Page {
 pub(super) async fn guide(caller: Option<Extension<Caller>>, Path(name): Path<String>) -> Page {
     let to = caller.map(|Extension(caller)| RespondedTo(caller.role));
     let unknown = || Error::NotFound { what: "guide".to_owned(), id: name.clone() };
-    let (file, title) = GUIDES.iter().find(|(guide, _)| *guide == name).ok_or_else(unknown)?;
-    let text = Files::get(&format!("{file}.md")).ok_or_else(unknown)?;
-    let guide = html_of(&String::from_utf8_lossy(&text.data));
+    let (_, title, file) = GUIDES.iter().find(|(guide, ..)| *guide == name).ok_or_else(unknown)?;
+    let guide = html_of(&text_of(file).ok_or_else(unknown)?, file);
     page(&Help { to, title: (*title).to_owned(), guide, guides: GUIDES })
 }
 
@@ -67,8 +74,20 @@ pub(super) async fn image(Path(name): Path<String>) -> Result<Response, Refusal>
     Ok(([(header::CONTENT_TYPE, file.metadata.mimetype().to_owned())], file.data).into_response())
 }
 
-/// Converts a guide to HTML with anchors and links between guides; links into the repository become plain text.
-fn html_of(markdown: &str) -> String {
+/// The text of a file of the repository, if it is embedded.
+fn text_of(file: &str) -> Option<String> {
+    match file {
+        DATA_FILES => Some(include_str!("../../../../optimizer/data/README.md").to_owned()),
+        LEARNER => Some(include_str!("../../../../learner/README.md").to_owned()),
+        _ => {
+            let found = Files::get(file.strip_prefix("docs/")?)?;
+            Some(String::from_utf8_lossy(&found.data).into_owned())
+        }
+    }
+}
+
+/// Converts a guide to HTML with anchors and links between guides; other links into the repository become plain text.
+fn html_of(markdown: &str, file: &str) -> String {
     let mut events: Vec<Event<'_>> = Parser::new_ext(markdown, Options::ENABLE_TABLES).collect();
     let mut linked = Vec::new();
     for place in 0..events.len() {
@@ -79,12 +98,12 @@ fn html_of(markdown: &str) -> String {
         match &mut events[place] {
             Event::Start(Tag::Heading { id, .. }) => *id = Some(text.into()),
             Event::Start(Tag::Image { dest_url, .. }) => {
-                if let Some(name) = dest_url.strip_prefix("images/") {
+                if let Some(name) = resolved(file, dest_url).strip_prefix("docs/images/") {
                     *dest_url = format!("{IMAGES}{name}").into();
                 }
             }
             Event::Start(Tag::Link { dest_url, .. }) => {
-                let served = served(dest_url);
+                let served = served(file, dest_url);
                 linked.push(served.is_some());
                 match served {
                     Some(address) => *dest_url = address,
@@ -114,12 +133,27 @@ fn anchor(from_heading: &[Event<'_>]) -> String {
     words.chars().filter(|c| c.is_alphanumeric() || " -".contains(*c)).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
+/// The target of a relative link in a file of the repository.
+fn resolved(file: &str, target: &str) -> String {
+    let mut parts: Vec<&str> = file.split('/').collect();
+    parts.pop();
+    for part in target.split('/') {
+        if part == ".." {
+            parts.pop();
+        } else {
+            parts.push(part);
+        }
+    }
+    parts.join("/")
+}
+
 /// The address of a link's target in the service; `None` for a file that only the repository has.
-fn served<'a>(target: &CowStr<'a>) -> Option<CowStr<'a>> {
+fn served<'a>(file: &str, target: &CowStr<'a>) -> Option<CowStr<'a>> {
     if target.starts_with("https://") || target.starts_with('#') {
         return Some(target.clone());
     }
-    let (file, fragment) = target.split_once(".md").unwrap_or((target, ""));
-    let known = GUIDES.iter().any(|(guide, _)| *guide == file);
-    known.then(|| format!("/help/{file}{fragment}").into())
+    let (target, fragment) = target.split_at(target.find('#').unwrap_or(target.len()));
+    let target = resolved(file, target);
+    let (name, ..) = GUIDES.iter().find(|(_, _, file)| *file == target)?;
+    Some(format!("/help/{name}{fragment}").into())
 }

@@ -1,10 +1,10 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
-use super::drawn::Drawn;
 use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
 use super::measurement_forms::{Forms, Settings};
+use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;

@@ -91,7 +91,7 @@ pub(super) fn limit_cycles(session: &LabSessionView, measured: &[(LimitCycles, O
             let title = format!("{}, {name}", JOINT_NAMES[place]);
             let mut chart = Chart::new(&title, "angle, °", "velocity, °/s").with("measured", 7, Stroke::Solid, line);
             if let Some(gait) = gait {
-                chart = chart.with("orbit of the gait", 1, Stroke::Solid, orbit(gait, place + 2));
+                chart = chart.with("limit cycle of the gait", 1, Stroke::Solid, orbit(gait, place + 2));
             }
             charts.push(Figure::chart("limit-cycle", chart));
         }

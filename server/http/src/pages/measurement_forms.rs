@@ -12,7 +12,7 @@ use std::str::FromStr;
 #[serde(deny_unknown_fields, default)]
 pub(super) struct EmgFields {
     pub(super) walk: u8,
-    pub(super) form: MeasurementFormat,
+    pub(super) format: MeasurementFormat,
     pub(super) recording: String,
     pub(super) rate_hz: String,
     pub(super) channels: String,
@@ -26,7 +26,7 @@ impl Default for EmgFields {
         let reading = EmgReading::default();
         Self {
             walk: 0,
-            form: reading.form,
+            format: reading.format,
             recording: String::new(),
             rate_hz: String::new(),
             channels: String::new(),
@@ -40,7 +40,7 @@ impl Default for EmgFields {
 impl EmgFields {
     pub(super) fn read(&self) -> Result<NewEmg, Error> {
         let reading = EmgReading {
-            form: self.form,
+            format: self.format,
             rate_hz: optional("rate_hz", &self.rate_hz)?,
             channels: pairs(&self.channels)?,
             heel_strikes_s: list("heel_strikes_s", &self.heel_strikes_s)?,
@@ -84,7 +84,7 @@ fn optional(field: &str, text: &str) -> Result<Option<f64>, Error> {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct MotionFields {
     pub(super) walk: u8,
-    pub(super) form: MeasurementFormat,
+    pub(super) format: MeasurementFormat,
     pub(super) recording: String,
     pub(super) unit: String,
     pub(super) cutoff_hz: String,
@@ -92,9 +92,9 @@ pub(super) struct MotionFields {
 
 impl Default for MotionFields {
     fn default() -> Self {
-        let MotionReading { form, cutoff_hz, .. } = MotionReading::default();
+        let MotionReading { format, cutoff_hz, .. } = MotionReading::default();
         let (recording, unit) = (String::new(), String::new());
-        Self { walk: 0, form, recording, unit, cutoff_hz: cutoff_hz.to_string() }
+        Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string() }
     }
 }
 
@@ -107,7 +107,7 @@ impl MotionFields {
             other => return Err(Error::invalid("unit", other, "degrees, radians or empty")),
         };
         let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(MotionReading::default().cutoff_hz);
-        let reading = MotionReading { form: self.form, unit, cutoff_hz };
+        let reading = MotionReading { format: self.format, unit, cutoff_hz };
         Ok(NewMotion { walk: self.walk, recording: self.recording.clone(), reading })
     }
 }

@@ -7,7 +7,6 @@ mod bound_use;
 mod certificate;
 mod compare;
 mod devices;
-mod drawn;
 mod explanation;
 pub(super) mod figures;
 mod format;
@@ -23,6 +22,7 @@ mod members;
 mod muscles;
 mod new_study;
 mod notice;
+mod page_chart;
 mod problems;
 mod rate;
 mod reference;
@@ -33,7 +33,7 @@ mod sign_in;
 mod study;
 mod subject;
 mod system;
-mod unsent;
+mod unsent_form;
 mod users;
 
 use super::AppState;
@@ -103,6 +103,6 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/sign-out", post(sign_in::out))
         .route("/account/sessions", post(sign_in::end_session))
         .route("/account", get(sign_in::account).post(sign_in::set_password))
-        .route_layer(from_fn_with_state(state.clone(), unsent::keep))
+        .route_layer(from_fn_with_state(state.clone(), unsent_form::keep))
         .route_layer(from_fn_with_state(state.clone(), notice::show))
 }

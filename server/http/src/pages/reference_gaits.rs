@@ -1,7 +1,7 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::drawn::Drawn;
 use super::figures;
+use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -27,7 +27,7 @@ use std::str::FromStr;
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Fields {
     name: String,
-    form: JointAngleFormat,
+    format: JointAngleFormat,
     recording: String,
     unit: String,
     force_column: String,
@@ -44,7 +44,7 @@ impl Fields {
         let size = |field, text: &str| given(text).map(|text| number(field, &text)).transpose();
         Ok(NewReferenceGait {
             name: self.name.clone(),
-            form: self.form,
+            format: self.format,
             recording: self.recording.clone(),
             unit: match self.unit.as_str() {
                 "" => None,
@@ -148,6 +148,8 @@ pub(super) async fn import(
 #[template(path = "reference_gait.html")]
 struct ReferenceGaitPage {
     reference: ReferenceGait,
+    /// Curves that differ from the built-in reference gait.
+    warning: Option<String>,
     steps: Vec<String>,
     charts: Vec<Drawn>,
 }
@@ -160,6 +162,7 @@ pub(super) async fn get(
 ) -> Page {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
+        warning: reference.definition.warning().map_err(Error::from)?,
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
         charts: figures::of_reference(&reference.definition)
             .iter()

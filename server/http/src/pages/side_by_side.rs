@@ -1,7 +1,7 @@
 //! The page that compares two studies in one chart and one table.
 
-use super::drawn::Drawn;
 use super::format::{self, words};
+use super::page_chart::Drawn;
 use super::study::{COURSE, Figures, course, figures};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
@@ -121,7 +121,7 @@ impl Side {
             ("State".to_owned(), words(self.snapshot.study.state.as_str())),
             ("Subject".to_owned(), self.subject.clone()),
             ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
-            ("Answers by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
+            ("Answered by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
             ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
             ("Seed".to_owned(), plan.seed.to_string()),
             ("Trials with a result".to_owned(), format!("{} of {}", self.counts.results(), plan.trial_budget)),

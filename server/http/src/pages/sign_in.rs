@@ -1,7 +1,7 @@
 //! Signing in and out, and the user's own account.
 
 use super::format;
-use super::unsent::{SignInPage, Unsent, send_now};
+use super::unsent_form::{SignInPage, Unsent, send_now};
 use crate::authorization::SignedIn;
 use crate::extract::Form;
 use crate::identify::{browser_cookie, browser_of, cookie, session_of};

@@ -1,8 +1,8 @@
 //! The caller of a request: a user, a token or nobody, with rights and accessible studies.
 
+use gaitwright_store::accessible_studies::{Principal, Reach};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::feedback::Source;
-use gaitwright_store::reach::{Principal, Reach};
 use gaitwright_store::rights::{Right, Rights, Role};
 use gaitwright_store::{TokenId, UserId};
 

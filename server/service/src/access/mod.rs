@@ -16,6 +16,6 @@ pub mod tokens;
 
 pub use caller::Caller;
 pub use clock::Clock;
-pub use gaitwright_store::reach::{Principal, Reach};
+pub use gaitwright_store::accessible_studies::{Principal, Reach};
 pub use gaitwright_store::rights::{Right, Rights, Role};
 pub use permission::{Administer, Answer, Anything, Device, Permission, Rate, Read, Run};

@@ -73,7 +73,7 @@ pub struct NewReferenceGait {
     pub name: String,
     /// File format of the recording.
     #[serde(default)]
-    pub form: JointAngleFormat,
+    pub format: JointAngleFormat,
     /// Content of the file.
     pub recording: String,
     /// Unit of angles, if the header of an OpenSim file does not state it.
@@ -109,7 +109,7 @@ impl NewReferenceGait {
     /// [`Error::Invalid`] with the field, or line and column, and the reason.
     pub fn definition(&self, what: &str, forces: &str) -> Result<Definition, Error> {
         let name = printable::name("name", &self.name, LONGEST_NAME)?;
-        let recording = match self.form {
+        let recording = match self.format {
             JointAngleFormat::Opensim => {
                 let unit = self.unit.map(AngleUnit::from);
                 let here = self.force_column.as_deref().filter(|_| self.forces.is_none());
@@ -121,7 +121,7 @@ impl NewReferenceGait {
         let recording = match &self.forces {
             Some(text) => {
                 let column = self.force_column.as_deref();
-                match self.form {
+                match self.format {
                     JointAngleFormat::Camargo => {
                         recording.with_camargo_forces(forces, text, column.unwrap_or(CAMARGO_FORCE_COLUMN))?
                     }

@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recommendation_holds_until_the_next_one() {
+    fn recommendation_holds_until_the_next_one() {
         let milestone = |iteration, rmse| Milestone {
             iteration,
             trial_id: gaitwright_store::TrialId::fresh(),
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_have_a_row_per_iteration_and_study() {
+    fn tables_have_a_row_for_each_iteration_and_study() {
         let outcomes = [outcome(false, 1, vec![None, Some(0.5)])];
         assert_eq!(
             iterations_csv(&outcomes),

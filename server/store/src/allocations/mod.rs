@@ -4,9 +4,9 @@
 //! known: the session or the rater is unblinded, the pair belongs to the rater, or the device fetches its file, which
 //! is recorded. The draw reads unblinded ones.
 
-mod lot;
+mod biased_coin;
 
-pub use lot::Lot;
+pub use biased_coin::Lot;
 
 use super::audit::Actor;
 use super::presentations::{Judgement, Presentation, SELECT};

@@ -1,6 +1,6 @@
 //! The chosen reference gait in the form for a new study: its chart, and whether another one is nearer to the subject.
 
-use super::super::drawn::Drawn;
+use super::super::page_chart::Drawn;
 use askama::Template;
 use gaitwright_charts::{Chart, Stroke};
 use gaitwright_service::error::Error;

@@ -124,13 +124,13 @@ mod tests {
     }
 
     #[test]
-    fn nothing_typed_is_table_i() {
+    fn empty_form_gives_table_i() {
         let (space, fixed) = SpaceEditor::typed(&BTreeMap::new()).unwrap().read().unwrap();
         assert_eq!((space, fixed), (table_i().unwrap(), TunedBounds::default()));
     }
 
     #[test]
-    fn one_bound_is_tuned_and_another_one_fixed() {
+    fn form_tunes_one_bound_and_fixes_another() {
         let fields = typed(&[("tuned_a5", "on"), ("values_a5", "0; 0.02 0.04"), ("fixed_a6", "0.25")]);
         let (space, fixed) = SpaceEditor::typed(&fields).unwrap().read().unwrap();
         assert_eq!(space.dimensions().len(), 1);
@@ -139,14 +139,14 @@ mod tests {
     }
 
     #[test]
-    fn a_range_is_told_without_the_noise_of_its_last_digits() {
+    fn error_gives_rounded_ends_of_the_range() {
         let fields = typed(&[("tuned_a3", "on"), ("lengthscale_a3", "0")]);
         let Err(Error::Invalid(field)) = SpaceEditor::typed(&fields).and_then(|editor| editor.read()) else { panic!() };
         assert_eq!((field.field.as_str(), field.allowed.as_deref()), ("lengthscale_a3", Some("0.001 to 2000")));
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn errors_name_the_wrong_field() {
         assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, high")]), "values_a5");
         assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, 7")]), "values_a5");
         assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "")]), "values_a5");

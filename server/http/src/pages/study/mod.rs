@@ -5,8 +5,8 @@ mod without_gait;
 
 use self::trials_table::{Choice, TrialRow, TrialsTable};
 use self::without_gait::WithoutGait;
-use super::drawn::Drawn;
 use super::format::{self, Bound, words};
+use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;

@@ -61,7 +61,7 @@ pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
         }
         printable::note(&field, text, LONGEST_TEXT).map_err(refuse)?;
         if matches!(column, "author" | "rater") && printable::name(&field, text, 80).map_err(refuse)? != text {
-            return Err(refuse(format!("{field} is {text:?}, which is not a name without surrounding spaces")));
+            return Err(refuse(format!("{field} is {text:?}, which has leading or trailing spaces")));
         }
         if column == "id" || column.ends_with("_id") {
             let is_written_so = Uuid::parse_str(text).is_ok_and(|id| id.hyphenated().to_string() == *text);

@@ -27,7 +27,10 @@ pub async fn export<W: Write + Send + 'static>(
 ) -> Result<W, Error> {
     let pool = read_only::open(database).await?;
     let (sender, mut rows) = mpsc::channel::<Option<Read>>(ROWS_AHEAD);
-    #[allow(clippy::disallowed_methods, reason = "works while rows come in, which no pool of finished data can")]
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "runs while rows are still arriving; the pool takes only complete data"
+    )]
     let packing = tokio::task::spawn_blocking(move || {
         let mut packer = Packer::new(out).map_err(Error::Output)?;
         while let Some(next) = rows.blocking_recv() {

@@ -33,7 +33,10 @@ pub struct Archive {
 /// [`Error::Malformed`] naming the row and its fault.
 pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> Result<Archive, Error> {
     let (sender, mut rows) = mpsc::channel::<(&'static str, Row)>(ROWS_AHEAD);
-    #[allow(clippy::disallowed_methods, reason = "works while rows come in, which no pool of finished data can")]
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "runs while rows are still arriving; the pool takes only complete data"
+    )]
     let reading = tokio::task::spawn_blocking(move || -> Result<Option<Whole>, Error> {
         let mut unpacker = Unpacker::new(from)?;
         loop {

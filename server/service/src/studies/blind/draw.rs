@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn pair_with_retracted_answer_comes_again_with_the_same_sides() {
+    fn pair_with_retracted_answer_is_shown_again_with_the_same_sides() {
         for lot in [1, 10] {
             let asked = question();
             let earlier = shown(1, draw(1, question(), &[], &[]));
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn settled_comparison_does_not_come_again() {
+    fn settled_comparison_is_not_shown_again() {
         let taken_back = Presentation { answer: Some(Judgement::Retracted), ..shown(1, draw(1, question(), &[], &[])) };
         let asked = question();
         assert_eq!(draw(1, asked, &[taken_back], &[]).pair, asked);

@@ -26,6 +26,9 @@ use serde_json::json;
 use std::collections::BTreeSet;
 use utoipa::ToSchema;
 
+/// The refusal of a pair that a rule excluded after it was drawn.
+const NO_LONGER_SHOWN: &str = "This pair is no longer shown. Continue with the next pair.";
+
 /// Answer of a rater.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -228,7 +231,7 @@ pub async fn answer(
 /// Replaces an error by one that names no gait.
 fn without_gaits(error: Error) -> Error {
     match error {
-        Error::Invalid(_) => Error::conflict("This pair is no longer compared. Continue with the next one."),
+        Error::Invalid(_) => Error::conflict(NO_LONGER_SHOWN),
         other => other,
     }
 }
@@ -252,8 +255,8 @@ fn answered_already(before: Option<Judgement>) -> String {
 pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
     let shown = own(writer, caller, token).await?.presentation;
     if !can_be_retracted(writer, &shown).await? {
-        let why = "Only the last answer can be retracted, and only once. A safety report cannot be retracted here: ask the study \
-                   coordinator.";
+        let why = "Only the last answer can be retracted, and only once. A safety report cannot be retracted: staff \
+                   review it.";
         return Err(Error::conflict(why));
     }
     if let Some(heard) = presentations::heard_of(writer, shown.id).await?
@@ -301,7 +304,7 @@ pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Si
 pub async fn own_to_show(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
     let shown = own(db, caller, token).await?;
     if !walkable::are_walkable(db, shown.presentation.pair()).await? {
-        return Err(Error::conflict("This pair is no longer shown. Take the next pair."));
+        return Err(Error::conflict(NO_LONGER_SHOWN));
     }
     Ok(shown)
 }

@@ -160,8 +160,8 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> 
     let session = still_open(writer, id).await?;
     let answer = session.answer().ok_or_else(|| Error::conflict("There is no answer to retract."))?;
     if !can_be_retracted(&session) {
-        let why = "This answer cannot be retracted here, because it is a safety report or the session is unblinded. Ask the study \
-                   coordinator to change it on the study page.";
+        let why = "This answer cannot be retracted here, because it is a safety report or the session is unblinded. Ask a clinician \
+                   to change it on the study page.";
         return Err(Error::conflict(why));
     }
     retract_number(writer, caller, id, answer.number).await?;

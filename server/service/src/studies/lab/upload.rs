@@ -35,7 +35,9 @@ pub enum MeasurementFormat {
 #[serde(deny_unknown_fields, default)]
 pub struct EmgReading {
     /// File format.
-    pub form: MeasurementFormat,
+    // Older records have the name `form`.
+    #[serde(alias = "form")]
+    pub format: MeasurementFormat,
     /// Sampling rate of a CSV file without a column `time_s`, Hz.
     #[schema(minimum = 100, maximum = 20000)]
     pub rate_hz: Option<f64>,
@@ -53,7 +55,7 @@ pub struct EmgReading {
 impl Default for EmgReading {
     fn default() -> Self {
         Self {
-            form: MeasurementFormat::default(),
+            format: MeasurementFormat::default(),
             rate_hz: None,
             channels: BTreeMap::new(),
             heel_strikes_s: Vec::new(),
@@ -76,7 +78,7 @@ impl EmgReading {
                 &format!("one of {}", CHANNELS.join(", ")),
             ));
         }
-        let whole = match (self.form, self.rate_hz) {
+        let whole = match (self.format, self.rate_hz) {
             (MeasurementFormat::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
             (MeasurementFormat::Opensim, None) => EmgRecording::from_opensim(what, text)?,
             (MeasurementFormat::Opensim, Some(rate_hz)) => {
@@ -136,7 +138,9 @@ pub struct NewEmg {
 pub struct MotionReading {
     /// File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     /// knee_R_rad, ankle_R_rad.
-    pub form: MeasurementFormat,
+    // Older records have the name `form`.
+    #[serde(alias = "form")]
+    pub format: MeasurementFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     pub unit: Option<Unit>,
     /// Cut-off frequency of the low-pass filter before differentiation, Hz.
@@ -145,7 +149,7 @@ pub struct MotionReading {
 
 impl Default for MotionReading {
     fn default() -> Self {
-        Self { form: MeasurementFormat::default(), unit: None, cutoff_hz: 6.0 }
+        Self { format: MeasurementFormat::default(), unit: None, cutoff_hz: 6.0 }
     }
 }
 
@@ -164,7 +168,7 @@ impl MotionReading {
     }
 
     fn joints(&self, text: &str) -> Result<JointRecording, Error> {
-        Ok(match self.form {
+        Ok(match self.format {
             MeasurementFormat::Csv => JointRecording::from_csv(WHAT, text)?,
             MeasurementFormat::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
         })
@@ -253,8 +257,8 @@ pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &MeasurementFile
 pub struct Brought {
     /// What is known of it.
     pub recording: MeasurementFile,
-    /// Its form.
-    pub form: MeasurementFormat,
+    /// Its format.
+    pub format: MeasurementFormat,
     /// Its content.
     pub file: PackedText,
 }
@@ -267,11 +271,12 @@ pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Broug
     /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
     struct Reading {
-        form: MeasurementFormat,
+        #[serde(alias = "form")]
+        format: MeasurementFormat,
     }
     let recording = measurement_files::get(db, id).await?;
-    let (Reading { form }, file) = measurement_files::file(db, id).await?;
-    Ok(Brought { recording, form, file })
+    let (Reading { format }, file) = measurement_files::file(db, id).await?;
+    Ok(Brought { recording, format, file })
 }
 
 /// Stores a measurement file with its walk.

@@ -101,7 +101,7 @@ mod tests {
         }
 
         #[test]
-        fn a_message_with_changed_bytes_is_read_or_refused(at in any::<prop::sample::Index>(), flip in 1_u8..) {
+        fn message_with_changed_bytes_is_read_or_refused(at in any::<prop::sample::Index>(), flip in 1_u8..) {
             let attempt = Attempt { trial: TrialId::fresh(), number: 3 };
             let brought = Brought { attempt, worker: "w".to_owned(), finding: Finding::Broke("reason".to_owned()) };
             let mut bytes = rmp_serde::to_vec_named(&brought).unwrap();

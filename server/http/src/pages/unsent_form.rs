@@ -47,7 +47,7 @@ pub(super) struct SignInPage {
 
 /// The page after signing in, which sends the form.
 #[derive(Template)]
-#[template(path = "send_now.html")]
+#[template(path = "unsent_form.html")]
 struct SendNowPage {
     to: String,
     fields: Vec<(String, String)>,

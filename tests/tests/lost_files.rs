@@ -42,7 +42,7 @@ fn beside(database: &Path, ending: &str) -> PathBuf {
 }
 
 #[tokio::test]
-async fn writes_are_refused_when_a_file_of_the_record_vanished() {
+async fn writes_are_refused_after_a_file_of_the_record_is_lost() {
     for ending in ["", "-wal", "-shm"] {
         for replaced in [false, true] {
             let (_folder, database, service) = service().await;
@@ -64,7 +64,7 @@ async fn writes_are_refused_when_a_file_of_the_record_vanished() {
 }
 
 #[tokio::test]
-async fn writes_are_refused_when_the_log_or_the_file_was_cut() {
+async fn writes_are_refused_after_the_log_or_the_file_is_truncated() {
     for ending in ["", "-wal"] {
         let (_folder, database, service) = service().await;
         assert_eq!(add_subjects(&service, "before", 5).await, (5, 0));
@@ -106,7 +106,7 @@ async fn record_that_another_program_writes_to_accepts_no_further_changes() {
 }
 
 #[tokio::test]
-async fn log_that_is_cut_within_a_commit_is_noticed_and_never_reaches_the_file() {
+async fn log_truncated_during_a_commit_is_detected_and_never_reaches_the_file() {
     // Bytes that the log loses; 9999 stands for all but the first 100.
     for lost in [1, 4000, 4121, 20_000, 9999] {
         let (_folder, database, service) = service().await;
@@ -130,7 +130,7 @@ async fn log_that_is_cut_within_a_commit_is_noticed_and_never_reaches_the_file()
 }
 
 #[tokio::test]
-async fn long_logs_go_into_the_file_and_are_written_from_their_beginning_again() {
+async fn long_logs_are_checkpointed_and_restarted() {
     let (_folder, database, service) = service().await;
     let mut longest = 0;
     for number in 0..12 {
@@ -144,7 +144,7 @@ async fn long_logs_go_into_the_file_and_are_written_from_their_beginning_again()
 }
 
 #[tokio::test]
-async fn changes_in_a_deleted_log_are_saved_when_its_loss_is_noticed() {
+async fn changes_in_a_deleted_log_are_saved_when_the_loss_is_detected() {
     let (folder, database, service) = service().await;
     assert_eq!(add_subjects(&service, "S", 40).await, (40, 0));
     std::fs::remove_file(beside(&database, "-wal")).unwrap();
@@ -166,7 +166,7 @@ async fn changes_in_a_deleted_log_are_saved_when_its_loss_is_noticed() {
 }
 
 #[tokio::test]
-async fn a_record_that_lost_its_end_is_refused_and_named_by_audit_verify() {
+async fn record_without_its_newest_rows_is_refused_and_reported_by_audit_verify() {
     let (folder, database, service) = service().await;
     assert_eq!(add_subjects(&service, "S", 40).await, (40, 0));
     // As after a kill with a deleted log: only checkpointed changes are in the file.
@@ -187,7 +187,7 @@ async fn a_record_that_lost_its_end_is_refused_and_named_by_audit_verify() {
 }
 
 #[tokio::test]
-async fn an_earlier_state_of_the_record_is_refused_by_each_anchor_until_it_is_restored() {
+async fn each_anchor_refuses_an_earlier_state_of_the_record_until_a_restore() {
     let folder = tempfile::tempdir().unwrap();
     let (database, elsewhere) = (folder.path().join("a.db"), folder.path().join("elsewhere.anchor"));
     let add = async |name: &'static str| {
@@ -233,7 +233,7 @@ async fn an_earlier_state_of_the_record_is_refused_by_each_anchor_until_it_is_re
 }
 
 #[tokio::test]
-async fn an_empty_record_is_not_begun_where_there_was_one() {
+async fn empty_record_is_not_created_in_place_of_a_lost_one() {
     let (folder, database, service) = service().await;
     service.stop().await;
     for leave_empty in [false, true] {
@@ -257,7 +257,7 @@ async fn an_empty_record_is_not_begun_where_there_was_one() {
 }
 
 #[tokio::test]
-async fn a_second_service_is_refused_also_when_the_lock_file_was_deleted() {
+async fn second_service_is_refused_after_the_lock_file_is_deleted() {
     let (_folder, database, service) = service().await;
     std::fs::remove_file(beside(&database, ".lock")).unwrap();
     let second = Store::open(&database).await;
@@ -269,7 +269,7 @@ async fn a_second_service_is_refused_also_when_the_lock_file_was_deleted() {
 
 #[cfg(unix)]
 #[tokio::test]
-async fn the_record_and_its_copies_are_for_their_owner_alone() {
+async fn only_the_owner_can_read_the_record_and_its_backups() {
     use std::os::unix::fs::PermissionsExt;
     let (folder, _database, service) = service().await;
     service.backed_up().await;
@@ -303,7 +303,7 @@ fn on_read_only_mount(folder: &Path, arguments: &str) -> Option<std::process::Ou
 }
 
 #[tokio::test]
-async fn verify_backup_and_export_work_on_a_read_only_mount() {
+async fn verify_backup_and_export_work_on_a_read_only_file_system() {
     let (folder, database, service) = service().await;
     let out = tempfile::tempdir().unwrap();
     let study = service.study(|new| (new.trial_budget, new.start) = (1, false)).await;
@@ -335,7 +335,7 @@ async fn verify_backup_and_export_work_on_a_read_only_mount() {
 }
 
 #[tokio::test]
-async fn a_backup_is_finished_without_its_requester_and_refused_when_it_cannot_be_recorded() {
+async fn backup_finishes_after_its_requester_disconnects_and_is_refused_if_it_cannot_be_recorded() {
     let (folder, database, service) = service().await;
     let path = "/api/v1/backups";
     // The client disconnects at once.
@@ -369,7 +369,7 @@ async fn a_backup_is_finished_without_its_requester_and_refused_when_it_cannot_b
 }
 
 #[tokio::test]
-async fn scheduled_copies_are_made_checked_and_the_oldest_removed() {
+async fn scheduled_backups_are_made_and_checked_and_the_oldest_deleted() {
     let (_folder, _database, service) = service().await;
     let out = tempfile::tempdir().unwrap();
     std::fs::write(out.path().join("a.db.backup-by-hand"), "").unwrap();
@@ -393,7 +393,7 @@ async fn scheduled_copies_are_made_checked_and_the_oldest_removed() {
 }
 
 #[test]
-fn serve_copies_the_record_by_itself_into_a_folder() {
+fn serve_makes_scheduled_backups_in_a_folder() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("copies")).unwrap();
     let binary = env!("CARGO_BIN_EXE_gaitwright-cli");

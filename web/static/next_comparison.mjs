@@ -2,7 +2,7 @@
 // After an answer: reloads the page when the study changes, to show the next comparison. If the user is typing, it offers a link
 // instead.
 
-import { holdsEdits } from "./edited.mjs";
+import { holdsEdits } from "./edited_fields.mjs";
 
 const place = /** @type {HTMLElement | null} */ (document.querySelector("[data-going-on]"));
 

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn best_guesser_is_right_in_four_of_seven_and_never_surer_than_three_of_four() {
+    fn best_guesser_is_right_in_four_of_seven_and_never_above_75_percent_certain() {
         let drawn = in_order(100_000);
         let (mut right, mut at_bias) = (0_u32, (0_u32, 0_u32));
         for (lead, one_first) in &drawn {
@@ -124,7 +124,7 @@ mod tests {
     /// Sessions are planned and unblinded in any order. The guesser sees every unblinded allocation, also of sessions that
     /// were planned later, and knows the rule.
     #[test]
-    fn best_guesser_gains_nothing_from_sessions_planned_or_unblinded_meanwhile() {
+    fn best_guesser_learns_nothing_from_other_sessions() {
         let (mut lead, mut concealed) = (0_i64, Vec::new());
         let (mut expected, mut right, mut of) = (0.0, 0_u32, 0_u32);
         for counter in 0..200_000_u64 {

@@ -1,13 +1,14 @@
 //! Every entry point through which a gait reaches a person or a device applies the same rules.
 //!
-//! The entry points, here called doors, are taken from the description of the REST interface, the page router and the
-//! commands: a door that is not classified here fails the test. Every classified door is then tried under every
-//! condition that must close it.
+//! The entry points are taken from the description of the REST interface, the page router and the commands. An entry
+//! point that is not classified here fails the test. Every classified one is then called under every condition in which
+//! it must refuse.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
 use gaitwright_http::openapi;
+use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
@@ -21,9 +22,9 @@ use tempfile::TempDir;
 
 const FORM: &str = "application/x-www-form-urlencoded";
 
-/// What a door leads to.
+/// What an entry point does with a gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Door {
+enum EntryPoint {
     /// A preference between two gaits that somebody chose.
     Preference,
     /// A note that two gaits cannot be told apart: it skips the pair.
@@ -50,7 +51,7 @@ enum Door {
     None(&'static str),
 }
 
-/// A condition that must close a door.
+/// A condition in which an entry point must refuse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Rule {
     /// One of the two gaits was reported as unsafe.
@@ -70,32 +71,32 @@ enum Rule {
 const RULES: [Rule; 6] =
     [Rule::Safety, Rule::Certificate, Rule::Withdrawal, Rule::Duplicate, Rule::EqualGaits, Rule::NotConverged];
 
-const READS: Door = Door::None("shows or gives out what is recorded; walks and answers do not follow from it");
-const RETRACTS: Door = Door::None("takes something back");
-const RUNS: Door = Door::None("runs solves or certifications; no person is asked");
-const SETS_UP: Door = Door::None("sets up subjects, devices, references, users or the service");
+const READS: EntryPoint = EntryPoint::None("shows or exports recorded data; no walk or answer follows from it");
+const RETRACTS: EntryPoint = EntryPoint::None("retracts an answer");
+const RUNS: EntryPoint = EntryPoint::None("runs solves or certifications; no person answers");
+const SETS_UP: EntryPoint = EntryPoint::None("sets up subjects, devices, references, users or the service");
 
-/// What an operation leads to. Nothing is the default: an operation that is not named here or in a file has no door.
-fn door_of(operation: &str) -> Option<Door> {
+/// What an operation does with a gait; `None` if neither this function nor a file classifies it.
+fn entry_point_of(operation: &str) -> Option<EntryPoint> {
     Some(match operation {
-        "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => Door::Preference,
-        "post /api/v1/studies/{id}/assessments" => Door::Note,
-        "post /api/v1/blind-pairs/{token}/answer" | "post /rate/pair/{token}" => Door::RaterAnswer,
-        "post /api/v1/studies/{id}/blind-pairs/next" | "post /rate/{id}" => Door::RaterPair,
-        "post /api/v1/studies/{id}/lab-sessions" | "post /studies/{id}/lab" => Door::Plan,
-        "post /api/v1/lab-sessions/{id}/walks" | "post /lab/{id}" => Door::Walk,
-        "post /api/v1/lab-sessions/{id}/answers" | "post /lab/{id}/answer" => Door::WalkAnswer,
-        "get /api/v1/trials/{id}/controller.json" => Door::DeviceFile,
-        "get /api/v1/lab-sessions/{id}/controller.json" => Door::WalkFile,
+        "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => EntryPoint::Preference,
+        "post /api/v1/studies/{id}/assessments" => EntryPoint::Note,
+        "post /api/v1/blind-pairs/{token}/answer" | "post /rate/pair/{token}" => EntryPoint::RaterAnswer,
+        "post /api/v1/studies/{id}/blind-pairs/next" | "post /rate/{id}" => EntryPoint::RaterPair,
+        "post /api/v1/studies/{id}/lab-sessions" | "post /studies/{id}/lab" => EntryPoint::Plan,
+        "post /api/v1/lab-sessions/{id}/walks" | "post /lab/{id}" => EntryPoint::Walk,
+        "post /api/v1/lab-sessions/{id}/answers" | "post /lab/{id}/answer" => EntryPoint::WalkAnswer,
+        "get /api/v1/trials/{id}/controller.json" => EntryPoint::DeviceFile,
+        "get /api/v1/lab-sessions/{id}/controller.json" => EntryPoint::WalkFile,
         "get /api/v1/studies/{id}/recommendation" | "get /api/v1/studies/{id}/recommendation.csv" => {
-            Door::Recommendation
+            EntryPoint::Recommendation
         }
-        "post /api/v1/studies/{id}/suggestions" => Door::Suggestion,
+        "post /api/v1/studies/{id}/suggestions" => EntryPoint::Suggestion,
         "post /api/v1/trials/{id}/safety-reports" | "post /trials/{id}/safety-report" => {
-            Door::None("closes a gait; `safety_review.rs` holds its rules")
+            EntryPoint::None("closes a gait; `safety_review.rs` holds its rules")
         }
         "post /api/v1/trials/{id}/safety-reviews" | "post /trials/{id}/safety-review" => {
-            Door::None("decides about a report; `safety_review.rs` holds its rules")
+            EntryPoint::None("decides about a report; `safety_review.rs` holds its rules")
         }
         "post /api/v1/preferences/{id}/retract"
         | "post /api/v1/assessments/{id}/retract"
@@ -104,7 +105,7 @@ fn door_of(operation: &str) -> Option<Door> {
         | "post /lab/{id}/retract"
         | "post /rate/pair/{token}/retract" => RETRACTS,
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
-            Door::None("the lab evaluates a trial by itself; figures, and no person's answer")
+            EntryPoint::None("the lab evaluates a trial by itself; figures, and no person's answer")
         }
         _ if operation.starts_with("get ") => return reads(operation),
         _ if [
@@ -127,15 +128,15 @@ fn door_of(operation: &str) -> Option<Door> {
 }
 
 /// GET operations that return nothing to walk with.
-const READ: &str = include_str!("one_door/reads.txt");
+const READ: &str = include_str!("entry_points/reads.txt");
 
-fn reads(operation: &str) -> Option<Door> {
+fn reads(operation: &str) -> Option<EntryPoint> {
     READ.lines().any(|line| line == operation).then_some(READS)
 }
 
 /// Operations that set something up, each by name.
-fn set_up(operation: &str) -> Option<Door> {
-    const KNOWN: &str = include_str!("one_door/set_up.txt");
+fn set_up(operation: &str) -> Option<EntryPoint> {
+    const KNOWN: &str = include_str!("entry_points/set_up.txt");
     KNOWN.lines().any(|line| line == operation).then_some(SETS_UP)
 }
 
@@ -195,7 +196,7 @@ impl Scene {
         gaitwright_store::commit(writer).await.unwrap();
     }
 
-    /// How many rows each table has that a door may write.
+    /// The number of rows of each table that an entry point may write.
     async fn rows(&self) -> BTreeMap<&'static str, i64> {
         let mut reader = self.service.store.read().await.unwrap();
         let mut counts = BTreeMap::new();
@@ -220,7 +221,7 @@ impl Scene {
         answer
     }
 
-    /// Makes a condition true, for `pair`; the pair to try the door with.
+    /// Makes a condition true for `pair`, and returns the pair to call the entry point with.
     async fn violate(&self, rule: Rule) -> (TrialId, TrialId) {
         let (first, second) = self.pair;
         match rule {
@@ -263,8 +264,8 @@ impl Scene {
     }
 }
 
-/// Sends what opens a door about a pair; `session`: a session of the pair.
-async fn knock(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session: &str) -> Answer {
+/// Calls an entry point for a pair; `session`: a lab session of the pair.
+async fn call(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session: &str) -> Answer {
     let (a, b) = pair;
     let (service, study) = (&scene.service, scene.study);
     let key = "01890000-0000-7000-8000-000000000009";
@@ -305,38 +306,39 @@ async fn knock(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session
         "get /api/v1/lab-sessions/{id}/controller.json" => {
             service.fetch(&format!("/api/v1/lab-sessions/{session}/controller.json?walk=2")).await
         }
-        other => panic!("nobody knows how to knock at {other}"),
+        other => panic!("this test has no request for {other}"),
     }
 }
 
-/// What a rule does at a door: `None` where the rule cannot be broken there, with the reason.
-fn expected(door: Door, rule: Rule) -> Result<(), &'static str> {
-    match (door, rule) {
-        (Door::Plan | Door::Walk | Door::DeviceFile | Door::WalkFile, Rule::Duplicate) => {
+/// Whether a rule applies to an entry point; the reason if it cannot be broken there.
+fn expected(entry_point: EntryPoint, rule: Rule) -> Result<(), &'static str> {
+    match (entry_point, rule) {
+        (EntryPoint::Plan | EntryPoint::Walk | EntryPoint::DeviceFile | EntryPoint::WalkFile, Rule::Duplicate) => {
             Err("the same gaits may be walked with again")
         }
-        (Door::Walk | Door::WalkFile, Rule::EqualGaits | Rule::NotConverged) => {
+        (EntryPoint::Walk | EntryPoint::WalkFile, Rule::EqualGaits | Rule::NotConverged) => {
             Err("a session with such a pair cannot be planned")
         }
-        (Door::DeviceFile, Rule::EqualGaits) => Err("a file is of one gait"),
+        (EntryPoint::DeviceFile, Rule::EqualGaits) => Err("a file is of one gait"),
         _ => Ok(()),
     }
 }
 
 #[test]
 fn every_route_is_classified() {
-    let unknown: Vec<String> = operations().into_iter().filter(|operation| door_of(operation).is_none()).collect();
-    assert!(unknown.is_empty(), "say in tests/tests/one_door.rs what these lead to:\n{}", unknown.join("\n"));
+    let unknown: Vec<String> =
+        operations().into_iter().filter(|operation| entry_point_of(operation).is_none()).collect();
+    assert!(unknown.is_empty(), "classify these in tests/tests/entry_points.rs:\n{}", unknown.join("\n"));
 }
 
 #[test]
-fn unknown_get_is_a_door_until_it_is_classified() {
+fn unknown_get_route_fails_until_it_is_classified() {
     for new in ["get /api/v1/trials/{id}/controller.bin", "get /lab/{id}/walk.json", "get /api/v1/studies/{id}/best"] {
-        assert_eq!(door_of(new), None, "{new}");
+        assert_eq!(entry_point_of(new), None, "{new}");
     }
     let known = operations();
     for line in READ.lines() {
-        assert!(known.iter().any(|operation| operation == line), "{line} is no operation");
+        assert!(known.iter().any(|operation| operation == line), "{line} is not an operation");
         assert!(
             !line.contains("controller") && !line.contains("recommendation"),
             "{line} hands out a gait to walk with"
@@ -351,7 +353,7 @@ const COMMANDS: [(&str, &str); 22] = [
     ("signing-key", "makes a key to sign archives"),
     ("audit", "reads the record"),
     ("backup", "copies the record"),
-    ("body", "writes a body's figures"),
+    ("body", "prints the figures of a body"),
     ("certify", "certifies a gait file"),
     ("config", "shows settings"),
     ("emg", "processes a recording"),
@@ -362,11 +364,11 @@ const COMMANDS: [(&str, &str); 22] = [
     ("reference", "makes a reference of a recording"),
     ("reproduce", "runs automatic studies"),
     ("restore", "puts a copy in place of a record"),
-    ("serve", "opens the doors that the other tests knock at"),
+    ("serve", "serves the entry points that the other tests call"),
     ("solve", "solves for a gait file"),
     ("sweep", "solves for gait files"),
     ("tune", "runs an automatic study"),
-    ("users", "lets people in"),
+    ("users", "makes sign-in links"),
     ("worker", "solves jobs"),
 ];
 
@@ -378,52 +380,53 @@ fn every_command_is_classified() {
     let commands: Vec<&str> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
     assert!(commands.len() > 15, "{help}");
     for command in commands {
-        assert!(COMMANDS.iter().any(|(known, _)| *known == command), "say in this file what {command:?} leads to");
+        assert!(COMMANDS.iter().any(|(known, _)| *known == command), "classify the command {command:?} in this file");
     }
 }
 
 #[tokio::test]
-async fn every_door_is_closed_by_every_rule() {
-    let doors: Vec<(String, Door)> = operations()
+async fn every_entry_point_applies_every_rule() {
+    let entry_points: Vec<(String, EntryPoint)> = operations()
         .into_iter()
-        .filter_map(|operation| door_of(&operation).map(|door| (operation, door)))
-        .filter(|(_, door)| {
+        .filter_map(|operation| entry_point_of(&operation).map(|entry_point| (operation, entry_point)))
+        .filter(|(_, entry_point)| {
             matches!(
-                door,
-                Door::Preference
-                    | Door::Note
-                    | Door::Suggestion
-                    | Door::Plan
-                    | Door::Walk
-                    | Door::DeviceFile
-                    | Door::WalkFile
+                entry_point,
+                EntryPoint::Preference
+                    | EntryPoint::Note
+                    | EntryPoint::Suggestion
+                    | EntryPoint::Plan
+                    | EntryPoint::Walk
+                    | EntryPoint::DeviceFile
+                    | EntryPoint::WalkFile
             )
         })
         .collect();
-    assert!(doors.len() >= 10, "{doors:?}");
+    assert!(entry_points.len() >= 10, "{entry_points:?}");
     let mut matrix = Vec::new();
-    for (operation, door) in &doors {
-        // Without a broken rule the door is open: a refusal for another reason proves nothing.
+    for (operation, entry_point) in &entry_points {
+        // If no rule is broken, the call succeeds: otherwise a refusal could have another reason.
         let scene = Scene::new().await;
         let session = scene.session(1).await;
-        let open = knock(&scene, operation, scene.pair, &session).await;
-        // The analytic solver's gaits are no gaits of the walker: that is found out behind the door.
-        let is_open = open.status.is_success() || open.status.is_redirection() || open.text.contains("contact_rows");
-        assert!(is_open, "{operation}: {} {}", open.status, open.text);
+        let accepted = call(&scene, operation, scene.pair, &session).await;
+        // The export finds, after the rules have passed, that the analytic solver's gaits do not fit the walker.
+        let is_accepted =
+            accepted.status.is_success() || accepted.status.is_redirection() || accepted.text.contains("contact_rows");
+        assert!(is_accepted, "{operation}: {} {}", accepted.status, accepted.text);
         scene.service.stop().await;
         for rule in RULES {
-            if let Err(why) = expected(*door, rule) {
+            if let Err(why) = expected(*entry_point, rule) {
                 matrix.push(format!("{operation:50} {rule:?}: does not apply ({why})"));
                 continue;
             }
             let scene = Scene::new().await;
             let session = scene.session(1).await;
             let mut pair = scene.violate(rule).await;
-            if (*door, rule) == (Door::DeviceFile, Rule::NotConverged) {
+            if (*entry_point, rule) == (EntryPoint::DeviceFile, Rule::NotConverged) {
                 pair = (pair.1, pair.0);
             }
             let before = scene.rows().await;
-            let refused = knock(&scene, operation, pair, &session).await;
+            let refused = call(&scene, operation, pair, &session).await;
             assert!(
                 matches!(refused.status, StatusCode::CONFLICT | StatusCode::UNPROCESSABLE_ENTITY),
                 "{operation} with {rule:?}: {} {}",
@@ -441,7 +444,7 @@ async fn every_door_is_closed_by_every_rule() {
 
 /// A rater's pair and answer under a rule that is broken after the pair was drawn.
 #[tokio::test]
-async fn a_pair_that_was_shown_is_not_answered_after_a_rule_closes_it() {
+async fn pair_cannot_be_answered_after_a_rule_excludes_it() {
     for (rule, statuses) in [
         (Rule::Safety, [StatusCode::CONFLICT, StatusCode::OK]),
         (Rule::Certificate, [StatusCode::CONFLICT, StatusCode::OK]),
@@ -518,7 +521,7 @@ impl Rated {
 }
 
 #[tokio::test]
-async fn person_who_answered_a_pair_elsewhere_does_not_answer_it_blind_and_the_other_way_round() {
+async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
     for blind_first in [true, false] {
         let scene = Rated::new().await;
         let token = scene.token().await;
@@ -565,7 +568,7 @@ async fn person_who_answered_a_pair_elsewhere_does_not_answer_it_blind_and_the_o
 }
 
 #[tokio::test]
-async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned() {
+async fn answer_about_a_gait_reported_as_unsafe_is_stored_and_not_learned() {
     let scene = Scene::new().await;
     let session = scene.session(3).await;
     scene.violate(Rule::Safety).await;
@@ -582,7 +585,7 @@ async fn answer_about_a_gait_reported_unsafe_meanwhile_is_stored_and_not_learned
 
 /// The recommendation names walkable gaits only.
 #[tokio::test]
-async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certificate() {
+async fn recommendation_excludes_unsafe_and_uncertified_gaits() {
     for rule in [Rule::Safety, Rule::Certificate, Rule::Withdrawal] {
         let scene = Scene::new().await;
         let recommended = format!("/api/v1/studies/{}/recommendation", scene.study);
@@ -603,7 +606,7 @@ async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certi
 }
 
 #[test]
-fn learners_log_and_new_trials_are_each_written_at_one_door() {
+fn one_function_writes_the_learner_log_and_one_writes_trials() {
     let mut writers = Vec::new();
     let mut appenders = Vec::new();
     let mut planners = Vec::new();
@@ -624,34 +627,56 @@ fn learners_log_and_new_trials_are_each_written_at_one_door() {
     assert_eq!(planners, ["service/src/studies/snapshot.rs"], "callers of the function that writes trials");
 }
 
-#[tokio::test]
-async fn a_plan_made_before_a_safety_report_is_not_written() {
-    let scene = Rated::new().await;
-    let study = scene.service.get(scene.study).await;
-    let snapshot = gaitwright_service::studies::snapshot::StudySnapshot::read(
-        &mut scene.service.store.read().await.unwrap(),
-        study,
-    )
-    .await
-    .unwrap();
-    let last = snapshot.trials.last().unwrap();
-    let new = NewTrial {
-        number: last.number + 1,
-        action_index: last.action_index,
-        action: last.action,
-        reason: "as asked".to_owned(),
-        best_before: None,
-        warm_started_from: None,
-    };
-    // Dropped, so that it leaves no trace.
-    let is_written = async || {
+/// A trial that a study could plan next, with the snapshot that it follows from.
+struct Plan {
+    snapshot: StudySnapshot,
+    trial: NewTrial,
+}
+
+impl Plan {
+    async fn of(scene: &Rated) -> Self {
+        let study = scene.service.get(scene.study).await;
+        let snapshot = StudySnapshot::read(&mut scene.service.store.read().await.unwrap(), study).await.unwrap();
+        let last = snapshot.trials.last().unwrap();
+        let trial = NewTrial {
+            number: last.number + 1,
+            action_index: last.action_index,
+            action: last.action,
+            reason: "as asked".to_owned(),
+            best_before: None,
+            warm_started_from: None,
+        };
+        Self { snapshot, trial }
+    }
+
+    /// Whether the plan can be written. The change is dropped, so that it leaves no trace.
+    async fn is_written(&self, scene: &Rated) -> bool {
         let mut writer = scene.service.store.write().await.unwrap();
-        snapshot.write_trial(&mut writer, &new).await.unwrap().is_some()
-    };
-    assert!(is_written().await);
+        self.snapshot.write_trial(&mut writer, &self.trial).await.unwrap().is_some()
+    }
+}
+
+#[tokio::test]
+async fn plan_made_before_an_answer_is_not_written() {
+    let scene = Rated::new().await;
+    let token = scene.token().await;
+    let plan = Plan::of(&scene).await;
+    assert!(plan.is_written(&scene).await);
+    let answer = format!("/api/v1/blind-pairs/{token}/answer");
+    let answered = scene.service.post(&answer, &json!({"answer": "first"})).await;
+    assert!(answered.status.is_success(), "{}", answered.text);
+    assert!(!plan.is_written(&scene).await);
+    scene.service.stop().await;
+}
+
+#[tokio::test]
+async fn plan_made_before_a_safety_report_is_not_written() {
+    let scene = Rated::new().await;
+    let plan = Plan::of(&scene).await;
+    assert!(plan.is_written(&scene).await);
     let feedback = scene.service.feedback(scene.study).await.len();
     scene.close(Rule::Safety).await;
     assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: nothing reaches the learner");
-    assert!(!is_written().await, "and the plan is made anew all the same");
+    assert!(!plan.is_written(&scene).await, "although no answer arrived");
     scene.service.stop().await;
 }

@@ -57,7 +57,7 @@ async fn clear(service: &Service, trial: &Trial) -> StatusCode {
 }
 
 #[tokio::test]
-async fn a_report_closes_every_trial_of_the_subject_with_the_same_motion() {
+async fn report_covers_every_trial_of_the_subject_with_the_same_motion() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let fork = service.post(&format!("/api/v1/studies/{study}/fork"), &json!({"start": true})).await.json();
@@ -93,7 +93,7 @@ async fn a_report_closes_every_trial_of_the_subject_with_the_same_motion() {
 /// Trials of one action: evaluated by a lab script in two studies, by the service in a third one, and by a lab script
 /// with another device.
 #[tokio::test]
-async fn a_report_closes_every_trial_with_equal_bounds_if_a_lab_script_evaluated_one_of_them() {
+async fn report_covers_every_trial_with_equal_bounds_if_a_lab_script_evaluated_one() {
     let (_folder, service) = service().await;
     let device = another_device(&service).await;
     let by_script = |new: &mut NewStudy| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3);
@@ -132,7 +132,7 @@ async fn a_report_closes_every_trial_with_equal_bounds_if_a_lab_script_evaluated
 }
 
 #[tokio::test]
-async fn a_lab_script_is_not_given_bounds_that_were_reported_as_unsafe() {
+async fn lab_script_does_not_receive_bounds_of_unsafe_gaits() {
     let (_folder, service) = service().await;
     let by_script = |new: &mut NewStudy| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3);
     let (first, second, third) =
@@ -174,7 +174,7 @@ async fn another_device(service: &Service) -> DeviceId {
 }
 
 #[tokio::test]
-async fn one_gait_is_reported_without_another_to_compare_it_with() {
+async fn single_gait_is_reported_without_a_comparison() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let made = report(&service, &trials[0]).await;
@@ -191,7 +191,7 @@ async fn one_gait_is_reported_without_another_to_compare_it_with() {
 }
 
 #[tokio::test]
-async fn an_unsafe_walk_is_reported_before_the_next_one_and_ends_the_walks() {
+async fn report_between_walks_ends_the_walks() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
@@ -222,7 +222,7 @@ async fn an_unsafe_walk_is_reported_before_the_next_one_and_ends_the_walks() {
 }
 
 #[tokio::test]
-async fn no_file_is_released_after_a_report_was_acknowledged_or_the_session_closed() {
+async fn controller_file_is_refused_after_a_report_or_the_end_of_the_session() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let device = Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
@@ -244,7 +244,7 @@ async fn no_file_is_released_after_a_report_was_acknowledged_or_the_session_clos
 }
 
 #[tokio::test]
-async fn a_report_that_is_recorded_while_a_file_waits_for_the_access_log_stops_the_file() {
+async fn report_stops_a_controller_file_that_waits_for_the_access_log() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
@@ -268,7 +268,7 @@ async fn a_report_that_is_recorded_while_a_file_waits_for_the_access_log_stops_t
 }
 
 #[tokio::test]
-async fn a_pair_is_no_longer_shown_to_its_rater_after_a_report() {
+async fn pair_is_no_longer_shown_to_its_rater_after_a_report() {
     let (_folder, service) = service().await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -285,7 +285,7 @@ async fn a_pair_is_no_longer_shown_to_its_rater_after_a_report() {
 }
 
 #[tokio::test]
-async fn a_safety_report_in_an_assessment_is_reviewed_and_not_retracted() {
+async fn safety_report_of_an_assessment_is_reviewed_and_cannot_be_retracted() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let body = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_first", "author": "K"});

@@ -11,7 +11,7 @@ use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, SubjectId, TrialId};
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::drawn::Drawn;
+use gaitwright_tests::bodies_from_schema::Drawn;
 use gaitwright_tests::measured::{electromyogram, four_strides, motion};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
@@ -234,7 +234,7 @@ fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>
         }
         path if path.ends_with("/reference-gaits") => BTreeMap::from([
             ("recording", vec![json!(four_strides(100))]),
-            ("form", vec![json!("csv")]),
+            ("format", vec![json!("csv")]),
             ("strikes", vec![json!("kinematics")]),
             ("forces", vec![Value::Null]),
             ("force_column", vec![Value::Null]),
@@ -261,7 +261,7 @@ fn is_said_in_words(drawn: &Drawn, schema: &Value, field: &str) -> bool {
 }
 
 #[tokio::test]
-async fn every_body_is_accepted_exactly_where_it_fits_the_description() {
+async fn bodies_are_accepted_if_and_only_if_they_match_the_description() {
     let (_folder, mut scene) = Scene::set().await;
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut drawn = Drawn::from(document.clone());
