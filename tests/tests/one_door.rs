@@ -354,6 +354,7 @@ const COMMANDS: [(&str, &str); 22] = [
     ("body", "writes a body's figures"),
     ("certify", "certifies a gait file"),
     ("config", "shows settings"),
+    ("doctor", "checks machine, settings and record, and changes nothing"),
     ("emg", "processes a recording"),
     ("export", "writes an archive"),
     ("help", "explains commands"),
