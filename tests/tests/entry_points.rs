@@ -356,6 +356,7 @@ const COMMANDS: [(&str, &str); 22] = [
     ("body", "prints the figures of a body"),
     ("certify", "certifies a gait file"),
     ("config", "shows settings"),
+    ("doctor", "checks machine, settings and record, and changes nothing"),
     ("emg", "processes a recording"),
     ("export", "writes an archive"),
     ("help", "explains commands"),

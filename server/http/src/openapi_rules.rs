@@ -140,7 +140,7 @@ pub(super) fn state(document: &mut Value) {
         close(schemas, "Dimension");
         close(schemas, "SearchSpace");
         state_bounds(schemas);
-        let mut gait = settings(GaitSettings::default(), |s: &GaitSettings| s.validate().err().map(Error::from));
+        let mut gait = settings(widest_durations(), |s: &GaitSettings| s.validate().err().map(Error::from));
         if let Some(muscles) = gait.pointer_mut("/properties/muscles") {
             *muscles = json!({ "$ref": format!("{SCHEMAS}MuscleParameters") });
         }
@@ -213,6 +213,15 @@ fn state_emg(schemas: &mut Map<String, Value>) {
     }
     set(schemas, "EmgSettings", "order", json!({ "type": "integer", "enum": [2, 4, 6, 8], "default": 4 }));
     close(schemas, "EmgSettings");
+}
+
+/// Settings whose durations leave each other the widest ranges; `x-depends` has the rule between them.
+fn widest_durations() -> GaitSettings {
+    let mut settings = GaitSettings::default();
+    let (least, most) = (&mut settings.limits.duration_min_s, &mut settings.limits.duration_max_s);
+    (least.ds2, least.ds3, least.ss2, least.ss1) = (0.005, 0.005, 0.005, 0.005);
+    (most.ds2, most.ds3, most.ss2, most.ss1) = (2.0, 2.0, 2.0, 2.0);
+    settings
 }
 
 /// The schema of the options of a solve. The choice of a gait is a word, or an object with a percentage.
