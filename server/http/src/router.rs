@@ -1,8 +1,8 @@
 //! The router: all routes, and the layers around them.
 
 use super::{
-    AppState, access_log, answers, api, client_address, host, identify, metrics, openapi, pages, same_origin,
-    static_files,
+    AppState, access_log, api, client_address, host, identify, metrics, openapi, page_error, pages, responses,
+    same_origin, static_files,
 };
 use crate::problem::Refusal;
 use axum::Router;
