@@ -345,7 +345,7 @@ fn unknown_get_is_a_door_until_it_is_classified() {
 }
 
 /// What each command has to do with people and devices.
-const COMMANDS: [(&str, &str); 22] = [
+const COMMANDS: [(&str, &str); 23] = [
     ("convert", "makes tables and pictures of a gait file, and nothing for a device"),
     ("import", "writes the rows of an archive after checking them: `archives.rs` holds its rules"),
     ("signing-key", "makes a key to sign archives"),
