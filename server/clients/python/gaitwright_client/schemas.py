@@ -42,12 +42,6 @@ FeedbackId = str
 # Who answers comparisons.
 FeedbackMode = Literal["automatic", "human", "mixed"]
 
-# Format of a measurement file.
-FileForm = Literal["csv", "opensim"]
-
-# File format of a recording.
-Form = Literal["opensim", "camargo", "csv"]
-
 # A gait as the optimiser writes it. `format_version` is the version of its layout.
 GaitDocument = dict[str, Any]
 
@@ -60,14 +54,23 @@ JobKind = Literal["backup", "certificate", "explanation", "solve"]
 # State of a job.
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
+# File format of a recording.
+JointAngleFormat = Literal["opensim", "camargo", "csv"]
+
 # Content of an assessment.
 Judgement = Literal[
-    "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "withdrawn",
+    "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
 ]
 
 LabSessionId = str
 
+# State of a session.
+LabSessionState = Literal["planned", "under_way", "closed"]
+
 MeasurementFileId = str
+
+# Format of a measurement file.
+MeasurementFormat = Literal["csv", "opensim"]
 
 # Kind of a measurement file.
 MeasurementKind = Literal["electromyogram", "motion"]
@@ -110,9 +113,6 @@ SafetyReportId = str
 SafetyReviewId = str
 
 SessionId = str
-
-# State of a session.
-SessionState = Literal["planned", "under_way", "closed"]
 
 # What `gaitwright solve --problem` reads: subject, device, bounds, settings, reference gait, limits, start.
 SolveProblem = dict[str, Any]
@@ -358,10 +358,10 @@ class Bounds(TypedDict):
 class _CertificateRequired(TypedDict):
     # Every quantity with its worst value and its limit.
     checks: list[CertificateCheck]
+    # Reasons if it failed; otherwise empty.
+    failures: list[str]
     # Version of this layout and of its checks.
     format_version: int
-    # Reasons if it failed; otherwise empty.
-    objections: list[str]
     # Whether every check is within its limit, the walker does not fall, and the gait is stable.
     passed: bool
 
@@ -413,30 +413,6 @@ class Closing(TypedDict, total=False):
 
     # Note, at most 2000 characters.
     note: str
-
-
-class _ComparedRequired(TypedDict):
-    id: StudyId
-    muscles: bool
-    name: str
-    seed: int
-    # Total time of all solves, s.
-    solve_seconds: float
-    state: StudyState
-    trials: TrialCounts
-
-
-class Compared(_ComparedRequired, total=False):
-    """Study in a comparison."""
-
-    # Action of the recommended trial.
-    best_action: Optional[Bounds]
-    # Cost of transport of the recommended trial.
-    best_cost_of_transport: Optional[float]
-    # Gait RMSE of the recommended trial, rad.
-    best_gait_rmse_rad: Optional[float]
-    # Number of the recommended trial.
-    best_trial: Optional[int]
 
 
 class _ConflictRequired(TypedDict):
@@ -491,6 +467,81 @@ class Correction(TypedDict):
     reason: str
     # Sequence number.
     seq: int
+
+
+class CreatedInvitation(TypedDict):
+    """Invited rater."""
+
+    # The membership.
+    member: Member
+    # Path of the one-time sign-in link, which is shown once and valid for a day.
+    path: str
+
+
+class _FeedbackRowRequired(TypedDict):
+    # Author.
+    author: str
+    # Whether it comes from a rater's blind comparison.
+    by_rater: bool
+    # Content of the entry.
+    content: FeedbackContent
+    # Time of recording.
+    created_at: Instant
+    # Identifier.
+    id: FeedbackId
+    # Free text.
+    note: str
+    # Sequence number.
+    seq: int
+    # Source.
+    source: Source
+    # The study.
+    study_id: StudyId
+    # Whether that rater could have known the allocation, so that it does not count as blind.
+    unblinded: bool
+
+
+class FeedbackRow(_FeedbackRowRequired, total=False):
+    """Entry of the feedback log."""
+
+    # Retraction, if it was retracted.
+    retraction: Optional[Retraction]
+
+
+class CreatedPreference(FeedbackRow):
+    """Recorded preference."""
+
+    # Answers of other people to the same comparison, at most the newest twenty.
+    other_answers: list[FeedbackId]
+
+
+class _TokenRequired(TypedDict):
+    # Time of creation.
+    created_at: Instant
+    # Who created it. The token is revoked when this user is disabled or is no longer an administrator.
+    created_by: str
+    # Identifier.
+    id: TokenId
+    # Unique name that states its purpose.
+    name: str
+    # Scopes.
+    scopes: list[Right]
+
+
+class Token(_TokenRequired, total=False):
+    """Token of a program, without its secret."""
+
+    # Time of expiry. Absent if it does not expire.
+    expires_at: Optional[Instant]
+    # Time of revocation, if it was revoked.
+    revoked_at: Optional[Instant]
+
+
+class CreatedToken(Token):
+    """New token."""
+
+    # Secret, shown once. Send it as `Authorization: Bearer SECRET`.
+    secret: str
 
 
 class CycleActivity(TypedDict):
@@ -594,17 +645,6 @@ class Dimension(TypedDict):
     values: list[float]
 
 
-class Done(TypedDict):
-    """Completed step of a session."""
-
-    # Who did it.
-    actor: str
-    # Time.
-    at: Instant
-    # Reason or note.
-    note: str
-
-
 class EmgReading(TypedDict, total=False):
     """How to read an EMG recording."""
 
@@ -612,7 +652,7 @@ class EmgReading(TypedDict, total=False):
     # channels.
     channels: dict[str, str]
     # File format.
-    form: FileForm
+    format: MeasurementFormat
     # Column of a switch under the right heel, or of the vertical force under the right foot.
     heel_strike_column: Optional[str]
     # Value of that column above which the foot is on the ground.
@@ -713,36 +753,6 @@ class FeedbackContentSuggestion(TypedDict):
     over: TrialId
     # Index of the suggested action.
     suggested: int
-
-
-class _FeedbackRowRequired(TypedDict):
-    # Author.
-    author: str
-    # Whether it comes from a rater's blind comparison.
-    by_rater: bool
-    # Content of the entry.
-    content: FeedbackContent
-    # Time of recording.
-    created_at: Instant
-    # Identifier.
-    id: FeedbackId
-    # Free text.
-    note: str
-    # Sequence number.
-    seq: int
-    # Source.
-    source: Source
-    # The study.
-    study_id: StudyId
-    # Whether that rater could have known the allocation, so that it does not count as blind.
-    unblinded: bool
-
-
-class FeedbackRow(_FeedbackRowRequired, total=False):
-    """Entry of the feedback log."""
-
-    # Retraction, if it was retracted.
-    retraction: Optional[Retraction]
 
 
 class Fork(TypedDict, total=False):
@@ -899,46 +909,11 @@ class Import(_ImportRequired, total=False):
     signed_by: Optional[str]
 
 
-class _InTheLabRequired(TypedDict):
-    # Whether that answer can be retracted here.
-    can_be_retracted: bool
-    # Whether the session is closed.
-    closed: bool
-    # Identifier of the session.
-    session: LabSessionId
-    # Number of walks.
-    walks: int
-
-
-class InTheLab(_InTheLabRequired, total=False):
-    """Session as shown in the lab, without anything that reveals a gait."""
-
-    # Current answer of the subject.
-    answer: Optional[LabAnswer]
-    # Number to send with the answer. Absent before the last walk and after an answer.
-    asks: Optional[int]
-    # Time at which the last walk was recorded.
-    last_recorded: Optional[Instant]
-    # Number to send with a report of an unsafe walk. Absent until the subject may have walked with the device.
-    reports: Optional[int]
-    # Next walk, 1 to 3. Absent after the last walk and in a closed session.
-    walk: Optional[int]
-
-
 class Invitation(TypedDict):
     """Rater to invite."""
 
     # Name or code of the rater, 1 to 80 characters. A new name adds a rater.
     name: str
-
-
-class Invited(TypedDict):
-    """Invited rater."""
-
-    # The membership.
-    member: Member
-    # Path of the one-time sign-in link, which is shown once and valid for a day.
-    path: str
 
 
 class Iteration(TypedDict):
@@ -1018,6 +993,82 @@ class LabAnswer(TypedDict):
     number: int
 
 
+class _LabSessionProgressRequired(TypedDict):
+    # Whether that answer can be retracted here.
+    can_be_retracted: bool
+    # Whether the session is closed.
+    closed: bool
+    # Identifier of the session.
+    session: LabSessionId
+    # Number of walks.
+    walks: int
+
+
+class LabSessionProgress(_LabSessionProgressRequired, total=False):
+    """Session as shown in the lab, without anything that reveals a gait."""
+
+    # Current answer of the subject.
+    answer: Optional[LabAnswer]
+    # Number to send with the answer. Absent before the last walk and after an answer.
+    answer_number: Optional[int]
+    # Time at which the last walk was recorded.
+    last_recorded: Optional[Instant]
+    # Number to send with a report of an unsafe walk. Absent until the subject may have walked with the device.
+    report_number: Optional[int]
+    # Next walk, 1 to 3. Absent after the last walk and in a closed session.
+    walk: Optional[int]
+
+
+class LabSessionStep(TypedDict):
+    """Completed step of a session."""
+
+    # Who did it.
+    actor: str
+    # Time.
+    at: Instant
+    # Reason or note.
+    note: str
+
+
+class _LabSessionViewRequired(TypedDict):
+    # Whether the allocation is in this record. A study that was imported while the session was blinded does not have
+    # it.
+    allocation_included: bool
+    # Time of planning.
+    created_at: Instant
+    # Who fetched controller files of the walks.
+    device_files: list[DeviceFile]
+    # Trial of one gait. Does not imply the order of the walks.
+    gait_one: TrialId
+    # Trial of the other gait.
+    gait_two: TrialId
+    # Identifier.
+    id: LabSessionId
+    # Free text.
+    notes: str
+    # Number of the session in this study, from 1.
+    number: int
+    # Who planned the session.
+    planned_by: str
+    # State of the session.
+    state: LabSessionState
+    # The study.
+    study_id: StudyId
+    # The three walks.
+    walks: list[WalkView]
+
+
+class LabSessionView(_LabSessionViewRequired, total=False):
+    """Lab session, without blinded data."""
+
+    # Current answer of the subject. Absent if there is none.
+    answer: Optional[LabAnswer]
+    # Who closed the session, and when.
+    closed: Optional[LabSessionStep]
+    # Who unblinded the session, when and why. Absent while it is blinded.
+    unblinded: Optional[LabSessionStep]
+
+
 class LearnerSettings(TypedDict, total=False):
     """Settings of the learner."""
 
@@ -1071,7 +1122,7 @@ class LimitCycles(TypedDict):
     # Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
     joints: list[PhasePortrait]
     # Measurement file of the walk.
-    recording_id: MeasurementFileId
+    measurement_file_id: MeasurementFileId
     # Number of the walk, 1 to 3.
     walk: int
 
@@ -1098,47 +1149,6 @@ class Link(TypedDict):
 
     # Path of the link, which is shown once and valid for a day.
     path: str
-
-
-class _TokenRequired(TypedDict):
-    # Time of creation.
-    created_at: Instant
-    # Who created it. The token is revoked when this user is disabled or is no longer an administrator.
-    created_by: str
-    # Identifier.
-    id: TokenId
-    # Unique name that states its purpose.
-    name: str
-    # Scopes.
-    scopes: list[Right]
-
-
-class Token(_TokenRequired, total=False):
-    """Token of a program, without its secret."""
-
-    # Time of expiry. Absent if it does not expire.
-    expires_at: Optional[Instant]
-    # Time of revocation, if it was revoked.
-    revoked_at: Optional[Instant]
-
-
-class MadeToken(Token):
-    """New token."""
-
-    # Secret, shown once. Send it as `Authorization: Bearer SECRET`.
-    secret: str
-
-
-class _MatchRequired(TypedDict):
-    # The reference gait.
-    reference_gait: ReferenceGait
-
-
-class Match(_MatchRequired, total=False):
-    """A reference gait and the distance between the recorded person and a subject."""
-
-    # `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
-    distance: Optional[float]
 
 
 class _MeRequired(TypedDict):
@@ -1250,7 +1260,7 @@ class MotionReading(TypedDict, total=False):
     cutoff_hz: float
     # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     # knee_R_rad, ankle_R_rad.
-    form: FileForm
+    format: MeasurementFormat
     # Unit of angles, if the header of an OpenSim file does not state it.
     unit: Optional[Unit]
 
@@ -1425,10 +1435,10 @@ class NewEmg(_NewEmgRequired, total=False):
 
 
 class _NewLabAnswerRequired(TypedDict):
-    # The answer. First is walk 2, second is walk 3. `withdrawn` is reserved for the service.
+    # The answer. First is walk 2, second is walk 3. `retracted` is reserved for the service.
     answer: Literal["first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
-    # Number of the answer: `asks` or, for a report of an unsafe walk, `reports` of the session. An answer that is sent
-    # twice counts once.
+    # Number of the answer: `answer_number` or, for a report of an unsafe walk, `report_number` of the session. An
+    # answer that is sent twice counts once.
     number: int
 
 
@@ -1437,6 +1447,20 @@ class NewLabAnswer(_NewLabAnswerRequired, total=False):
 
     # Free text, at most 2000 characters.
     note: str
+
+
+class _NewLabSessionRequired(TypedDict):
+    # Converged trial of one gait.
+    gait_one: TrialId
+    # Converged trial of the other gait.
+    gait_two: TrialId
+
+
+class NewLabSession(_NewLabSessionRequired, total=False):
+    """Lab session to plan."""
+
+    # Free text, at most 2000 characters.
+    notes: str
 
 
 class NewMember(TypedDict):
@@ -1501,7 +1525,7 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
     # of Camargo 2021. Both files must have the same time axis.
     forces: Optional[str]
     # File format of the recording.
-    form: Form
+    format: JointAngleFormat
     # Times of right heel strikes, s. Empty: detect them.
     heel_strikes_s: list[float]
     # Height of the recorded person, m.
@@ -1530,18 +1554,21 @@ class NewSafetyReport(TypedDict, total=False):
     source: Optional[PersonSource]
 
 
-class _NewSessionRequired(TypedDict):
-    # Converged trial of one gait.
-    gait_one: TrialId
-    # Converged trial of the other gait.
-    gait_two: TrialId
+class _NewSafetyReviewRequired(TypedDict):
+    # `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
+    decision: SafetyDecision
+    # Reason, 1 to 2000 characters.
+    reason: str
 
 
-class NewSession(_NewSessionRequired, total=False):
-    """Lab session to plan."""
+class NewSafetyReview(_NewSafetyReviewRequired, total=False):
+    """A decision about the safety reports of a gait."""
 
-    # Free text, at most 2000 characters.
-    notes: str
+    # Name or pseudonym of the reviewer. Defaults to the caller's name.
+    author: Optional[str]
+    # The open safety reports that the reviewer has seen. The decision is refused if there is another one. By default,
+    # all open reports count as seen.
+    reports: Optional[list[SafetyReportId]]
 
 
 class _NewStudyRequired(TypedDict):
@@ -1785,7 +1812,7 @@ class Pushes(TypedDict):
 
 
 class _RaterAnswerRequired(TypedDict):
-    # The answer. `withdrawn` is reserved for the service.
+    # The answer. `retracted` is reserved for the service.
     answer: Literal["first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
 
 
@@ -1847,7 +1874,7 @@ class _RecommendationRequired(Recommended):
     # Whether gaits of the study are being certified, so that the recommendation may change.
     certifying: bool
     # Reasons if it failed.
-    objections: list[str]
+    failures: list[str]
     study: str
     study_id: StudyId
 
@@ -1857,13 +1884,6 @@ class Recommendation(_RecommendationRequired, total=False):
 
     # If it failed, the best action whose gait passed.
     passing: Optional[Recommended]
-
-
-class Recorded(FeedbackRow):
-    """Recorded preference."""
-
-    # Answers of other people to the same comparison, at most the newest twenty.
-    other_answers: list[FeedbackId]
 
 
 class _RecordedWalkRequired(TypedDict):
@@ -1889,6 +1909,18 @@ class ReferenceGait(TypedDict):
     id: ReferenceGaitId
     # Name shown to people.
     name: str
+
+
+class _ReferenceGaitMatchRequired(TypedDict):
+    # The reference gait.
+    reference_gait: ReferenceGait
+
+
+class ReferenceGaitMatch(_ReferenceGaitMatchRequired, total=False):
+    """A reference gait and the distance between the recorded person and a subject."""
+
+    # `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
+    distance: Optional[float]
 
 
 _RelaxationRequired = TypedDict(
@@ -1988,15 +2020,15 @@ class ReturnMap(TypedDict):
 
 
 class _SafetyReportRequired(TypedDict):
-    # Time of the report.
-    at: Instant
     # Who reported it.
-    by: str
+    author: str
+    # Time of the report.
+    created_at: Instant
     # Identifier of the report. A report from a blinded pair, an assessment or a lab session has the identifier of that
     # object, so reports about both of its gaits share one identifier.
     id: SafetyReportId
     # Whether the report is open, so that the gait must not be walked.
-    stands: bool
+    open: bool
     # Trial of the gait.
     trial_id: TrialId
 
@@ -2025,23 +2057,6 @@ class SafetyReview(TypedDict):
     reports: list[SafetyReportId]
     # Trial of the reviewed gait.
     trial_id: TrialId
-
-
-class _SafetyReviewToMakeRequired(TypedDict):
-    # `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
-    decision: SafetyDecision
-    # Reason, 1 to 2000 characters.
-    reason: str
-
-
-class SafetyReviewToMake(_SafetyReviewToMakeRequired, total=False):
-    """A decision about the safety reports of a gait."""
-
-    # Name or pseudonym of the reviewer. Defaults to the caller's name.
-    author: Optional[str]
-    # The open safety reports that the reviewer has seen. The decision is refused if there is another one. By default,
-    # all open reports count as seen.
-    reports: Optional[list[SafetyReportId]]
 
 
 class SearchSpace(TypedDict):
@@ -2073,45 +2088,6 @@ class Session(_SessionRequired, total=False):
     address: Optional[str]
     # User agent of the browser.
     browser: Optional[str]
-
-
-class _SessionViewRequired(TypedDict):
-    # Time of planning.
-    created_at: Instant
-    # Who fetched controller files of the walks.
-    device_files: list[DeviceFile]
-    # Trial of one gait. Does not imply the order of the walks.
-    gait_one: TrialId
-    # Trial of the other gait.
-    gait_two: TrialId
-    # Identifier.
-    id: LabSessionId
-    # Free text.
-    notes: str
-    # Number of the session in this study, from 1.
-    number: int
-    # Whether the allocation is in this record. A study that was imported while the session was blinded does not have
-    # it.
-    order_included: bool
-    # Who planned the session.
-    planned_by: str
-    # State of the session.
-    state: SessionState
-    # The study.
-    study_id: StudyId
-    # The three walks.
-    walks: list[WalkView]
-
-
-class SessionView(_SessionViewRequired, total=False):
-    """Lab session, without blinded data."""
-
-    # Current answer of the subject. Absent if there is none.
-    answer: Optional[LabAnswer]
-    # Who closed the session, and when.
-    closed: Optional[Done]
-    # Who unblinded the session, when and why. Absent while it is blinded.
-    unblinded: Optional[Done]
 
 
 class _SolveAttemptRequired(TypedDict):
@@ -2287,6 +2263,37 @@ class StudyAccess(TypedDict):
 
     # Whether only members and administrators can access the study. Raters must be members in any case.
     restricted: bool
+
+
+class StudyActionReason(TypedDict, total=False):
+    """Reason for a command."""
+
+    # Reason, at most 2000 characters.
+    reason: str
+
+
+class _StudyComparisonRequired(TypedDict):
+    id: StudyId
+    muscles: bool
+    name: str
+    seed: int
+    # Total time of all solves, s.
+    solve_seconds: float
+    state: StudyState
+    trials: TrialCounts
+
+
+class StudyComparison(_StudyComparisonRequired, total=False):
+    """Study in a comparison."""
+
+    # Action of the recommended trial.
+    best_action: Optional[Bounds]
+    # Cost of transport of the recommended trial.
+    best_cost_of_transport: Optional[float]
+    # Gait RMSE of the recommended trial, rad.
+    best_gait_rmse_rad: Optional[float]
+    # Number of the recommended trial.
+    best_trial: Optional[int]
 
 
 class StudyView(Study):
@@ -2507,7 +2514,7 @@ class _WalkActivityRequired(TypedDict):
     # the peak of walk 1.
     channels: list[CycleActivity]
     # Measurement file that it was computed from.
-    recording_id: MeasurementFileId
+    measurement_file_id: MeasurementFileId
     # Number of the walk, 1 to 3.
     walk: int
 
@@ -2541,14 +2548,7 @@ class WalkView(_WalkViewRequired, total=False):
     # Condition of the walk. Absent while it is blinded.
     condition: Optional[Condition]
     # Who recorded the walk, and when.
-    recorded: Optional[Done]
-
-
-class Why(TypedDict, total=False):
-    """Reason for a command."""
-
-    # Reason, at most 2000 characters.
-    reason: str
+    recorded: Optional[LabSessionStep]
 
 
 class Withdrawal(TypedDict):

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
+    CreatedInvitation,
+    CreatedToken,
     Invitation,
-    Invited,
     Link,
-    MadeToken,
     Me,
     Member,
     MemberId,
@@ -96,7 +96,7 @@ class AccessMethods(Transport):
             ),
         )
 
-    def invite_rater(self, study_id: StudyId, **body: Unpack[Invitation]) -> Invited:
+    def invite_rater(self, study_id: StudyId, **body: Unpack[Invitation]) -> CreatedInvitation:
         """Invite a rater.
 
         Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
@@ -104,7 +104,7 @@ class AccessMethods(Transport):
         Fields: name.
         """
         return cast(
-            Invited,
+            CreatedInvitation,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/invitations",
@@ -173,14 +173,14 @@ class AccessMethods(Transport):
         """
         return Pages(self, "/api/v1/tokens", query={"limit": page_size})
 
-    def create_token(self, **body: Unpack[NewToken]) -> MadeToken:
+    def create_token(self, **body: Unpack[NewToken]) -> CreatedToken:
         """Create a token.
 
         Does not accept an Idempotency-Key, because the secret is not stored.
 
         Fields: name, scopes; optionally days.
         """
-        return cast(MadeToken, self.request_json("POST", "/api/v1/tokens", body=body, repeatable=False))
+        return cast(CreatedToken, self.request_json("POST", "/api/v1/tokens", body=body, repeatable=False))
 
     def get_token(self, token_id: TokenId) -> Token:
         """Get a token."""

@@ -78,7 +78,7 @@ class BlindMethods(Transport):
             ),
         )
 
-    def get_rater_agreement(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[RaterFigures]:
+    def list_rater_agreement(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[RaterFigures]:
         """Get the reliability of raters.
 
         Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.

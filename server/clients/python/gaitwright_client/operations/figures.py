@@ -5,7 +5,7 @@ Made by generate.py from server/openapi.json.
 
 from __future__ import annotations
 
-from typing import Literal, Optional
+from typing import Optional
 
 from ..schemas import (
     LabSessionId,
@@ -43,20 +43,20 @@ class FiguresMethods(Transport):
         study_id: StudyId,
         file: str,
         *,
-        right: Optional[Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]] = None,
-        down: Optional[Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]] = None,
+        x: Optional[str] = None,
+        y: Optional[str] = None,
     ) -> bytes:
         """Download a figure of the posterior.
 
-        right: Bound on the horizontal axis of maps. The first one by default.
+        x: Bound on the horizontal axis of maps. The first one by default.
 
-        down: Bound on the vertical axis of maps. The second one by default.
+        y: Bound on the vertical axis of maps. The second one by default.
         """
         return self.request_bytes(
             "GET",
             "/api/v1/studies/{id}/belief/figures/{file}",
             {"id": study_id, "file": file},
-            query={"right": right, "down": down},
+            query={"x": x, "y": y},
         )
 
     def get_study_figure(self, study_id: StudyId, file: str, *, other: Optional[StudyId] = None) -> bytes:

@@ -12,18 +12,18 @@ from ..schemas import (
     Closing,
     ControllerFile,
     EmgView,
-    InTheLab,
     LabSessionId,
+    LabSessionProgress,
+    LabSessionView,
     LimitCycles,
     MeasurementFile,
     MeasurementFileId,
     NewEmg,
     NewLabAnswer,
+    NewLabSession,
     NewMotion,
-    NewSession,
     Processing,
     RecordedWalk,
-    SessionView,
     StudyId,
     UnblindSession,
 )
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
 class LabMethods(Transport):
     """Operations with the tag `lab`."""
 
-    def get_lab_session(self, lab_session_id: LabSessionId) -> SessionView:
+    def get_lab_session(self, lab_session_id: LabSessionId) -> LabSessionView:
         """Get a lab session.
 
         The response omits blinded data.
         """
-        return cast(SessionView, self.request_json("GET", "/api/v1/lab-sessions/{id}", {"id": lab_session_id}))
+        return cast(LabSessionView, self.request_json("GET", "/api/v1/lab-sessions/{id}", {"id": lab_session_id}))
 
     def answer_lab_session(
         self,
@@ -49,7 +49,7 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewLabAnswer],
-    ) -> InTheLab:
+    ) -> LabSessionProgress:
         """Record the answer of the subject.
 
         States which walk was better. The answer reaches the learner at unblinding.
@@ -57,7 +57,7 @@ class LabMethods(Transport):
         Fields: answer, number; optionally note.
         """
         return cast(
-            InTheLab,
+            LabSessionProgress,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/answers",
@@ -73,7 +73,7 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[Closing],
-    ) -> SessionView:
+    ) -> LabSessionView:
         """Close a lab session.
 
         A closed session accepts no more data.
@@ -81,7 +81,7 @@ class LabMethods(Transport):
         Fields: optionally note.
         """
         return cast(
-            SessionView,
+            LabSessionView,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/close",
@@ -228,17 +228,29 @@ class LabMethods(Transport):
             ),
         )
 
-    def get_next_walk(self, lab_session_id: LabSessionId) -> InTheLab:
+    def get_next_walk(self, lab_session_id: LabSessionId) -> LabSessionProgress:
         """Get the next walk of a lab session.
 
         The view for the lab, without anything that reveals a gait.
         """
-        return cast(InTheLab, self.request_json("GET", "/api/v1/lab-sessions/{id}/next-walk", {"id": lab_session_id}))
+        return cast(
+            LabSessionProgress,
+            self.request_json(
+                "GET",
+                "/api/v1/lab-sessions/{id}/next-walk",
+                {"id": lab_session_id},
+            ),
+        )
 
-    def retract_lab_answer(self, lab_session_id: LabSessionId, *, idempotency_key: Optional[str] = None) -> InTheLab:
+    def retract_lab_answer(
+        self,
+        lab_session_id: LabSessionId,
+        *,
+        idempotency_key: Optional[str] = None,
+    ) -> LabSessionProgress:
         """Retract the answer of the subject."""
         return cast(
-            InTheLab,
+            LabSessionProgress,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/retract-answer",
@@ -253,7 +265,7 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[UnblindSession],
-    ) -> SessionView:
+    ) -> LabSessionView:
         """Unblind a lab session.
 
         Reveals which gait each walk used, to all readers. The audit trail records it, later walks are marked, and the
@@ -262,7 +274,7 @@ class LabMethods(Transport):
         Fields: reason.
         """
         return cast(
-            SessionView,
+            LabSessionView,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/unblind",
@@ -278,13 +290,13 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[RecordedWalk],
-    ) -> InTheLab:
+    ) -> LabSessionProgress:
         """Record a walk.
 
         Fields: walk; optionally note.
         """
         return cast(
-            InTheLab,
+            LabSessionProgress,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/walks",
@@ -312,7 +324,7 @@ class LabMethods(Transport):
         """
         return self.request_text("GET", "/api/v1/measurement-files/{id}/content", {"id": measurement_file_id})
 
-    def list_lab_sessions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[SessionView]:
+    def list_lab_sessions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[LabSessionView]:
         """List lab sessions of a study.
 
         The response omits blinded data.
@@ -324,8 +336,8 @@ class LabMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewSession],
-    ) -> SessionView:
+        **body: Unpack[NewLabSession],
+    ) -> LabSessionView:
         """Plan a lab session.
 
         A walk without the device, then one with each gait, in an order that is drawn now and concealed.
@@ -333,7 +345,7 @@ class LabMethods(Transport):
         Fields: gait_one, gait_two; optionally notes.
         """
         return cast(
-            SessionView,
+            LabSessionView,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/lab-sessions",

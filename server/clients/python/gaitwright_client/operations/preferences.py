@@ -11,16 +11,16 @@ from ..paging import Pages
 from ..schemas import (
     Assessment,
     AssessmentId,
+    CreatedPreference,
     FeedbackId,
     FeedbackRow,
     NewAssessment,
     NewPreference,
     NewSafetyReport,
-    Recorded,
+    NewSafetyReview,
     Retract,
     SafetyReport,
     SafetyReview,
-    SafetyReviewToMake,
     StudyId,
     Suggestion,
     TrialId,
@@ -135,13 +135,13 @@ class PreferencesMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewPreference],
-    ) -> Recorded:
+    ) -> CreatedPreference:
         """Record a preference.
 
         Fields: answer, trial_a, trial_b; optionally author, note, source.
         """
         return cast(
-            Recorded,
+            CreatedPreference,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/preferences",
@@ -228,7 +228,7 @@ class PreferencesMethods(Transport):
         trial_id: TrialId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[SafetyReviewToMake],
+        **body: Unpack[NewSafetyReview],
     ) -> SafetyReview:
         """Review the safety reports of a gait.
 

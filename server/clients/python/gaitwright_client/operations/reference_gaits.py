@@ -40,8 +40,8 @@ class ReferenceGaitsMethods(Transport):
         Segments the recording at right heel strikes and averages its strides. An identical recording returns the
         existing reference gait.
 
-        Fields: name, recording; optionally body_mass_kg, force_column, forces, form, heel_strikes_s, height_m, strikes,
-        unit.
+        Fields: name, recording; optionally body_mass_kg, force_column, forces, format, heel_strikes_s, height_m,
+        strikes, unit.
         """
         return cast(ReferenceGait, self.request_json("POST", "/api/v1/reference-gaits", body=body, key=idempotency_key))
 

@@ -12,18 +12,18 @@ from ..events import Event, follow
 from ..paging import Pages
 from ..schemas import (
     Change,
-    Compared,
     Extend,
     Fork,
     Import,
     Milestone,
     NewStudy,
     Recommendation,
+    StudyActionReason,
+    StudyComparison,
     StudyId,
     StudyState,
     StudyView,
     SubjectId,
-    Why,
 )
 from ..transport import Transport
 
@@ -190,7 +190,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why],
+        **body: Unpack[StudyActionReason],
     ) -> StudyView:
         """Pause a study.
 
@@ -230,7 +230,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why],
+        **body: Unpack[StudyActionReason],
     ) -> StudyView:
         """Resume a study.
 
@@ -254,7 +254,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why],
+        **body: Unpack[StudyActionReason],
     ) -> StudyView:
         """Start a study.
 
@@ -278,7 +278,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Why],
+        **body: Unpack[StudyActionReason],
     ) -> StudyView:
         """Stop a study.
 
@@ -298,7 +298,7 @@ class StudiesMethods(Transport):
             ),
         )
 
-    def compare_studies(self, *, ids: str, page_size: Optional[int] = None) -> Pages[Compared]:
+    def compare_studies(self, *, ids: str, page_size: Optional[int] = None) -> Pages[StudyComparison]:
         """Compare several studies.
 
         Results keep the order of `ids`.

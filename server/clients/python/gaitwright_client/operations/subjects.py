@@ -11,11 +11,11 @@ from ..paging import Pages
 from ..schemas import (
     Consent,
     Correction,
-    Match,
     MuscleParameters,
     NewConsent,
     NewCorrection,
     NewSubject,
+    ReferenceGaitMatch,
     Subject,
     SubjectId,
     Withdrawal,
@@ -138,7 +138,12 @@ class SubjectsMethods(Transport):
             ),
         )
 
-    def list_nearest_reference_gaits(self, subject_id: SubjectId, *, page_size: Optional[int] = None) -> Pages[Match]:
+    def list_nearest_reference_gaits(
+        self,
+        subject_id: SubjectId,
+        *,
+        page_size: Optional[int] = None,
+    ) -> Pages[ReferenceGaitMatch]:
         """Rank reference gaits for a subject.
 
         The nearest in height and body mass first. Those without height and mass come last.
