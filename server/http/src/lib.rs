@@ -14,6 +14,8 @@ pub mod connections;
 mod csv_response;
 mod event_stream;
 mod extract;
+mod figures;
+mod format;
 mod forwarded;
 mod host;
 mod idempotent;

@@ -5,7 +5,7 @@ use crate::accessible::{Id, Named, accessible};
 use crate::authorization::Authorized;
 use crate::binary::Binary;
 use crate::extract::Params;
-use crate::pages::{belief, figures};
+use crate::figures::{belief, lab_session, reference, study, trial};
 use crate::problem::Refusal;
 use crate::visible::Visible;
 use axum::extract::{Path, State};
@@ -46,7 +46,7 @@ pub(super) async fn of_study(
     Params(ComparedWith { other }): Params<ComparedWith<StudyId>>,
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
-    let figures = figures::of_study(&mut app, id, other).await?.into_figures();
+    let figures = study::of_study(&mut app, id, other).await?.into_figures();
     response(&mut app, figures, file).await
 }
 
@@ -75,8 +75,8 @@ pub(super) async fn of_trial(
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = match other {
-        None => figures::of_trial(&mut app, id).await?,
-        Some(other) => figures::of_pair(&mut app, id, other).await?,
+        None => trial::of_trial(&mut app, id).await?,
+        Some(other) => trial::of_pair(&mut app, id, other).await?,
     };
     response(&mut app, figures, file).await
 }
@@ -102,7 +102,7 @@ pub(super) async fn of_session(
     Visible(id, _): Visible<LabSessionId, Read>,
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
-    let figures = figures::of_session(&mut app, id).await?;
+    let figures = lab_session::of_session(&mut app, id).await?;
     response(&mut app, figures, file).await
 }
 
@@ -126,7 +126,7 @@ pub(super) async fn of_belief(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(choice): Params<belief::Choice>,
+    Params(choice): Params<belief::AxisChoice>,
 ) -> Result<Response, Refusal> {
     let figures = belief::figures(&mut app, id, choice).await?;
     response(&mut app, figures, file).await
@@ -152,7 +152,7 @@ pub(super) async fn of_reference(
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?.definition;
-    response(&mut app, figures::of_reference(&reference), file).await
+    response(&mut app, reference::of_reference(&reference), file).await
 }
 
 /// Responds with a figure in the format of the file name.

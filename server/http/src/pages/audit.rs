@@ -1,9 +1,9 @@
 //! The page of the audit trail, with the check of its hash chain.
 
-use super::format::words;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::format::words;
 use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;

@@ -1,6 +1,6 @@
 //! Which bounds a gait reaches.
 
-use super::format;
+use crate::format;
 use gait_optimizer::walking::kept_clearance_m;
 use gait_optimizer::{Gait, TunedBounds};
 use gaitwright_service::error::Error;

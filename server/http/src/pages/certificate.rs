@@ -1,9 +1,9 @@
 //! The certificate on the page of a gait, and the button that certifies it.
 
-use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;

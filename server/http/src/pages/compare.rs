@@ -1,12 +1,12 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::figures;
 use super::page_chart::Drawn;
 use super::study::{answer_in_words, assessment_in_words};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::figures::trial;
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use crate::refusal;
@@ -223,7 +223,7 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
         let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
         let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
         let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
-        let charts = figures::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
+        let charts = trial::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
         let stride = |gait: &Gait| stick_figures(gait).ok().map(|figures| gait_tiles(&figures));
         Ok::<_, Error>((charts, [&gait_a, &gait_b].into_iter().filter_map(stride).collect()))
     };

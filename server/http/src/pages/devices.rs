@@ -1,10 +1,10 @@
 //! The pages of devices: the list, and each device with the form to derive a new one.
 
-use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::format;
 use crate::page_error::{Page, PageError, page};
 use askama::Template;
 use axum::extract::State;

@@ -1,9 +1,9 @@
 //! The explanation of a trial without a gait, on its page, and the button that requests it.
 
-use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;

@@ -3,10 +3,10 @@
 use super::bound_use::{self, BoundUse};
 use super::certificate;
 use super::explanation::NoGait;
-use super::format::{self, words};
 use super::page_chart::Drawn;
 use crate::AppState;
 use crate::authorization::Authorized;
+use crate::format::{self, words};
 use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;

@@ -1,10 +1,10 @@
 //! The home page: pending tasks and the list of studies.
 
-use super::format::{variant, words};
 use crate::AppState;
 use crate::authorization::SignedIn;
 use crate::authorization::{Authorized, Refused};
 use crate::extract::Params;
+use crate::format::{variant, words};
 use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;

@@ -1,14 +1,14 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
-use super::figures::measured_cycles;
-use super::format::{self, words};
-use super::lab_charts;
 use super::measurement_forms::{Forms, Settings};
 use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::figures::lab_charts;
+use crate::figures::lab_session::measured_cycles;
+use crate::format::{self, words};
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use crate::refusal;

@@ -1,10 +1,10 @@
 //! The pages in the lab: the next walk, and the answer of the subject. They never name a gait.
 
-use super::format::walks_in_words;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::format::walks_in_words;
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use crate::refusal;

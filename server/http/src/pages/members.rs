@@ -1,12 +1,12 @@
 //! The access page of a study: its members, and the forms that add and remove them.
 
-use super::format;
 use super::users::origin;
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id, Named};
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extract::Form;
+use crate::format;
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use crate::refusal;

@@ -2,19 +2,17 @@
 
 mod access_log;
 mod audit;
-pub(super) mod belief;
+mod belief;
 mod bound_use;
 mod certificate;
 mod compare;
 mod devices;
 mod explanation;
-pub(super) mod figures;
-mod format;
+mod figures;
 mod gait;
 mod help;
 mod home;
 mod lab;
-mod lab_charts;
 mod lab_walk;
 mod measurement_files;
 mod measurement_forms;

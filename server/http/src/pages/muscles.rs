@@ -1,10 +1,10 @@
 //! The form for measured muscle parameters of a subject, which override the published table.
 
-use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::Form;
+use crate::format;
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use crate::refusal;

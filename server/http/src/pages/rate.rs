@@ -1,11 +1,11 @@
 //! The pages of a rater: the studies, and one blinded pair. They never name a trial.
 
-use super::format;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extract::{Form, Params};
+use crate::format;
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use askama::Template;

@@ -1,11 +1,11 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::figures;
 use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form as Submitted, Params};
+use crate::figures::reference;
 use crate::page_error::{Page, PageError, page};
 use crate::refusal;
 use askama::Template;
@@ -164,7 +164,7 @@ pub(super) async fn get(
     page(&ReferenceGaitPage {
         warning: reference.definition.warning().map_err(Error::from)?,
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
-        charts: figures::of_reference(&reference.definition)
+        charts: reference::of_reference(&reference.definition)
             .iter()
             .map(|figure| Drawn::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
             .collect(),

@@ -1,12 +1,12 @@
 //! The page that compares two studies in one chart and one table.
 
-use super::format::{self, words};
 use super::page_chart::Drawn;
-use super::study::{COURSE, Figures, course, figures};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extract::Params;
+use crate::figures::{COURSE, Outcome, StudyResults, course};
+use crate::format::{self, words};
 use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;
@@ -16,15 +16,12 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::choice::MANY;
-use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::{Chosen, Study};
-use gaitwright_store::trials::TrialCounts;
-use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
+use gaitwright_store::{StudyId, studies};
 use serde::Deserialize;
 use std::sync::Arc;
 
-/// How many of the newest studies are offered, and how many of the newest trials of a large study are drawn.
+/// How many of the newest studies are offered.
 const OFFERED: u32 = 200;
 
 /// The two studies.
@@ -74,7 +71,7 @@ pub(super) async fn get(
             return Err(Error::invalid("b", b.to_string(), "a study other than study A").into());
         }
         (Some(a), Some(b)) => {
-            let (a, b) = (Side::read(&mut reader, a).await?, Side::read(&mut reader, b).await?);
+            let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
             drop(reader);
             let beliefs = Arc::clone(&app.beliefs);
             Some(app.compute(move |pool| compare(pool, a, b, &beliefs)).await.map_err(Error::from)??)
@@ -87,72 +84,46 @@ pub(super) async fn get(
     page(&SideBySide { offered, a, b, compared })
 }
 
-/// A study with its snapshot and figures.
-pub(super) struct Side {
-    pub(super) snapshot: StudySnapshot,
-    subject: String,
-    counts: TrialCounts,
+/// The properties and results of the study.
+fn rows(study: &StudyResults, outcome: &Outcome) -> Vec<(String, String)> {
+    let plan = &study.snapshot.study.plan;
+    let best = outcome.best.and_then(|id| study.snapshot.trial(id));
+    let seconds: f64 = study.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
+    let mut rows = vec![
+        ("State".to_owned(), words(study.snapshot.study.state.as_str())),
+        ("Subject".to_owned(), study.subject.clone()),
+        ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
+        ("Answered by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
+        ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
+        ("Seed".to_owned(), plan.seed.to_string()),
+        ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.trial_budget)),
+        ("Converged".to_owned(), study.counts.converged.to_string()),
+        ("Total solve time, s".to_owned(), format!("{seconds:.0}")),
+        ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
+        ("Gait RMSE of the best trial, rad".to_owned(), format::figure(best.and_then(|trial| trial.gait_rmse_rad))),
+        (
+            "Cost of transport of the best trial".to_owned(),
+            format::figure(best.and_then(|trial| trial.cost_of_transport)),
+        ),
+    ];
+    let bounds = best.map(|trial| trial.action.to_array());
+    for (place, name) in TunedBounds::NAMES.iter().enumerate() {
+        let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
+        rows.push((format!("{name}: {}", TunedBounds::MEANINGS[place]), value));
+    }
+    rows
 }
 
-impl Side {
-    pub(super) async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
-        let study = studies::get(db, id).await?;
-        consents::may_be_shown(db, id).await?;
-        let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
-        let counts = trials::counts(db, id).await?;
-        let snapshot = if counts.total as usize >= MANY {
-            StudySnapshot::newest(db, study, OFFERED).await?
-        } else {
-            StudySnapshot::read(db, study).await?
-        };
-        Ok(Self { snapshot, subject, counts })
-    }
-
-    pub(super) fn figures(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Figures, Error> {
-        figures(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
-    }
-
-    /// The properties and results of the study.
-    fn rows(&self, figures: &Figures) -> Vec<(String, String)> {
-        let plan = &self.snapshot.study.plan;
-        let best = figures.best.and_then(|id| self.snapshot.trial(id));
-        let seconds: f64 = self.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
-        let mut rows = vec![
-            ("State".to_owned(), words(self.snapshot.study.state.as_str())),
-            ("Subject".to_owned(), self.subject.clone()),
-            ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
-            ("Answered by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
-            ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
-            ("Seed".to_owned(), plan.seed.to_string()),
-            ("Trials with a result".to_owned(), format!("{} of {}", self.counts.results(), plan.trial_budget)),
-            ("Converged".to_owned(), self.counts.converged.to_string()),
-            ("Total solve time, s".to_owned(), format!("{seconds:.0}")),
-            ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
-            ("Gait RMSE of the best trial, rad".to_owned(), format::figure(best.and_then(|trial| trial.gait_rmse_rad))),
-            (
-                "Cost of transport of the best trial".to_owned(),
-                format::figure(best.and_then(|trial| trial.cost_of_transport)),
-            ),
-        ];
-        let bounds = best.map(|trial| trial.action.to_array());
-        for (place, name) in TunedBounds::NAMES.iter().enumerate() {
-            let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
-            rows.push((format!("{name}: {}", TunedBounds::MEANINGS[place]), value));
-        }
-        rows
-    }
-}
-
-fn compare(pool: &OnPool, a: Side, b: Side, beliefs: &Beliefs) -> Result<Compared, Error> {
-    let (of_a, of_b) = (a.figures(pool, beliefs)?, b.figures(pool, beliefs)?);
+fn compare(pool: &OnPool, a: StudyResults, b: StudyResults, beliefs: &Beliefs) -> Result<Compared, Error> {
+    let (of_a, of_b) = (a.outcome(pool, beliefs)?, b.outcome(pool, beliefs)?);
     let chart = course(&[(&a.snapshot, &of_a), (&b.snapshot, &of_b)]).map(|chart| {
         let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
         Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
     });
-    let rows = a.rows(&of_a).into_iter().zip(b.rows(&of_b));
-    let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, figures)| figures.course().is_empty());
+    let properties = rows(&a, &of_a).into_iter().zip(rows(&b, &of_b));
+    let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, outcome)| outcome.course().is_empty());
     Ok(Compared {
-        rows: rows.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
+        rows: properties.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
         without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
         chart,
         a: a.snapshot.study,

@@ -1,9 +1,9 @@
 //! Signing in and out, and the user's own account.
 
-use super::format;
 use super::unsent_form::{SignInPage, Unsent, send_now};
 use crate::authorization::SignedIn;
 use crate::extract::Form;
+use crate::format;
 use crate::identify::{browser_cookie, browser_of, cookie, session_of};
 use crate::page_error::{Page, PageError, page};
 use crate::refusal;

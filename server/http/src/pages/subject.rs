@@ -1,10 +1,10 @@
 //! The pages of subjects, with the forms for consent, withdrawal and corrections.
 
-use super::format::{variant, words};
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::format::{variant, words};
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use crate::refusal;

@@ -1,9 +1,9 @@
 //! The system page: version, workers, queue, record and backups.
 
-use super::format::{duration, words};
 use crate::AppState;
 use crate::api::Workers;
 use crate::authorization::Authorized;
+use crate::format::{duration, words};
 use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;

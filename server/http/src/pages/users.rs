@@ -1,10 +1,10 @@
 //! The page of users, sessions and tokens.
 
-use super::format;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extract::Form;
+use crate::format;
 use crate::page_error::{Page, PageError, page};
 use crate::problem::Problem;
 use crate::refusal;

@@ -5,10 +5,10 @@ mod space_editor;
 
 use self::chosen_reference::Choice;
 use self::space_editor::SpaceEditor;
-use super::format;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::format;
 use crate::page_error::{Page, PageError, page};
 use crate::refusal;
 use askama::Template;

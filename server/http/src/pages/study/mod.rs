@@ -1,52 +1,51 @@
 //! The study page, kept current by events.
 
+mod answers;
 mod trials_table;
 mod without_gait;
 
+use self::answers::{AnswerRow, answers};
+pub(super) use self::answers::{answer_in_words, assessment_in_words};
 use self::trials_table::{Choice, TrialRow, TrialsTable};
 use self::without_gait::WithoutGait;
-use super::format::{self, Bound, words};
 use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extract::{Form, Params};
+use crate::figures::{COURSE, Outcome, course, warm_starts};
+use crate::format::{self, Bound, words};
 use crate::page_error::{Page, PageError, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_charts::Figure;
 use gaitwright_charts::gait_charts;
-use gaitwright_charts::{Chart, Figure, Node, Stroke, Tree};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
+use gaitwright_service::studies::belief::MOST_ANSWERS;
 use gaitwright_service::studies::change::{self, Extend};
-use gaitwright_service::studies::choice::{MANY, last_believed, ranking_to_show};
-use gaitwright_service::studies::comparison::open_question;
-use gaitwright_service::studies::history::{self, Milestone};
+use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
 use gaitwright_service::studies::recommended::{self, CertificateState, Judged};
-use gaitwright_service::studies::safety_reports::{Closed, SafetyReportSource};
+use gaitwright_service::studies::safety_reports::Closed;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::{command, lifecycle};
 use gaitwright_service::workers::Track;
-use gaitwright_store::assessments::{self, Assessment};
+use gaitwright_store::assessments::{self};
 use gaitwright_store::devices::{self, Device};
-use gaitwright_store::feedback::{self, FeedbackContent, FeedbackRow, Retraction, Source};
+use gaitwright_store::feedback::{self};
 use gaitwright_store::imports::{self, Import};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
 use gaitwright_store::{
-    Instant, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, presentations, reference_gaits,
-    studies, trials,
+    Instant, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, reference_gaits, studies, trials,
 };
 use serde::Deserialize;
-use std::cmp::Reverse;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 #[derive(Template)]
@@ -168,18 +167,6 @@ struct Passing {
     id: TrialId,
     number: u32,
     rmse: String,
-}
-
-struct AnswerRow {
-    text: String,
-    /// Source and author.
-    by: String,
-    note: String,
-    /// Why it no longer counts.
-    undone: Option<String>,
-    /// `saved` of the comparison page that can retract it.
-    saved: Option<String>,
-    at: Instant,
 }
 
 /// A gait that was reported as unsafe.
@@ -315,31 +302,6 @@ fn button(act: Act) -> Option<ActButton> {
     }
 }
 
-/// Figures that are computed from the snapshot on the thread pool.
-#[derive(Default)]
-pub(super) struct Figures {
-    /// Whether people answer and nobody has yet, so that the posterior is only the prior.
-    unanswered: bool,
-    pub(super) best: Option<TrialId>,
-    /// Whether the trajectory of the best gait is stored.
-    has_gait: bool,
-    /// The gaits from best to worst, and the states of their certificates.
-    ranking: Vec<TrialId>,
-    judged: Judged,
-    /// Why trials have no gait.
-    without_gait: Option<WithoutGait>,
-    pub(super) history: Vec<Milestone>,
-    question: bool,
-}
-
-impl Figures {
-    /// Gait RMSE of the best action by iteration.
-    pub(super) fn course(&self) -> Vec<(f64, f64)> {
-        let point = |milestone: &Milestone| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
-        self.history.iter().filter_map(point).collect()
-    }
-}
-
 async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Choice) -> Result<Live, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
@@ -357,20 +319,21 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
     let draw = move |pool: &OnPool| {
-        let figures = figures(pool, &snapshot, large, &beliefs);
-        (snapshot, figures)
+        let outcome = Outcome::of(pool, &snapshot, large, &beliefs);
+        (snapshot, outcome)
     };
-    let (snapshot, figures) = app.compute(draw).await?;
-    let mut figures = figures.map_err(Error::Learner)?;
+    let (snapshot, outcome) = app.compute(draw).await?;
+    let outcome = outcome.map_err(Error::Learner)?;
     let mut reader = app.read().await?;
-    figures.judged = recommended::judged(&mut reader, &figures.ranking).await?;
-    figures.without_gait = WithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
-    if let Some(best) = figures.best {
-        figures.has_gait = gaits::is_here(&mut reader, best).await?;
-    }
+    let mut judged = recommended::judged(&mut reader, &outcome.ranking).await?;
+    let without_gait = WithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
+    let has_gait = match outcome.best {
+        Some(best) => gaits::is_here(&mut reader, best).await?,
+        None => false,
+    };
     drop(reader);
-    if let Some(next) = figures.judged.without_certificate {
-        figures.judged.certified_by_service(app.scheduler.is_certifying(id, next));
+    if let Some(next) = judged.without_certificate {
+        judged.certified_by_service(app.scheduler.is_certifying(id, next));
     }
     let running = snapshot
         .trials
@@ -381,35 +344,12 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let mut answers = answers(&snapshot, &assessments);
     answers.truncate(SHOWN as usize);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let mut live = view(snapshot, counts, &figures, running, table, answers, caller.may(Run::NEEDED));
+    let found = Found { outcome, judged, has_gait, without_gait };
+    let mut live = view(snapshot, counts, found, running, table, answers, caller.may(Run::NEEDED));
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
         live.pace = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
     }
     Ok(live)
-}
-
-pub(super) fn figures(
-    pool: &OnPool,
-    snapshot: &StudySnapshot,
-    large: bool,
-    beliefs: &Beliefs,
-) -> Result<Figures, gait_learner::LearnerError> {
-    if large {
-        // A large study is not read completely, so the learner's last best action is used instead of the posterior.
-        let best = last_believed(snapshot);
-        let (ranking, history) = (best.into_iter().collect(), history::known(snapshot));
-        let question = snapshot.study.state == StudyState::Waiting;
-        return Ok(Figures { best, ranking, history, question, ..Figures::default() });
-    }
-    let question = snapshot.study.plan.feedback_mode != FeedbackMode::Automatic
-        && open_question(pool, snapshot)?.trials().is_some();
-    if snapshot.waits_for_first_answer() {
-        return Ok(Figures { unanswered: true, question, ..Figures::default() });
-    }
-    let ranking = ranking_to_show(pool, snapshot, beliefs)?;
-    let best = ranking.first().copied();
-    let history = history::of(snapshot, best);
-    Ok(Figures { best, ranking, history, question, ..Figures::default() })
 }
 
 fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
@@ -432,29 +372,40 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
     }
 }
 
+/// What a study has found, and what the record says of it.
+struct Found {
+    outcome: Outcome,
+    /// The states of the certificates.
+    judged: Judged,
+    /// Whether the trajectory of the best gait is stored.
+    has_gait: bool,
+    without_gait: Option<WithoutGait>,
+}
+
 fn view(
     snapshot: StudySnapshot,
     counts: TrialCounts,
-    figures: &Figures,
+    found: Found,
     running: Vec<RunningRow>,
     table: TrialsTable,
     answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
-    let best = figures.best.and_then(|id| snapshot.trial(id)).map(|trial| Best {
+    let Found { outcome, judged, has_gait, without_gait } = found;
+    let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| Best {
         id: trial.id,
         number: trial.number,
         rmse: format::figure(trial.gait_rmse_rad),
         cost: format::figure(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
-        has_gait: figures.has_gait,
+        has_gait,
         by_script: trial.asked_by.is_some(),
-        passing: figures.judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
+        passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,
             rmse: format::figure(trial.gait_rmse_rad),
         }),
-        judged: figures.judged.clone(),
+        judged: judged.clone(),
     });
     let unsafe_gait = |closed: &Closed| {
         let number = snapshot.trial(closed.trial)?.number;
@@ -471,99 +422,22 @@ fn view(
         may_extend: acts.contains(&Act::Extend),
         acts: acts.into_iter().filter_map(button).collect(),
         pace: pace(&snapshot, counts),
-        without_gait: figures.without_gait.clone(),
+        without_gait,
         progress: [counts.results(), snapshot.study.plan.trial_budget].map(|trials| format::count(trials.into())),
         counts,
         running,
         best,
-        unanswered: figures.unanswered,
+        unanswered: outcome.unanswered,
         people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
-        chart: course(&[(&snapshot, figures)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
+        chart: course(&[(&snapshot, &outcome)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
-        tree: warm_starts(&snapshot, figures.best).map(|figure| Drawn::of(&figure, &files, "")),
+        tree: warm_starts(&snapshot, outcome.best).map(|figure| Drawn::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
-        question: figures.question && snapshot.study.state != StudyState::Stopped,
+        question: outcome.question && snapshot.study.state != StudyState::Stopped,
         can_compare: converged >= 2,
         study: snapshot.study,
     }
-}
-
-/// Warm-start tree; `None` before the first warm start.
-pub(super) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>) -> Option<Figure> {
-    let places: HashMap<TrialId, usize> = snapshot.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
-    let node = |trial: &Trial| Node {
-        parent: trial.warm_started_from.and_then(|from| places.get(&from).copied()),
-        label: format!("trial {}", trial.number),
-        link: format!("/trials/{}", trial.id),
-        class: if best == Some(trial.id) { "best" } else { trial.state.as_str() },
-    };
-    let nodes: Vec<Node> = snapshot.trials.iter().map(node).collect();
-    let title = format!("Warm starts of {}", snapshot.study.plan.name);
-    nodes.iter().any(|node| node.parent.is_some()).then(|| Figure::tree(Tree { title, nodes }))
-}
-
-/// Answers of users and subjects, newest first. Those of Gait RMSE follow from the table of trials.
-fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRow> {
-    let of_assessment = |id| assessments.iter().any(|assessment| assessment.feedback_id == Some(id));
-    let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
-    let why = |retraction: &Option<Retraction>| Some(format!("retracted: {}", retraction.as_ref()?.reason));
-    let lifted = |id| {
-        let of_it = |closed: &&Closed| closed.source == SafetyReportSource::Staff(id);
-        let review = snapshot.grounds.safety_reports.lifted.iter().find(of_it)?.review.as_ref()?;
-        Some(format!("cleared for walking by {}: {}", review.author, review.reason))
-    };
-    let preference = |row: &FeedbackRow| {
-        Some(AnswerRow {
-            text: answer_in_words(row, snapshot)?,
-            by: format!("{}, {}", format::source(row), row.author),
-            note: row.note.clone(),
-            undone: why(&row.retraction),
-            saved: (row.retraction.is_none() && !row.by_rater).then(|| row.id.to_string()),
-            at: row.created_at,
-        })
-    };
-    let assessment = |assessment: &Assessment| {
-        Some(AnswerRow {
-            text: assessment_in_words(assessment, snapshot)?,
-            by: format!("{}, {}", format::source_name(assessment.source), assessment.author),
-            note: assessment.note.clone(),
-            undone: why(&assessment.retraction).or_else(|| lifted(assessment.id)),
-            saved: (assessment.retraction.is_none() && !assessment.answer.is_about_safety())
-                .then(|| format!("assessment-{}", assessment.id)),
-            at: assessment.created_at,
-        })
-    };
-    let preferences = snapshot.feedback.iter().filter(by_people).filter(|row| !of_assessment(row.id));
-    let mut rows: Vec<AnswerRow> =
-        preferences.filter_map(preference).chain(assessments.iter().filter_map(assessment)).collect();
-    rows.reverse();
-    rows.sort_by_key(|row| Reverse(row.at));
-    rows
-}
-
-/// `trial 3 is better than trial 2`.
-pub(super) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Option<String> {
-    let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
-    match row.content {
-        FeedbackContent::Preference { winner, loser } => {
-            Some(format!("{} is better than {}", name(winner)?, name(loser)?))
-        }
-        FeedbackContent::Tie { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
-        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
-    }
-}
-
-/// `trial 3 is unsafe`.
-pub(super) fn assessment_in_words(assessment: &Assessment, snapshot: &StudySnapshot) -> Option<String> {
-    let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
-    let (first, second) = (name(assessment.first)?, name(assessment.second)?);
-    Some(match assessment.answer {
-        presentations::Judgement::UnsafeFirst => format!("{first} is unsafe (compared with {second})"),
-        presentations::Judgement::UnsafeSecond => format!("{second} is unsafe (compared with {first})"),
-        presentations::Judgement::UnsafeBoth => format!("{first} and {second} are unsafe"),
-        _ => format!("cannot tell whether {first} or {second} is better"),
-    })
 }
 
 /// Why the next solve of the study has not started, from the numbers of queued and running solves of all studies.
@@ -595,35 +469,4 @@ fn pace(snapshot: &StudySnapshot, counts: TrialCounts) -> String {
     let left = study.plan.trial_budget.saturating_sub(counts.results());
     let people = format::besides_solves(study.plan.feedback_mode);
     format!("About {} left{people}.", format::duration(median * f64::from(left)))
-}
-
-/// Group of the figures that show the progress of a study.
-pub(super) const COURSE: &str = "course";
-
-/// Gait RMSE of the best action by iteration, for one study with its trials or for several studies; `None` before the first
-/// converged trial.
-pub(super) fn course(studies: &[(&StudySnapshot, &Figures)]) -> Option<Chart> {
-    let title = "Gait RMSE of the best action by iteration";
-    let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad");
-    if let [(snapshot, figures)] = studies {
-        chart = chart.with("trial", 7, Stroke::Points, converged(snapshot));
-        chart = chart.with("best action so far", 0, Stroke::Steps, figures.course());
-    } else {
-        for (place, (snapshot, figures)) in studies.iter().enumerate() {
-            let stroke = if place == 0 { Stroke::Steps } else { Stroke::DashedSteps };
-            chart = chart.with(&snapshot.study.plan.name, place, stroke, figures.course());
-        }
-    }
-    chart.whole_x = true;
-    (!chart.legend().is_empty()).then_some(chart)
-}
-
-/// Gait RMSE of each converged trial by iteration.
-fn converged(snapshot: &StudySnapshot) -> Vec<(f64, f64)> {
-    history::results(snapshot)
-        .into_iter()
-        .zip(1_u32..)
-        .filter(|(trial, _)| trial.state == TrialState::Converged)
-        .filter_map(|(trial, iteration)| Some((f64::from(iteration), trial.gait_rmse_rad?)))
-        .collect()
 }

@@ -1,7 +1,7 @@
 //! The table of trials. The query string has sorting, filters and page, so the table works without scripts and can be
 //! bookmarked.
 
-use super::super::format::{self, words};
+use crate::format::{self, words};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_store::listing::{self, Listed, Listing, SORTS};

@@ -1,6 +1,6 @@
 //! One sentence about why trials of a study have no gait.
 
-use super::format;
+use crate::format;
 use gaitwright_store::TrialId;
 use gaitwright_store::explanations::{Common, Relief};
 use gaitwright_store::trials::{Trial, TrialState};

@@ -22,7 +22,7 @@ const JOINT_NAMES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
 /// The condition of a walk, or its number while it is blinded.
-pub(super) fn walk_name(session: &LabSessionView, walk: u8) -> String {
+pub(crate) fn walk_name(session: &LabSessionView, walk: u8) -> String {
     let condition = session.walks.iter().find(|known| known.number == walk).and_then(|known| known.condition);
     match condition {
         Some(Condition::Normal) => "without the device".to_owned(),
@@ -33,13 +33,13 @@ pub(super) fn walk_name(session: &LabSessionView, walk: u8) -> String {
 }
 
 /// The name of a channel.
-pub(super) fn muscle_name(channel: &str) -> &str {
+pub(crate) fn muscle_name(channel: &str) -> &str {
     MUSCLES.iter().find(|(known, _)| *known == channel).map_or(channel, |(_, name)| name)
 }
 
 /// Muscle activity over the gait cycle (figure 6 of the paper): a chart for each channel with mean and standard deviation
 /// of each walk, and the activation of the model after unblinding.
-pub(super) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
+pub(crate) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
     let Some(normal) = emg.result.walks.first() else { return Vec::new() };
     let chart = |(place, channel): (usize, &CycleActivity)| {
         let mut chart = Chart::new(
@@ -80,7 +80,7 @@ fn look(walk: u8) -> (usize, Stroke) {
 }
 
 /// Measured limit cycles (figure 5 of the paper): a chart per joint and walk, over the orbit of the gait where it is known.
-pub(super) fn limit_cycles(session: &LabSessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
+pub(crate) fn limit_cycles(session: &LabSessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
     let mut charts = Vec::new();
     for (place, joint) in JOINTS.iter().enumerate() {
         for (walk, gait) in measured {

@@ -9,17 +9,17 @@ use gaitwright_store::presentations::Judgement;
 use gaitwright_store::studies::FeedbackMode;
 
 /// A figure with four decimals, or a dash.
-pub(super) fn figure(value: Option<f64>) -> String {
+pub(crate) fn figure(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
 }
 
 /// Seconds, or a dash.
-pub(super) fn seconds(value: Option<f64>) -> String {
+pub(crate) fn seconds(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}"))
 }
 
 /// A rounded duration.
-pub(super) fn duration(seconds: f64) -> String {
+pub(crate) fn duration(seconds: f64) -> String {
     let minutes = seconds / 60.0;
     if seconds < 1.0 {
         "a second".to_owned()
@@ -33,7 +33,7 @@ pub(super) fn duration(seconds: f64) -> String {
 }
 
 /// A number of any size with three digits: `0.0123`, `2.46 × 10⁻⁷`.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 || (1e-3..1e5).contains(&magnitude) {
         return minus(&significant(value));
@@ -58,17 +58,17 @@ fn minus(text: &str) -> String {
 }
 
 /// `−0.1 to 0.2`.
-pub(super) fn range(minimum: f64, maximum: f64) -> String {
+pub(crate) fn range(minimum: f64, maximum: f64) -> String {
     minus(&format!("{minimum} to {maximum}"))
 }
 
 /// The same, or a dash.
-pub(super) fn optional_number(value: Option<f64>) -> String {
+pub(crate) fn optional_number(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), number)
 }
 
 /// A count with separated thousands: `11 664`.
-pub(super) fn count(value: u64) -> String {
+pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {
@@ -82,17 +82,17 @@ pub(super) fn count(value: u64) -> String {
 }
 
 /// `not_converged` as `not converged`.
-pub(super) fn words(name: &str) -> String {
+pub(crate) fn words(name: &str) -> String {
     name.replace('_', " ")
 }
 
 /// With or without muscles.
-pub(super) fn variant(muscles: bool) -> &'static str {
+pub(crate) fn variant(muscles: bool) -> &'static str {
     if muscles { "with muscles" } else { "without muscles" }
 }
 
 /// Who answers the comparisons.
-pub(super) fn answers_by(mode: FeedbackMode) -> &'static str {
+pub(crate) fn answers_by(mode: FeedbackMode) -> &'static str {
     match mode {
         FeedbackMode::Automatic => "Gait RMSE",
         FeedbackMode::Human => "people",
@@ -101,12 +101,12 @@ pub(super) fn answers_by(mode: FeedbackMode) -> &'static str {
 }
 
 /// What a study waits for besides its solves; empty if it waits for solves only.
-pub(super) fn besides_solves(mode: FeedbackMode) -> &'static str {
+pub(crate) fn besides_solves(mode: FeedbackMode) -> &'static str {
     if mode == FeedbackMode::Human { ", plus the time that people need to answer" } else { "" }
 }
 
 /// The answer of the subject in a lab session; first is walk 2.
-pub(super) fn walks_in_words(judgement: Judgement) -> &'static str {
+pub(crate) fn walks_in_words(judgement: Judgement) -> &'static str {
     match judgement {
         Judgement::First => "walk 2 was better, the first with the device",
         Judgement::Second => "walk 3 was better, the second with the device",
@@ -120,7 +120,7 @@ pub(super) fn walks_in_words(judgement: Judgement) -> &'static str {
 }
 
 /// The answer of a rater about the two sides of a pair.
-pub(super) fn sides_in_words(answer: Judgement) -> &'static str {
+pub(crate) fn sides_in_words(answer: Judgement) -> &'static str {
     match answer {
         Judgement::First => "the first gait is better",
         Judgement::Second => "the second gait is better",
@@ -134,7 +134,7 @@ pub(super) fn sides_in_words(answer: Judgement) -> &'static str {
 }
 
 /// Where an answer comes from.
-pub(super) fn source(row: &FeedbackRow) -> &'static str {
+pub(crate) fn source(row: &FeedbackRow) -> &'static str {
     // A rater need not be the subject or a clinician; known is only whether the answer is blind.
     match (row.by_rater, row.unblinded) {
         (true, false) => "a rater",
@@ -144,7 +144,7 @@ pub(super) fn source(row: &FeedbackRow) -> &'static str {
 }
 
 /// The source of an answer that no rater gave.
-pub(super) fn source_name(source: Source) -> &'static str {
+pub(crate) fn source_name(source: Source) -> &'static str {
     match source {
         Source::Convergence => "the solver",
         Source::GaitRmse => "Gait RMSE",
@@ -156,7 +156,7 @@ pub(super) fn source_name(source: Source) -> &'static str {
 
 /// The name of a role.
 #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
-pub(super) fn role(role: &Role) -> &'static str {
+pub(crate) fn role(role: &Role) -> &'static str {
     match role {
         Role::Admin => "administrator",
         Role::Clinician => "clinician",
@@ -166,7 +166,7 @@ pub(super) fn role(role: &Role) -> &'static str {
 
 /// The kind of a measurement file.
 #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
-pub(super) fn file_kind(kind: &MeasurementKind) -> &'static str {
+pub(crate) fn file_kind(kind: &MeasurementKind) -> &'static str {
     match kind {
         MeasurementKind::Electromyogram => "EMG recording",
         MeasurementKind::Motion => "joint angles",
@@ -174,36 +174,36 @@ pub(super) fn file_kind(kind: &MeasurementKind) -> &'static str {
 }
 
 /// A probability in whole percent.
-pub(super) fn percent(probability: f64) -> String {
+pub(crate) fn percent(probability: f64) -> String {
     format!("{:.0} %", 100.0 * probability)
 }
 
 /// A number with two decimals and its sign.
-pub(super) fn signed(value: f64) -> String {
+pub(crate) fn signed(value: f64) -> String {
     // Zero has no minus sign.
     minus(&format!("{:+.2}", if value.abs() < 0.005 { 0.0 } else { value }))
 }
 
 /// What a bound limits, with its unit; empty for any other name.
-pub(super) fn meaning(name: &str) -> &'static str {
+pub(crate) fn meaning(name: &str) -> &'static str {
     TunedBounds::NAMES.iter().position(|known| *known == name).map_or("", |place| TunedBounds::MEANINGS[place])
 }
 
 /// The same without its unit.
-pub(super) fn limited(name: &str) -> &'static str {
+pub(crate) fn limited(name: &str) -> &'static str {
     let meaning = meaning(name);
     meaning.rsplit_once(", ").map_or(meaning, |(limited, _)| limited)
 }
 
 /// One bound: name, value, what it limits.
-pub(super) struct Bound {
-    pub(super) name: &'static str,
-    pub(super) value: String,
-    pub(super) meaning: &'static str,
+pub(crate) struct Bound {
+    pub(crate) name: &'static str,
+    pub(crate) value: String,
+    pub(crate) meaning: &'static str,
 }
 
 /// The bounds of an action.
-pub(super) fn bounds(action: &TunedBounds) -> Vec<Bound> {
+pub(crate) fn bounds(action: &TunedBounds) -> Vec<Bound> {
     TunedBounds::NAMES
         .iter()
         .zip(action.to_array())

@@ -1,0 +1,205 @@
+//! The figures of what the learner believes about the search space of a study.
+
+use crate::format::{meaning, percent, signed};
+use crate::state::AppState;
+use gait_learner::{Dimension, LearnerError, Marginal, SearchSpace};
+use gaitwright_charts::{Cell, Chart, Figure, HeatMap, Stroke};
+use gaitwright_compute::OnPool;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::belief::{Belief, MOST_ANSWERS};
+use gaitwright_service::studies::choice::MANY;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{StudyId, TrialId, studies, trials};
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// Which two bounds the maps show.
+#[derive(Debug, Default, Deserialize)]
+pub(crate) struct AxisChoice {
+    x: Option<String>,
+    y: Option<String>,
+}
+
+/// Two bounds, the others held.
+pub(crate) struct Maps {
+    pub(crate) dimensions: Vec<DimensionChoice>,
+    pub(crate) held: Option<(TrialId, u32)>,
+    pub(crate) figures: Vec<Figure>,
+}
+
+pub(crate) struct DimensionChoice {
+    pub(crate) name: String,
+    pub(crate) meaning: &'static str,
+    pub(crate) x: bool,
+    pub(crate) y: bool,
+}
+
+/// Every figure of the page; empty if the page shows no belief.
+///
+/// # Errors
+/// [`Error::Invalid`] for a bound that is not tuned, [`Error::NotFound`], or errors of the database and the learner.
+pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: AxisChoice) -> Result<Vec<Figure>, Error> {
+    let Believed::There(snapshot, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
+    let draw = move |_: &OnPool| {
+        let chosen = chosen(belief.posterior.space(), &choice)?;
+        let mut figures = marginals(&belief);
+        figures.extend(maps(&belief, &snapshot, chosen).map_err(Error::Learner)?.figures);
+        Ok(figures)
+    };
+    app.compute(draw).await?
+}
+
+/// What the learner believes of a study, or why the page does not show it.
+pub(crate) enum Believed {
+    Absent(String),
+    There(Box<StudySnapshot>, Arc<Belief>),
+}
+
+pub(crate) async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
+    let too_many = |what: String| {
+        Ok(Believed::Absent(format!(
+            "This page is not available for studies with {what} or more, because the computation would take too long."
+        )))
+    };
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    if trials::counts(&mut reader, id).await?.total as usize >= MANY {
+        return too_many(format!("{MANY} trials"));
+    }
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
+    drop(reader);
+    let answers = snapshot.log().feedback.len();
+    if answers == 0 {
+        let why = "No results yet. The page appears with the first result.";
+        return Ok(Believed::Absent(why.to_owned()));
+    }
+    if answers > MOST_ANSWERS {
+        return too_many(format!("{MOST_ANSWERS} answers"));
+    }
+    let beliefs = app.beliefs.clone();
+    let think =
+        move |pool: &OnPool| beliefs.of(pool, &snapshot).map(|belief| Believed::There(Box::new(snapshot), belief));
+    app.compute(think).await?.map_err(Error::Learner)
+}
+
+/// The two dimensions of the maps: the requested ones, by default the first two; `None` if there is only one dimension.
+pub(crate) fn chosen(space: &SearchSpace, choice: &AxisChoice) -> Result<Option<(usize, usize)>, Error> {
+    let names: Vec<&str> = space.dimensions().iter().map(|d| d.name.as_str()).collect();
+    if names.len() < 2 {
+        return Ok(None);
+    }
+    let place = |field: &str, asked: &Option<String>, default: usize| match asked {
+        None => Ok(default),
+        Some(name) => {
+            let found = names.iter().position(|known| known == name);
+            found.ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
+        }
+    };
+    let (x, y) = (place("x", &choice.x, 0)?, place("y", &choice.y, 1)?);
+    if x == y {
+        return Err(Error::invalid("y", names[y], &format!("a bound other than {}", names[x])));
+    }
+    Ok(Some((x, y)))
+}
+
+/// All on one scale: what matters is which bound matters.
+pub(crate) fn marginals(belief: &Belief) -> Vec<Figure> {
+    let ends =
+        |m: &Marginal| [m.average.mean - m.average.standard_deviation, m.average.mean + m.average.standard_deviation];
+    let all = || belief.marginals.iter().flatten().flat_map(ends);
+    let range = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+    let draw = |(dimension, levels): (&Dimension, &Vec<Marginal>)| {
+        let line = levels.iter().map(|m| (m.value, m.average.mean)).collect();
+        let band = levels.iter().map(|m| (m.value, ends(m)[0], ends(m)[1])).collect();
+        let label = format!("{}: {}", dimension.name, meaning(&dimension.name));
+        let mut chart = Chart::new(&label, &label, "utility").with_band("one standard deviation", 0, band).with(
+            "mean",
+            0,
+            Stroke::Marked,
+            line,
+        );
+        chart.y_range = Some(range);
+        chart.x_ticks.clone_from(&dimension.values);
+        Figure::chart("utility", chart)
+    };
+    belief.posterior.space().dimensions().iter().zip(&belief.marginals).map(draw).collect()
+}
+
+pub(crate) fn maps(
+    belief: &Belief,
+    snapshot: &StudySnapshot,
+    chosen: Option<(usize, usize)>,
+) -> Result<Maps, LearnerError> {
+    let space = belief.posterior.space();
+    let dimensions = space.dimensions().iter().enumerate();
+    let dimensions = dimensions
+        .map(|(place, dimension)| DimensionChoice {
+            name: dimension.name.clone(),
+            meaning: meaning(&dimension.name),
+            x: chosen.is_some_and(|(x, _)| x == place),
+            y: chosen.is_some_and(|(_, y)| y == place),
+        })
+        .collect();
+    let (Some((right, down)), Some(best)) = (chosen, belief.posterior.best()) else {
+        return Ok(Maps { dimensions, held: None, figures: Vec::new() });
+    };
+    let held = snapshot.trial_of(best).map(|trial| (trial.id, trial.number));
+    let slice = belief.posterior.slice(down, right, best)?;
+    let at = |row: usize, column: usize| {
+        let mut levels = space.levels(best);
+        (levels[down], levels[right]) = (row, column);
+        space.index_of_levels(&levels)
+    };
+    let mut utility = Vec::new();
+    let mut converging = Vec::new();
+    for (row, predictions) in slice.predictions.iter().enumerate() {
+        let (mut utilities, mut chances) = (Vec::new(), Vec::new());
+        for (column, prediction) in predictions.iter().enumerate() {
+            let action = at(row, column)?;
+            let framed = action == best;
+            utilities.push(Cell {
+                value: prediction.mean,
+                text: signed(prediction.mean),
+                below: format!("± {:.2}", prediction.standard_deviation),
+                framed,
+            });
+            let chance = belief.posterior.probability_of_converging(action)?;
+            let below = tried(snapshot, space, [(down, row), (right, column)]);
+            chances.push(Cell { value: chance, text: percent(chance), below, framed });
+        }
+        utility.push(utilities);
+        converging.push(chances);
+    }
+    let means = || utility.iter().flatten().map(|cell| cell.value);
+    let range = (means().fold(f64::INFINITY, f64::min), means().fold(f64::NEG_INFINITY, f64::max));
+    let axis = |place: usize| {
+        let dimension = &space.dimensions()[place];
+        (format!("{}: {}", dimension.name, meaning(&dimension.name)), dimension.values.clone())
+    };
+    let draw = |title: &str, cells, range| {
+        let group = format!("{} {}", space.dimensions()[right].name, space.dimensions()[down].name);
+        Figure::map(&group, HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range })
+    };
+    let figures = vec![draw("Utility", utility, range), draw("Probability of converging", converging, (0.0, 1.0))];
+    Ok(Maps { dimensions, held, figures })
+}
+
+/// The text below each map.
+pub(crate) const MAP_NOTES: [&str; 2] = [
+    "Mean ± standard deviation. The frame marks the best action.",
+    "The small numbers count the trials with these two values: yes, converged; no, not converged.",
+];
+
+/// How many trials with these levels converged and how many did not.
+fn tried(snapshot: &StudySnapshot, space: &SearchSpace, levels: [(usize, usize); 2]) -> String {
+    let here = |trial: &&Trial| {
+        let own = space.levels(trial.action_index);
+        levels.iter().all(|(dimension, level)| own[*dimension] == *level)
+    };
+    let count = |state| snapshot.trials.iter().filter(here).filter(|trial| trial.state == state).count();
+    match (count(TrialState::Converged), count(TrialState::NotConverged)) {
+        (0, 0) => String::new(),
+        (converged, not) => format!("{converged} yes, {not} no"),
+    }
+}

@@ -1,0 +1,62 @@
+//! What a study has found, for charts and pages, computed from its snapshot on the thread pool.
+
+use gait_learner::LearnerError;
+use gaitwright_compute::OnPool;
+use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::choice::{last_believed, ranking_to_show};
+use gaitwright_service::studies::comparison::open_question;
+use gaitwright_service::studies::history::{self, Milestone};
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::TrialId;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+
+/// What a study has found.
+#[derive(Default)]
+pub(crate) struct Outcome {
+    /// Whether people answer and nobody has yet, so that the posterior is only the prior.
+    pub(crate) unanswered: bool,
+    /// The best trial.
+    pub(crate) best: Option<TrialId>,
+    /// The gaits from best to worst.
+    pub(crate) ranking: Vec<TrialId>,
+    /// The best action by iteration.
+    history: Vec<Milestone>,
+    /// Whether people are asked to compare two gaits.
+    pub(crate) question: bool,
+}
+
+impl Outcome {
+    /// The outcome of a study. Of a large study, the snapshot has the newest trials only.
+    ///
+    /// # Errors
+    /// Errors of the learner.
+    pub(crate) fn of(
+        pool: &OnPool,
+        snapshot: &StudySnapshot,
+        large: bool,
+        beliefs: &Beliefs,
+    ) -> Result<Self, LearnerError> {
+        if large {
+            // A large study is not read completely, so the learner's last best action is used instead of the posterior.
+            let best = last_believed(snapshot);
+            let (ranking, history) = (best.into_iter().collect(), history::known(snapshot));
+            let question = snapshot.study.state == StudyState::Waiting;
+            return Ok(Self { best, ranking, history, question, ..Self::default() });
+        }
+        let question = snapshot.study.plan.feedback_mode != FeedbackMode::Automatic
+            && open_question(pool, snapshot)?.trials().is_some();
+        if snapshot.waits_for_first_answer() {
+            return Ok(Self { unanswered: true, question, ..Self::default() });
+        }
+        let ranking = ranking_to_show(pool, snapshot, beliefs)?;
+        let best = ranking.first().copied();
+        let history = history::of(snapshot, best);
+        Ok(Self { best, ranking, history, question, ..Self::default() })
+    }
+
+    /// Gait RMSE of the best action by iteration.
+    pub(crate) fn course(&self) -> Vec<(f64, f64)> {
+        let point = |milestone: &Milestone| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
+        self.history.iter().filter_map(point).collect()
+    }
+}

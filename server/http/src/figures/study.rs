@@ -1,0 +1,141 @@
+//! The figures of a study, or of two.
+
+use super::course::{COURSE, course, warm_starts};
+use super::outcome::Outcome;
+use super::study_results::StudyResults;
+use crate::state::AppState;
+use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::{Gait, ReferenceGait};
+use gaitwright_charts::{Chart, Figure, band_in_words, gait_charts};
+use gaitwright_compute::OnPool;
+use gaitwright_service::error::Error;
+use gaitwright_store::studies::Study;
+use gaitwright_store::{StudyId, TrialId, gaits, reference_gaits, trials};
+use std::sync::Arc;
+
+/// A section of figures.
+#[derive(Debug)]
+pub(crate) struct Section {
+    pub(crate) id: &'static str,
+    pub(crate) heading: &'static str,
+    pub(crate) hint: String,
+    pub(crate) figures: Vec<Figure>,
+}
+
+/// The figures of a study, or of two.
+#[derive(Debug)]
+pub(crate) struct StudyFigures {
+    pub(crate) study: Study,
+    /// The best trial of the study, and its number.
+    pub(crate) best: Option<(TrialId, u32)>,
+    /// Names of the studies without a gait to draw.
+    pub(crate) without_gait: Vec<String>,
+    pub(crate) sections: Vec<Section>,
+    /// The warm-start tree, which the study page shows.
+    tree: Option<Figure>,
+}
+
+impl StudyFigures {
+    /// All of them.
+    pub(crate) fn into_figures(self) -> Vec<Figure> {
+        self.sections.into_iter().flat_map(|section| section.figures).chain(self.tree).collect()
+    }
+}
+
+/// A study with its best gait.
+struct Best {
+    results: StudyResults,
+    outcome: Outcome,
+    trial: Option<(TrialId, u32)>,
+    gait: Option<Gait>,
+}
+
+impl Best {
+    async fn read(app: &mut AppState, id: StudyId) -> Result<Self, Error> {
+        let beliefs = Arc::clone(&app.beliefs);
+        let results = StudyResults::read(&mut *app.read().await?, id).await?;
+        let draw = move |pool: &OnPool| {
+            let outcome = results.outcome(pool, &beliefs);
+            (results, outcome)
+        };
+        let (results, outcome) = app.compute(draw).await?;
+        let outcome = outcome?;
+        let mut reader = app.read().await?;
+        let trial = match outcome.best {
+            Some(id) => Some((id, trials::get(&mut reader, id).await?.number)),
+            None => None,
+        };
+        let gait = match trial {
+            Some((id, _)) => gaits::find(&mut reader, id).await?,
+            None => None,
+        };
+        drop(reader);
+        let gait = app.compute(move |pool| gait.map(|gait| gait.unpack(pool)).transpose()).await??;
+        Ok(Self { results, outcome, trial, gait })
+    }
+
+    fn name(&self) -> &str {
+        &self.results.snapshot.study.plan.name
+    }
+}
+
+/// The paper's figures for a study, and optionally for a second one.
+///
+/// # Errors
+/// A conflict when the subject of one of them withdrew, [`Error::NotFound`]; errors of the database.
+pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
+    let mut shown = vec![Best::read(app, id).await?];
+    if let Some(other) = other.filter(|other| *other != id) {
+        shown.push(Best::read(app, other).await?);
+    }
+    let mut reader = app.read().await?;
+    let reference = shown[0].results.snapshot.study.plan.reference_gait_id;
+    let reference = reference_gaits::get(&mut reader, reference).await?.definition;
+    drop(reader);
+    let draw = move |_: &OnPool| {
+        let sections = sections(&shown, &reference);
+        (shown, sections)
+    };
+    let (shown, sections) = app.compute(draw).await?;
+    let without_gait = shown.iter().filter(|best| best.gait.is_none()).map(|best| best.name().to_owned()).collect();
+    let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
+    let tree = warm_starts(&first.results.snapshot, first.outcome.best);
+    Ok(StudyFigures { best: first.trial, study: first.results.snapshot.study, without_gait, sections: sections?, tree })
+}
+
+fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {
+    let snapshots: Vec<_> = shown.iter().map(|best| (&best.results.snapshot, &best.outcome)).collect();
+    let gaits: Vec<(&str, &Gait)> = shown.iter().filter_map(|best| Some((best.name(), best.gait.as_ref()?))).collect();
+    let mut tiles = Vec::new();
+    for (name, gait) in &gaits {
+        tiles.push(Figure::tiles(&format!("Gait of {name}"), stick_figures(gait)?));
+    }
+    let charts = |group: &str, charts: Vec<Chart>| charts.into_iter().map(|c| Figure::chart(group, c)).collect();
+    Ok(vec![
+        Section {
+            id: COURSE,
+            heading: "Gait RMSE of the best action by iteration",
+            hint: "Figure 3b of the paper, which compares a study with muscles and one without.".to_owned(),
+            figures: charts(COURSE, course(&snapshots).into_iter().collect()),
+        },
+        Section {
+            id: "angles",
+            heading: "Joint angles of the best gait",
+            hint: format!("Figure 3c of the paper, with the reference gait. {}", band_in_words(reference)),
+            figures: charts("angles", gait_charts::with_reference(&gaits, reference)),
+        },
+        Section {
+            id: "tiles",
+            heading: "Gait tiles",
+            hint: "Figure 4 of the paper: the stride of the best gait.".to_owned(),
+            figures: tiles,
+        },
+        Section {
+            id: "orbits",
+            heading: "Limit cycles of the best gait",
+            hint: "Figure 5 of the paper: angle and velocity over the stride. The pages of lab sessions show measured limit cycles."
+                .to_owned(),
+            figures: charts("orbits", gait_charts::orbits(&gaits)),
+        },
+    ])
+}

@@ -1,0 +1,39 @@
+//! A study with its trials, as charts of one or of several studies show it.
+
+use super::outcome::Outcome;
+use gaitwright_compute::OnPool;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::choice::MANY;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::trials::TrialCounts;
+use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
+
+/// How many of the newest trials of a large study are drawn.
+const NEWEST: u32 = 200;
+
+/// A study with its snapshot.
+pub(crate) struct StudyResults {
+    pub(crate) snapshot: StudySnapshot,
+    pub(crate) subject: String,
+    pub(crate) counts: TrialCounts,
+}
+
+impl StudyResults {
+    pub(crate) async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
+        let study = studies::get(db, id).await?;
+        consents::may_be_shown(db, id).await?;
+        let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
+        let counts = trials::counts(db, id).await?;
+        let snapshot = if counts.total as usize >= MANY {
+            StudySnapshot::newest(db, study, NEWEST).await?
+        } else {
+            StudySnapshot::read(db, study).await?
+        };
+        Ok(Self { snapshot, subject, counts })
+    }
+
+    pub(crate) fn outcome(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Outcome, Error> {
+        Outcome::of(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
+    }
+}
