@@ -22,7 +22,6 @@ use gaitwright_service::studies::choice::ranking_to_show;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::Study;
 use gaitwright_store::{StudyId, TrialId, studies};
-use serde::Deserialize;
 use std::sync::Arc;
 
 /// So many actions and answers are listed.
