@@ -42,6 +42,7 @@ mod state;
 mod static_files;
 pub mod unwritten_access;
 mod visible;
+mod workers;
 
 pub use client_address::ClientAddress;
 pub use forwarded::{NETWORKS, Network, Proxies, ProxyHeaders};

@@ -6,16 +6,16 @@ use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem::Refusal;
 use crate::visible::Visible;
+use crate::workers::Workers;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::studies::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
-use gaitwright_store::jobs::{self, OpenSolve};
+use gaitwright_store::jobs::OpenSolve;
 use gaitwright_store::{LentWriter, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// Background work of the service.
@@ -157,23 +157,6 @@ pub(super) async fn cancel(
     let answer = request.done(&app, writer, &Job::from(cancelled)).await?;
     job_status::stop(app.runners(), id).await;
     Ok(answer)
-}
-
-/// Workers of the service.
-#[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct Workers {
-    /// Number of solves that can run in parallel.
-    pub(crate) places: usize,
-    /// Number of running solves by worker.
-    pub(crate) at_work: BTreeMap<String, u32>,
-}
-
-impl Workers {
-    pub(crate) async fn read(app: &AppState) -> Result<Self, Refusal> {
-        // Names of workers reveal nothing about studies.
-        let at_work = jobs::by_worker(&mut *app.read().await?).await?;
-        Ok(Self { places: app.scheduler.workers(), at_work })
-    }
 }
 
 /// List workers

@@ -36,7 +36,6 @@ mod trials;
 mod users;
 
 use super::AppState;
-pub(super) use jobs::Workers;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 

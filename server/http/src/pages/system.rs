@@ -1,10 +1,10 @@
 //! The system page: version, workers, queue, record and backups.
 
 use crate::AppState;
-use crate::api::Workers;
 use crate::authorization::Authorized;
 use crate::format::{duration, words};
 use crate::page_error::{Page, page};
+use crate::workers::Workers;
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::{Administer, Caller, Permission, Read};
