@@ -21,11 +21,16 @@ pub struct GaitRmse {
 /// Gait RMSE: `sum_i sqrt(mean((q_i - ref_i)^2))` over the five human coordinates, at equidistant times of the stride.
 /// Gait and reference are interpolated linearly.
 pub fn gait_rmse(gait: &Gait, reference: &ReferenceGait) -> GaitRmse {
+    gait_rmse_with_shift(gait, reference, 0.0)
+}
+
+/// Gait RMSE against the reference gait delayed by a fraction of the stride.
+pub(crate) fn gait_rmse_with_shift(gait: &Gait, reference: &ReferenceGait, shift: f64) -> GaitRmse {
     let mut squares = [0.0; 5];
     for sample in 0..RMSE_SAMPLES {
         let fraction = sample as f64 / RMSE_SAMPLES as f64;
         let angles = gait.coordinates_at(fraction * gait.stride_time_s);
-        let wanted = reference.at(fraction);
+        let wanted = reference.at(fraction - shift);
         for i in 0..5 {
             squares[i] += (angles[2 + i] - wanted[i]).powi(2);
         }

@@ -15,8 +15,8 @@ pub(super) struct Certify {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// JSON reference gait of the solve, for the Gait RMSE that a file of `solve --out` states (default: the built-in one).
-    #[arg(long, value_name = "FILE")]
+    /// Reference gait of the solve, as in `solve`, for the Gait RMSE that a file of `solve --out` states.
+    #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Print the certificate as one JSON object.
     #[arg(long)]
@@ -27,8 +27,9 @@ impl Certify {
     /// Certifies the gait. A failed certificate is a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let GaitFile { gait, report } = read_gait_file(&self.gait)?;
+        let reference = reference_of(self.reference.as_deref())?;
         if let Some(report) = report {
-            check_figures(&gait, &report, &reference_of(self.reference.as_deref())?)
+            check_figures(&gait, &report, &reference)
                 .map_err(|reason| Error::Malformed(format!("{} is not certified: {reason}", self.gait.display())))?;
         }
         let certificate = Pool::new(1).run(move |_| certify(&gait)).await??;
