@@ -373,7 +373,11 @@ async fn users_link_command_prints_a_working_sign_in_link() {
     let process = Process::start(folder.path(), &[], "sign in");
     let first = send(process.address(), "POST", link.trim(), "").unwrap();
     assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
-    let busy = run(&["users", "list"]);
-    let said = String::from_utf8_lossy(&busy.stderr).into_owned();
-    assert!(busy.status.code() == Some(2) && said.contains("--sign-in-link"), "{said}");
+    for (arguments, instead) in
+        [(&["users", "list"][..], "page Users and tokens"), (&["users", "link", "ada"], "--sign-in-link")]
+    {
+        let busy = run(arguments);
+        let said = String::from_utf8_lossy(&busy.stderr).into_owned();
+        assert!(busy.status.code() == Some(2) && said.contains(instead), "{said}");
+    }
 }
