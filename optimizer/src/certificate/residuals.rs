@@ -321,7 +321,7 @@ mod tests {
         assert_eq!(points.last().unwrap().0, 1.0);
         for (share, _) in points.iter().filter(|(_, node)| node.is_none()) {
             let tenths = 20.0 * share;
-            assert!((tenths - tenths.round()).abs() > 0.05, "{share}");
+            assert!((tenths - tenths.round()).abs() > 0.04, "{share}");
         }
     }
 }
