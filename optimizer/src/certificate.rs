@@ -10,6 +10,9 @@
 //!    regulated and with a free hip velocity.
 //! 4. The largest pushes from which the walker recovers ([`Pushes`]).
 //!
+//! The limits are those of the gait itself. [`CertifiedGait`] names the gait and every value that differs from the built-in
+//! problem.
+//!
 //! Step 1 checks the muscles. The closed loop has joint torques as inputs, like the device and the gait problem.
 
 mod check;
@@ -21,6 +24,7 @@ mod dormand_prince;
 mod findings;
 mod guard;
 mod hybrid_walker;
+mod identity;
 mod limit_excess;
 mod muscle_residuals;
 mod poincare_section;
@@ -38,6 +42,7 @@ mod simulation_tests;
 pub use check::Check;
 pub use closed_loop::STRIDES;
 pub use hybrid_walker::Fall;
+pub use identity::{CertifiedGait, Difference};
 pub use push::{LARGEST_PUSH_M_S, Pushes, RECOVERY_STRIDES};
 pub use return_map::{Multiplier, ReturnMap};
 
@@ -49,13 +54,15 @@ use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};
 
 /// Version of the layout and of the checks of [`Certificate`].
-pub const FORMAT_VERSION: u32 = 6;
+pub const FORMAT_VERSION: u32 = 7;
 
 /// The result of certifying a gait.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
     /// Version of this layout and of its checks.
     pub format_version: u32,
+    /// The gait that was checked. `None` if it is malformed.
+    pub certified: Option<CertifiedGait>,
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
     /// The reasons for a failed certificate, as text; empty if it passed.
@@ -85,6 +92,7 @@ impl Certificate {
     fn empty(checks: Vec<Check>) -> Self {
         Self {
             format_version: FORMAT_VERSION,
+            certified: None,
             passed: false,
             failures: Vec::new(),
             checks,
@@ -104,6 +112,7 @@ pub fn certify(gait: &Gait) -> Result<Certificate, ModelError> {
     gait.validate()?;
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
     let mut certificate = Certificate::empty(residuals::residuals(&model, gait));
+    certificate.certified = Some(CertifiedGait::new(gait, model.total_mass)?);
     if let Err(fall) = simulate(&model, gait, &mut certificate) {
         certificate.fall = Some(fall.to_string());
     }

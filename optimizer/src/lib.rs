@@ -20,6 +20,7 @@ mod opensim;
 pub mod phase_portrait;
 mod quadrature;
 pub mod reference;
+pub mod reference_comparison;
 pub mod settings;
 mod signal_filter;
 pub mod solve;

@@ -1,6 +1,8 @@
-//! Metrics of a gait: Gait RMSE against a reference, and alternations of the muscle activations.
+//! Metrics of a gait: Gait RMSE against a reference, cost of transport, and alternations of the muscle activations.
 
+use crate::body::{GRAVITY, JOINTS};
 use crate::gait::Gait;
+use crate::gait::motion::instant;
 use crate::muscle::MUSCLE_COUNT;
 use crate::reference::ReferenceGait;
 
@@ -19,17 +21,41 @@ pub struct GaitRmse {
 /// Gait RMSE: `sum_i sqrt(mean((q_i - ref_i)^2))` over the five human coordinates, at equidistant times of the stride.
 /// Gait and reference are interpolated linearly.
 pub fn gait_rmse(gait: &Gait, reference: &ReferenceGait) -> GaitRmse {
+    gait_rmse_with_shift(gait, reference, 0.0)
+}
+
+/// Gait RMSE against the reference gait delayed by a fraction of the stride.
+pub(crate) fn gait_rmse_with_shift(gait: &Gait, reference: &ReferenceGait, shift: f64) -> GaitRmse {
     let mut squares = [0.0; 5];
     for sample in 0..RMSE_SAMPLES {
         let fraction = sample as f64 / RMSE_SAMPLES as f64;
         let angles = gait.coordinates_at(fraction * gait.stride_time_s);
-        let wanted = reference.at(fraction);
+        let wanted = reference.at(fraction - shift);
         for i in 0..5 {
             squares[i] += (angles[2 + i] - wanted[i]).powi(2);
         }
     }
     let parts = squares.map(|s| (s / RMSE_SAMPLES as f64).sqrt());
     GaitRmse { total: parts.iter().sum(), parts }
+}
+
+/// Parts of the time between two nodes for the integral of the joint powers, whose magnitudes have kinks.
+const POWER_SAMPLES: usize = 32;
+
+/// Mechanical cost of transport `sum_i integral |P_i| dt / (m g D)` over the six joint powers `P_i = u_i qd_(3+i)` of the
+/// continuous motion of a well-formed gait, by the midpoint rule; dimensionless. The objective smooths |P|.
+pub fn unsmoothed_cost_of_transport(gait: &Gait, total_mass_kg: f64) -> f64 {
+    let mut effort_j = 0.0;
+    for domain in &gait.domains {
+        let samples = (domain.q.len() - 1) * POWER_SAMPLES;
+        let mut sum_w = 0.0;
+        for sample in 0..samples {
+            let at = instant(domain, (sample as f64 + 0.5) / samples as f64);
+            sum_w += (0..JOINTS).map(|i| (at.u[i] * at.qd[3 + i]).abs()).sum::<f64>();
+        }
+        effort_j += domain.duration_s * sum_w / samples as f64;
+    }
+    effort_j / (total_mass_kg * GRAVITY * gait.stride_length_m)
 }
 
 /// Smallest step of an activation that counts in an alternation.

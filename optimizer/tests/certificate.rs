@@ -4,8 +4,9 @@
 
 mod golden_gaits;
 
-use gait_optimizer::certificate::{Certificate, STRIDES, certify};
-use gait_optimizer::{Gait, ModelError};
+use gait_optimizer::body::WalkerModel;
+use gait_optimizer::certificate::{Certificate, Difference, STRIDES, certify};
+use gait_optimizer::{Gait, GaitFigures, ModelError, ReferenceGait};
 use golden_gaits::golden_gait;
 
 fn certificate(gait: &Gait) -> Certificate {
@@ -102,6 +103,80 @@ fn each_violated_limit_is_detected() {
         change(&mut gait);
         let found = certificate(&gait);
         assert!(objects_to(&found, name), "{name}: {:?}", found.failures);
+    }
+}
+
+#[test]
+fn every_changed_limit_is_named_although_the_gait_keeps_it() {
+    type Change = fn(&mut Gait);
+    let changes: [(&str, Change); 15] = [
+        ("device.knee_torque_limit_n_m is 300.0 (built-in: ", |gait| gait.device.knee_torque_limit_n_m = 300.0),
+        ("device.ankle_torque_limit_n_m is 300.0 (built-in: ", |gait| gait.device.ankle_torque_limit_n_m = 300.0),
+        ("device.joint_speed_limit_rad_s is 50.0 (built-in: ", |gait| gait.device.joint_speed_limit_rad_s = 50.0),
+        ("device.ankle_min_rad is -1.2 (built-in: ", |gait| gait.device.ankle_min_rad = -1.2),
+        ("device.ankle_max_rad is 1.2 (built-in: ", |gait| gait.device.ankle_max_rad = 1.2),
+        ("settings.limits.friction is 1.0 (built-in: 0.6)", |gait| gait.settings.limits.friction = 1.0),
+        ("settings.limits.impact_friction is 1.0 (built-in: 0.6)", |gait| gait.settings.limits.impact_friction = 1.0),
+        ("settings.limits.toe_touchdown_m_s is 0.0 (built-in: 0.1)", |gait| {
+            gait.settings.limits.toe_touchdown_m_s = 0.0;
+        }),
+        ("settings.limits.heel_touchdown_m_s is 0.0 (built-in: 0.1)", |gait| {
+            gait.settings.limits.heel_touchdown_m_s = 0.0;
+        }),
+        ("settings.limits.hip_torque_n_m is 999.0 (built-in: 200.0)", |gait| {
+            gait.settings.limits.hip_torque_n_m = 999.0;
+        }),
+        ("settings.limits.clearance_min_m is 0.0 (built-in: 0.005)", |gait| gait.settings.limits.clearance_min_m = 0.0),
+        ("settings.limits.liftoff_force_n is 0.0 (built-in: 20.0)", |gait| gait.settings.limits.liftoff_force_n = 0.0),
+        ("settings.limits.knee_min_rad is 0.0 (built-in: 0.02)", |gait| gait.settings.limits.knee_min_rad = 0.0),
+        ("settings.limits.duration_max_s.ds3 is 1.0 (built-in: 0.3)", |gait| {
+            gait.settings.limits.duration_max_s.ds3 = 1.0;
+        }),
+        ("settings.limits.contact_force_max_n is 9000.0 (built-in: 3000.0)", |gait| {
+            gait.settings.limits.contact_force_max_n = 9000.0;
+        }),
+    ];
+    let (_, whole) = golden_gait(1, true);
+    let certified = |gait: &Gait| certificate(gait).certified.unwrap();
+    let before = certified(&whole);
+    assert!(before.differences.iter().all(|one| one.name == "settings.regularisation.activation_bend"), "{before:?}");
+    assert!(before.muscles);
+    for (difference, change) in changes {
+        let mut gait = whole.clone();
+        change(&mut gait);
+        let after = certified(&gait);
+        let names: Vec<String> = after.differences.iter().map(Difference::in_words).collect();
+        assert!(names.iter().any(|name| name.starts_with(difference)), "{difference}: {names:?}");
+        assert_eq!(names.len(), before.differences.len() + 1);
+        assert_ne!(after.gait_sha256, before.gait_sha256, "{difference}");
+    }
+}
+
+#[test]
+fn gait_without_its_muscles_is_certified_as_one_without_muscles() {
+    let (_, mut gait) = golden_gait(1, true);
+    gait.muscles = false;
+    gait.domains.iter_mut().for_each(|domain| domain.muscles = None);
+    let certificate = certificate(&gait);
+    let certified = certificate.certified.unwrap();
+    assert!(!certified.muscles && certified.walker_in_words().ends_with("without muscles"), "{certified:?}");
+    assert!(certificate.checks.iter().all(|check| !check.name.contains("C5")), "{:?}", certificate.checks);
+}
+
+#[test]
+fn cost_of_transport_with_magnitudes_exceeds_the_smoothed_cost_by_at_most_the_smoothing() {
+    for (subject, muscles) in [(1, false), (2, true)] {
+        let (_, gait) = golden_gait(subject, muscles);
+        let reference = ReferenceGait::builtin().unwrap();
+        let smoothed = GaitFigures::of(&gait, &reference).unwrap().cost_of_transport;
+        let unsmoothed = certificate(&gait).certified.unwrap().unsmoothed_cost_of_transport;
+        // |P| - eps <= sqrt(P^2 + eps^2) - eps <= |P| for each of six joints; the two quadratures differ by a little.
+        let body_weight_n = WalkerModel::new(&gait.subject, &gait.device).unwrap().total_mass * 9.81;
+        let smoothing_w = gait.settings.regularisation.power_smoothing_w;
+        let most = 6.0 * smoothing_w * gait.stride_time_s / (body_weight_n * gait.stride_length_m);
+        let difference = unsmoothed - smoothed;
+        assert!((-1e-4..most + 1e-4).contains(&difference), "{unsmoothed} {smoothed}: {difference} of {most}");
+        assert!(difference > 1e-4, "{difference}");
     }
 }
 

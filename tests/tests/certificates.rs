@@ -50,6 +50,20 @@ fn commands_solve_certify_and_convert_a_gait() {
     std::fs::write(folder.join("alone.json"), outcome["gait"].to_string()).unwrap();
     let text = done(folder, &["certify", "alone.json"]);
     assert!(text.starts_with("certificate: ") && text.contains("largest multiplier"), "{text}");
+    let walker = "subject of 1.727 m and 65.7 kg, device \"AMPRO3\", without muscles";
+    assert!(text.contains(walker) && text.contains("differs: settings.mesh.ds2 is 2 (built-in: 4)"), "{text}");
+
+    // Figures that the file states are compared with those of its gait.
+    for (figure, expected) in [
+        ("cost_of_transport", "it states cost_of_transport as 0.01; computed from the gait it is 0."),
+        ("gait_rmse_rad", "it states gait_rmse_rad as 0.01; with the reference gait \"Falisse 2019, subject 1\" it is"),
+    ] {
+        let mut forged = outcome.clone();
+        forged["report"][figure] = json!(0.01);
+        std::fs::write(folder.join("forged.json"), forged.to_string()).unwrap();
+        refused(folder, &["certify", "forged.json"], expected);
+    }
+    std::fs::remove_file(folder.join("forged.json")).unwrap();
 
     done(folder, &["convert", "alone.json", "--to", "mot", "--rate-hz", "1000", "--out", "gait.mot"]);
     let end = outcome["gait"]["stride_time_s"].as_f64().unwrap() - 1e-6;

@@ -23,7 +23,7 @@ from programme import DEFAULTS, Gait, read_reference
 
 HERE = Path(__file__).resolve().parent
 CRATE = HERE.parent.parent
-REFERENCE = CRATE / "data" / "reference_gait.csv"
+REFERENCE = CRATE / "data" / "reference_gait_falisse_2019.csv"
 FIXTURES = CRATE / "tests" / "data"
 
 TRACKING = {"relaxed": True}

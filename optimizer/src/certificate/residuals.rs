@@ -1,4 +1,4 @@
-//! Residuals of C1 to C4 at the nodes and on a grid ten times finer.
+//! Residuals of C1 to C4 at the nodes and on a finer grid between them.
 
 use super::check::{Check, CheckLocation, Quantity, Worst};
 use super::contact::Contact;
@@ -11,8 +11,10 @@ use crate::gait::Gait;
 use crate::gait::motion::{Instant, instant};
 use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 
-/// Number of grid points between adjacent nodes.
-pub(super) const REFINEMENT: usize = 10;
+/// Number of grid points between adjacent nodes, in the middle of as many equal parts. The solve divides the same time
+/// into ten parts and tightens bounds at their ends. No point of this grid is one of those, so that a gait is judged where
+/// nothing was tightened.
+const BETWEEN_NODES: usize = 24;
 
 // At nodes: 1e-6, the tolerance of a converged gait, times the scale of the row in the gait problem.
 const FORCE: Measured = Measured::new("C1 equations of motion, forces", "N", 1e-4, None);
@@ -49,6 +51,11 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Measures a well-formed gait without simulation.
 pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
+    residuals_on(model, gait, BETWEEN_NODES)
+}
+
+/// [`residuals`] with this number of grid points between adjacent nodes.
+pub(super) fn residuals_on(model: &WalkerModel, gait: &Gait, between_nodes: usize) -> Vec<Check> {
     let limits = AllowedRanges::new(gait);
     let table = gait.settings.muscles.muscles(&gait.subject);
     let mut worst = Findings::default();
@@ -62,18 +69,14 @@ pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
             contacts: Contact::of_domain(model, CYCLE[d]),
             constraints: VirtualConstraints::new(model, gait, d),
         };
-        let cells = (trajectory.q.len() - 1) * REFINEMENT;
-        for cell in 0..=cells {
-            let share = cell as f64 / cells as f64;
-            let on_mesh = cell % REFINEMENT == 0;
+        for (share, node) in grid(trajectory.q.len(), between_nodes) {
             let mut here = instant(trajectory, share);
             let of_cubic = here.muscles.as_ref().map(|muscles| muscles.fibre_length);
-            let written =
-                trajectory.muscles.as_ref().filter(|_| on_mesh).map(|all| all.fibre_length[cell / REFINEMENT]);
+            let written = trajectory.muscles.as_ref().zip(node).map(|(all, node)| all.fibre_length[node]);
             if let (Some(muscles), Some(written)) = (&mut here.muscles, written) {
                 muscles.fibre_length = written;
             }
-            let point = GridPoint { instant: &here, place: CheckLocation::within(trajectory, share), on_mesh };
+            let point = GridPoint { instant: &here, place: CheckLocation::within(trajectory, share), on_mesh: node.is_some() };
             if let (Some(written), Some(of_cubic)) = (written, of_cubic) {
                 muscle_residuals::note_written(&point, &written, &of_cubic, &mut worst);
             }
@@ -88,6 +91,16 @@ pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
     }
     stride(gait, &mut worst);
     worst.into_checks()
+}
+
+/// Fractions of the duration of a domain, in order: every node with its number, and the points between.
+fn grid(nodes: usize, between: usize) -> impl Iterator<Item = (f64, Option<usize>)> {
+    let gaps = (nodes - 1) as f64;
+    (0..nodes).flat_map(move |node| {
+        let parts = if node + 1 < nodes { between } else { 0 };
+        let middle = move |part: usize| (node as f64 + (part as f64 + 0.5) / between as f64) / gaps;
+        std::iter::once((node as f64 / gaps, Some(node))).chain((0..parts).map(move |part| (middle(part), None)))
+    })
 }
 
 struct DomainResiduals<'a> {
@@ -292,5 +305,23 @@ fn stride(gait: &Gait, worst: &mut Findings) {
             DomainKind::Ss1 => (low.ss1, high.ss1),
         };
         range(trajectory.duration_s, low, high);
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::grid;
+
+    #[test]
+    fn no_point_between_nodes_is_one_where_the_solve_tightens_bounds() {
+        let points: Vec<_> = grid(3, super::BETWEEN_NODES).collect();
+        assert_eq!(points.iter().filter_map(|(_, node)| *node).collect::<Vec<_>>(), [0, 1, 2]);
+        assert!(points.windows(2).all(|pair| pair[0].0 < pair[1].0) && points[0].0 == 0.0);
+        assert_eq!(points.last().unwrap().0, 1.0);
+        for (share, _) in points.iter().filter(|(_, node)| node.is_none()) {
+            let tenths = 20.0 * share;
+            assert!((tenths - tenths.round()).abs() > 0.04, "{share}");
+        }
     }
 }

@@ -4,6 +4,7 @@ use super::control::{BANDWIDTH, Control, State, join, split};
 use super::dormand_prince::System;
 use super::hybrid_walker::HybridWalker;
 use super::limit_excess::AllowedRanges;
+use super::residuals::{residuals, residuals_on};
 use super::return_map::return_map;
 use crate::body::{Chain, GRAVITY, PointState, WalkerModel};
 use crate::gait::motion::instant;
@@ -157,4 +158,18 @@ fn energy_changes_by_the_work_of_the_joints() {
         // The trapezoidal rule over the steps of the integrator.
         assert!((work - gained).abs() < 2e-3 * (1.0 + gained.abs()), "{}: {work} {gained}", domain.name);
     }
+}
+
+#[test]
+fn finer_grid_finds_no_larger_violations_between_nodes() {
+    let (coarse, fine) = (residuals(&model(), gait()), residuals_on(&model(), gait(), 400));
+    let mut compared = 0;
+    for (check, finer) in coarse.iter().zip(&fine).filter(|(check, _)| check.name.ends_with("between nodes")) {
+        assert_eq!(check.name, finer.name);
+        if let (Some(limit), Some(value), Some(more)) = (check.limit, check.value, finer.value) {
+            assert!(more - value < 0.02 * limit, "{}: {value} and {more}, limit {limit}", check.name);
+            compared += 1;
+        }
+    }
+    assert!(compared > 10, "{compared}");
 }

@@ -4,8 +4,10 @@ use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// The built-in reference gait. Its header states the source, the licence and the processing.
-const BUILTIN_CSV: &str = include_str!("../../data/reference_gait.csv");
+/// One healthy adult, the default. The headers of these files state source, licence and processing.
+const FALISSE_2019_CSV: &str = include_str!("../../data/reference_gait_falisse_2019.csv");
+/// The median of 24 healthy adults.
+const FUKUCHI_2018_CSV: &str = include_str!("../../data/reference_gait_fukuchi_2018.csv");
 /// Largest plausible joint angle, rad. Angles in degrees exceed it.
 pub(crate) const LARGEST_ANGLE_RAD: f64 = PI;
 /// Number of rows of a reference gait: 0, 1, ..., 100 % of the cycle.
@@ -44,8 +46,18 @@ impl ReferenceGait {
     /// If the built-in file is invalid; a test excludes it.
     pub fn builtin() -> Result<Self, ModelError> {
         // The source has the mass but not the height.
-        let reference = Self::from_csv("Falisse 2019, subject 1", BUILTIN_CSV)?;
+        let reference = Self::from_csv("Falisse 2019, subject 1", FALISSE_2019_CSV)?;
         Ok(Self { body_mass_kg: Some(62.0), ..reference })
+    }
+
+    /// Every built-in reference gait with its name on the command line, the default first: `falisse-2019`, one adult,
+    /// and `fukuchi-2018`, the median of 24 young adults of Fukuchi et al. 2018 (CC BY 4.0).
+    ///
+    /// # Errors
+    /// If a built-in file is invalid; a test excludes it.
+    pub fn all_builtin() -> Result<[(&'static str, Self); 2], ModelError> {
+        let fukuchi = Self::from_csv("Fukuchi 2018, median of 24 adults", FUKUCHI_2018_CSV)?;
+        Ok([("falisse-2019", Self::builtin()?), ("fukuchi-2018", fukuchi)])
     }
 
     /// Parses a table with the columns `pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad` and 101 rows.

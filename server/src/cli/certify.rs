@@ -1,9 +1,11 @@
 //! `gaitwright certify`: certifies a gait independently of the optimiser.
 
-use super::gait_file::read_gait;
+use super::gait_file::{GaitFile, read_gait_file};
 use super::output::data;
+use super::problem::reference_of;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, RECOVERY_STRIDES, STRIDES, certify};
+use gait_optimizer::{Gait, GaitFigures, ReferenceGait, SolveReport};
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
@@ -13,6 +15,9 @@ pub(super) struct Certify {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
+    /// Reference gait of the solve, as in `solve`, for the Gait RMSE that a file of `solve --out` states.
+    #[arg(long, value_name = "NAME or FILE")]
+    reference: Option<PathBuf>,
     /// Print the certificate as one JSON object.
     #[arg(long)]
     json: bool,
@@ -21,7 +26,12 @@ pub(super) struct Certify {
 impl Certify {
     /// Certifies the gait. A failed certificate is a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
-        let gait = read_gait(&self.gait)?;
+        let GaitFile { gait, report } = read_gait_file(&self.gait)?;
+        let reference = reference_of(self.reference.as_deref())?;
+        if let Some(report) = report {
+            check_figures(&gait, &report, &reference)
+                .map_err(|reason| Error::Malformed(format!("{} is not certified: {reason}", self.gait.display())))?;
+        }
         let certificate = Pool::new(1).run(move |_| certify(&gait)).await??;
         if self.json {
             let text = serde_json::to_string_pretty(&certificate).map_err(|e| Error::Internal(e.to_string()))?;
@@ -32,9 +42,31 @@ impl Certify {
     }
 }
 
+/// Checks the figures that a file states against those of its gait. The error is the reason.
+fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -> Result<(), String> {
+    let figures = GaitFigures::of(gait, reference).map_err(|e| e.to_string())?;
+    match figures.difference(&GaitFigures::stated_in(report)) {
+        None => Ok(()),
+        Some((name, computed, stated)) if name.starts_with("gait_rmse") => Err(format!(
+            "it states {name} as {stated}; with the reference gait {:?} it is {computed}. If the solve had another reference \
+             gait, give it with --reference.",
+            reference.name
+        )),
+        Some((name, computed, stated)) => Err(format!("it states {name} as {stated}; computed from the gait it is {computed}.")),
+    }
+}
+
 /// The certificate as text.
 pub(super) fn for_people(certificate: &Certificate) -> String {
     let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
+    if let Some(certified) = &certificate.certified {
+        lines.push(format!("  gait {}, {}", certified.gait_sha256, certified.walker_in_words()));
+        lines.extend(certified.differences.iter().map(|difference| format!("  differs: {}", difference.in_words())));
+        lines.push(format!(
+            "  cost of transport {:.4} (with the magnitudes of the joint powers, which the objective smooths)",
+            certified.unsmoothed_cost_of_transport
+        ));
+    }
     lines.extend(certificate.failures.iter().map(|failure| format!("  failure: {failure}")));
     for check in &certificate.checks {
         let (value, limit) = (check.value_in_words(), check.limit_in_words());

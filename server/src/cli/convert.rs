@@ -1,7 +1,7 @@
 //! `gaitwright convert`: converts a gait for other programs. Not to controller files: only the record knows safety
 //! reports.
 
-use super::gait_file::read_gait;
+use super::gait_file::read_gait_file;
 use super::out_file::OutFile;
 use super::output::data;
 use clap::{Args, ValueEnum};
@@ -41,7 +41,7 @@ pub(super) struct Convert {
 
 impl Convert {
     pub(super) fn run(self) -> Result<(), Error> {
-        let gait = read_gait(&self.gait)?;
+        let gait = read_gait_file(&self.gait)?.gait;
         let out = self.out.as_deref().map(|out| OutFile::open(out, &[&self.gait])).transpose()?;
         let text = match self.to {
             Form::Csv => gait_csv(&gait),

@@ -1,25 +1,32 @@
 //! Reads a gait from a file of `solve --out`, or from a gait file of the service.
 
 use super::problem::read;
-use gait_optimizer::{Gait, SolveOutcome};
+use gait_optimizer::{Gait, SolveOutcome, SolveReport};
 use gaitwright_service::document;
 use gaitwright_service::error::Error;
 use serde_json::Value;
 use std::path::Path;
 
-/// Reads the gait.
+/// A gait, with the report of its solve if the file has one.
+pub(super) struct GaitFile {
+    pub(super) gait: Gait,
+    pub(super) report: Option<SolveReport>,
+}
+
+/// Reads a gait file.
 ///
 /// # Errors
 /// [`Error::Malformed`] with the file's name and the reason.
-pub(super) fn read_gait(path: &Path) -> Result<Gait, Error> {
+pub(super) fn read_gait_file(path: &Path) -> Result<GaitFile, Error> {
     let text = read(path)?;
     let bytes = text.as_bytes();
-    let gait = document::read::<Value>(bytes).and_then(|value| {
+    let file = document::read::<Value>(bytes).and_then(|value| {
         if value.get("gait").is_some() {
-            document::read::<SolveOutcome>(bytes).map(|outcome| outcome.gait)
+            let SolveOutcome { gait, report, .. } = document::read(bytes)?;
+            Ok(GaitFile { gait, report: Some(report) })
         } else {
-            document::read(bytes)
+            Ok(GaitFile { gait: document::read(bytes)?, report: None })
         }
     });
-    gait.map_err(|e| Error::Malformed(format!("{} is not a gait file: {e}", path.display())))
+    file.map_err(|e| Error::Malformed(format!("{} is not a gait file: {e}", path.display())))
 }

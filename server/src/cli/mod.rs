@@ -19,6 +19,7 @@ mod out_file;
 mod output;
 mod problem;
 mod reference;
+mod reference_comparison;
 mod reproduce;
 mod scheduled_backups;
 mod serve;

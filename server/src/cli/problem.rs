@@ -29,8 +29,9 @@ pub(super) struct ProblemFiles {
     /// {"limits": {"speed_min_m_s": 1.1}, "muscles": {"sol": {"max_force_n": 3500}}}.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// JSON reference gait written by `gaitwright reference` (default: the built-in one).
-    #[arg(long, value_name = "FILE")]
+    /// Reference gait: `falisse-2019` (one adult), `fukuchi-2018` (median of 24 adults), or a JSON file written by
+    /// `gaitwright reference` (default: falisse-2019).
+    #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Settings of the interior-point method that differ from the defaults (JSON), as in {"tau_min": 0.995,
     /// "linear_solver": "delayed_pivots"}. The error for an unknown name lists the known ones.
@@ -79,9 +80,12 @@ fn options_with_solver(text: &str) -> Result<SolveOptions, Error> {
     Ok(options)
 }
 
-/// Reads a reference gait, or returns the built-in one.
+/// The built-in reference gait of this name, or the one in this file; without either the default one.
 pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> {
     let Some(path) = path else { return Ok(ReferenceGait::builtin()?) };
+    if let Some((_, builtin)) = ReferenceGait::all_builtin()?.into_iter().find(|(name, _)| path.as_os_str() == *name) {
+        return Ok(builtin);
+    }
     read_document(path, "a reference gait", |read: &ReferenceGait| Ok(read.validate()?))
 }
 

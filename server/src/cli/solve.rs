@@ -6,10 +6,12 @@ use super::numbers::whole;
 use super::out_file::OutFile;
 use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal, read_document};
+use super::reference_comparison;
 use super::serve::cores_or;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
+use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
 use gait_optimizer::{
     BasinChoice, GaitProblem, InitialGuess, ModelError, SolveError, SolveOptions, SolveOutcome, SolveReport,
     SolveStatus, StartedFrom, TunedBounds, solve,
@@ -85,6 +87,8 @@ struct Figures<'a> {
     #[serde(flatten)]
     report: &'a SolveReport,
     lineage: &'a Lineage,
+    /// Distances of a converged gait from the reference gait of the problem and from the built-in ones.
+    reference_gaits: &'a [ReferenceComparison],
     #[serde(skip_serializing_if = "Option::is_none")]
     certificate: Option<&'a Certificate>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -133,6 +137,7 @@ impl Solve {
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
         let explain = self.explain;
+        let reference = problem.reference.clone();
         let pool = Pool::new(1);
         let solved = pool.run(move |_| {
             let mut observer = |record: &gait_optimizer::IterationRecord| {
@@ -155,6 +160,8 @@ impl Solve {
         bar.finish_and_clear();
         let lineage = Lineage::of(&outcome, start.as_ref());
         let converged = outcome.report.status == SolveStatus::Converged;
+        let comparisons =
+            if converged { compare_with_references(&outcome.gait, &reference)? } else { Vec::new() };
         let certificate = if self.certify && converged {
             let gait = outcome.gait.clone();
             Some(pool.run(move |_| certify(&gait)).await??)
@@ -166,12 +173,13 @@ impl Solve {
             let figures = Figures {
                 report: &outcome.report,
                 lineage: &lineage,
+                reference_gaits: &comparisons,
                 certificate: certificate.as_ref(),
                 explanation: explanation.as_ref(),
             };
             data(&serde_json::to_string_pretty(&figures).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
-            data(&for_people(&outcome, &lineage, start.as_ref(), explanation.as_ref()))?;
+            data(&for_people(&outcome, &comparisons, &lineage, start.as_ref(), explanation.as_ref()))?;
             if let Some(certificate) = &certificate {
                 data(&super::certify::for_people(certificate))?;
             }
@@ -201,6 +209,7 @@ pub(super) fn status_word(status: SolveStatus) -> &'static str {
 
 fn for_people(
     outcome: &SolveOutcome,
+    comparisons: &[ReferenceComparison],
     lineage: &Lineage,
     start: Option<&Start>,
     explanation: Option<&Explanation>,
@@ -209,7 +218,6 @@ fn for_people(
     let mut lines = vec![
         format!("{} after {} iterations, {:.2} s", status_word(r.status), r.iterations, r.seconds_total),
         format!("  cost of transport  {:.5}   objective {:.5}", r.cost_of_transport, r.objective),
-        format!("  Gait RMSE          {:.4} rad", r.gait_rmse_rad),
         format!("  speed              {:.3} m/s   stride {:.3} m", r.speed_m_s, r.stride_length_m),
         format!("  largest violation  {:.1e}", r.max_violation),
         format!(
@@ -217,6 +225,11 @@ fn for_people(
             r.variables, r.equalities, r.inequalities
         ),
     ];
+    if comparisons.is_empty() {
+        lines.insert(2, format!("  Gait RMSE          {:.4} rad", r.gait_rmse_rad));
+    } else {
+        lines.splice(2..2, reference_comparison::in_words(comparisons));
+    }
     lines.extend(linear_algebra_in_words(r));
     lines.extend(lineage_in_words(r, lineage, start));
     lines.extend(basins_in_words(r));

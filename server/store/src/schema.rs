@@ -348,6 +348,8 @@ pub struct LinearAlgebra {
 pub struct Certificate {
     /// Version of this layout and of its checks.
     pub format_version: u32,
+    /// The gait that was checked; null if it is malformed.
+    pub certified: Option<CertifiedGait>,
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
     /// Reasons if it failed; otherwise empty.
@@ -362,6 +364,46 @@ pub struct Certificate {
     pub free_hip_return_map: Option<ReturnMap>,
     /// Largest pushes from which the walker recovers. Null if the gait is not stable.
     pub pushes: Option<Pushes>,
+}
+
+/// What a certificate is about, computed from the gait.
+#[derive(Debug, ToSchema)]
+pub struct CertifiedGait {
+    /// SHA-256 of the gait as compact JSON, hexadecimal.
+    pub gait_sha256: String,
+    /// Version of the optimiser that made the certificate.
+    pub optimizer_version: String,
+    /// The subject.
+    pub subject: CertifiedSubject,
+    /// Name of the device. `differences` tells whether its values are those of the built-in device.
+    pub device: String,
+    /// Whether the muscle constraints were checked.
+    pub muscles: bool,
+    /// Values of the device and of the settings that differ from AMPRO3 and the default settings.
+    pub differences: Vec<CertifiedDifference>,
+    /// Mechanical cost of transport with the magnitudes of the joint powers. The objective, and with it
+    /// `cost_of_transport` of a trial, has a smoothed magnitude, which is smaller.
+    pub unsmoothed_cost_of_transport: f64,
+}
+
+/// Height and mass of a certified walker.
+#[derive(Debug, ToSchema)]
+pub struct CertifiedSubject {
+    /// Body height, m.
+    pub height_m: f64,
+    /// Body mass, kg.
+    pub body_mass_kg: f64,
+}
+
+/// A value that differs from the built-in problem.
+#[derive(Debug, ToSchema)]
+pub struct CertifiedDifference {
+    /// Name, as in the gait: `settings.limits.friction`, `device.knee_torque_limit_n_m`.
+    pub name: String,
+    /// Value of the gait; null if it is not set.
+    pub value: Value,
+    /// Value of the built-in problem; null if it is not set.
+    pub built_in: Value,
 }
 
 /// The worst value of a quantity.

@@ -7,7 +7,7 @@ use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
-use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};
+use gait_optimizer::certificate::{Certificate, Check, Difference, RECOVERY_STRIDES};
 use gaitwright_service::access::Run;
 use gaitwright_service::studies::certification;
 use gaitwright_store::{TrialId, commit};
@@ -27,6 +27,16 @@ pub(super) struct InWords {
 impl InWords {
     pub(super) fn new(certificate: Certificate) -> Self {
         let mut figures = Vec::new();
+        if let Some(certified) = &certificate.certified {
+            figures.push(("Gait (SHA-256)", certified.gait_sha256.clone()));
+            figures.push(("Walker", certified.walker_in_words()));
+            let differences: Vec<String> = certified.differences.iter().map(Difference::in_words).collect();
+            let none = || "none".to_owned();
+            let words = (!differences.is_empty()).then(|| differences.join("; ")).unwrap_or_else(none);
+            figures.push(("Differences from the built-in device and the default settings", words));
+            let cost = format::number(certified.unsmoothed_cost_of_transport);
+            figures.push(("Cost of transport with the magnitudes of the joint powers", cost));
+        }
         if let Some(map) = &certificate.return_map {
             figures.push(("Largest Poincaré multiplier", format::number(map.largest)));
             let (found, resolved) =

@@ -1,4 +1,4 @@
-//! The built-in entries of a new record: the subjects of the paper, the device and the reference gait.
+//! The built-in entries of a new record: the subjects of the paper, the device and the reference gaits.
 
 use crate::error::Error;
 use gait_optimizer as optimizer;
@@ -21,7 +21,7 @@ pub async fn device(db: &mut Connection) -> Result<Device, Error> {
     Ok(devices::ensure(db, &optimizer::Device::ampro3()?).await?.0)
 }
 
-/// The built-in reference gait of the record.
+/// The default reference gait of the record.
 ///
 /// # Errors
 /// Errors of the database.
@@ -35,7 +35,10 @@ pub async fn reference_gait(db: &mut Connection) -> Result<ReferenceGait, Error>
 /// Errors of the database.
 pub async fn ensure(db: &mut Connection) -> Result<(), Error> {
     device(db).await?;
-    reference_gait(db).await?;
+    // The default one last, so that lists of a new record begin with it.
+    for (_, definition) in optimizer::ReferenceGait::all_builtin()?.iter().rev() {
+        reference_gaits::ensure(db, definition).await?;
+    }
     for (number, pseudonym, notes) in PAPER {
         if subjects::by_pseudonym(db, pseudonym).await?.is_none() {
             subjects::insert(db, pseudonym, optimizer::Subject::builtin(number)?, notes).await?;
