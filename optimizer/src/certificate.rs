@@ -112,7 +112,7 @@ pub fn certify(gait: &Gait) -> Result<Certificate, ModelError> {
     gait.validate()?;
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
     let mut certificate = Certificate::empty(residuals::residuals(&model, gait));
-    certificate.certified = Some(CertifiedGait::new(gait, model.total_mass)?);
+    certificate.certified = Some(CertifiedGait::of(gait)?);
     if let Err(fall) = simulate(&model, gait, &mut certificate) {
         certificate.fall = Some(fall.to_string());
     }

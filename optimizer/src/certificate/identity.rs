@@ -1,5 +1,6 @@
 //! What a certificate is about: which gait of which walker, and every value that differs from the built-in problem.
 
+use crate::body::WalkerModel;
 use crate::device::Device;
 use crate::gait::Gait;
 use crate::metrics::unsmoothed_cost_of_transport;
@@ -41,11 +42,13 @@ pub struct Difference {
 }
 
 impl CertifiedGait {
-    /// The identity of a well-formed gait of a walker with this total mass in kg.
+    /// What a certificate of the gait is about, without certifying it.
     ///
     /// # Errors
-    /// [`ModelError`] if the built-in device is invalid or the gait has numbers that JSON cannot represent.
-    pub(super) fn new(gait: &Gait, total_mass_kg: f64) -> Result<Self, ModelError> {
+    /// [`ModelError`] if the gait is malformed.
+    pub fn of(gait: &Gait) -> Result<Self, ModelError> {
+        gait.validate()?;
+        let total_mass_kg = WalkerModel::new(&gait.subject, &gait.device)?.total_mass;
         let text = serde_json::to_vec(gait).map_err(|e| unreadable("gait", &e))?;
         Ok(Self {
             gait_sha256: Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect(),
