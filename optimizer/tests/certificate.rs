@@ -168,7 +168,15 @@ fn effort_at_nodes_j(gait: &Gait) -> f64 {
     let of_domain = |domain: &DomainTrajectory| {
         let last = domain.q.len() - 1;
         let power_w = |k: usize| (0..6).map(|i| (domain.u[k][i] * domain.qd[k][3 + i]).abs()).sum::<f64>();
-        let weight = |k: usize| if k == 0 || k == last { 1.0 } else if k % 2 == 1 { 4.0 } else { 2.0 };
+        let weight = |k: usize| {
+            if k == 0 || k == last {
+                1.0
+            } else if k % 2 == 1 {
+                4.0
+            } else {
+                2.0
+            }
+        };
         let sum: f64 = (0..=last).map(|k| weight(k) * power_w(k)).sum();
         domain.duration_s * sum / (3.0 * last as f64)
     };

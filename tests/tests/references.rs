@@ -25,6 +25,37 @@ async fn service() -> (tempfile::TempDir, Service) {
 }
 
 #[tokio::test]
+async fn gait_rmse_is_not_compared_between_studies_with_different_reference_gaits() {
+    let (_folder, service) = service().await;
+    let all = service.fetch("/api/v1/reference-gaits").await.items();
+    let ids: Vec<gaitwright_store::ReferenceGaitId> =
+        all.as_array().unwrap().iter().map(|one| one["id"].as_str().unwrap().parse().unwrap()).collect();
+    assert_eq!(all[0]["name"], "Falisse 2019, subject 1");
+    assert_eq!(all[1]["name"], "Fukuchi 2018, median of 24 adults");
+    let mut studies = Vec::new();
+    for reference in [ids[0], ids[0], ids[1]] {
+        let study = service.study(|new| (new.reference_gait_id, new.trial_budget) = (Some(reference), 2)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        studies.push(study);
+    }
+    let warning = "The studies have different reference gaits";
+    for (other, comparable) in [(1, true), (2, false)] {
+        let (a, b) = (studies[0], studies[other]);
+        let rows = service.fetch(&format!("/api/v1/study-comparison?ids={a},{b}")).await.items();
+        for row in rows.as_array().unwrap() {
+            assert_eq!(row["best_gait_rmse_rad"].is_number(), comparable, "{row}");
+            assert!(row["best_cost_of_transport"].is_number() && row["reference_gait_id"].is_string(), "{row}");
+        }
+        let page = service.fetch(&format!("/studies/compare?a={a}&b={b}")).await.text;
+        assert_eq!(page.contains("Gait RMSE of the best trial"), comparable);
+        assert_eq!(page.contains("class=\"sided\""), comparable);
+        assert_eq!(page.contains(warning), !comparable);
+        let figures = service.fetch(&format!("/studies/{a}/figures?other={b}")).await.text;
+        assert_eq!(figures.contains(warning), !comparable);
+    }
+}
+
+#[tokio::test]
 async fn imported_recording_becomes_the_reference_of_a_study() {
     let (_folder, service) = service().await;
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await;

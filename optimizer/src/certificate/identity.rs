@@ -125,10 +125,7 @@ fn differences(gait: &Gait) -> Result<Vec<Difference>, ModelError> {
     // An optional value is in one of the two only.
     let only_built_in = built_in.iter().filter(|(name, _)| found.iter().all(|(other, _)| other != name));
     let names = found.iter().chain(only_built_in).map(|(name, _)| name);
-    let pairs = names.map(|name| Difference {
-        value: of(&found, name),
-        built_in: of(&built_in, name),
-        name: name.clone(),
-    });
+    let pairs =
+        names.map(|name| Difference { value: of(&found, name), built_in: of(&built_in, name), name: name.clone() });
     Ok(pairs.filter(|pair| pair.value != pair.built_in).collect())
 }

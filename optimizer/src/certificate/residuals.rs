@@ -76,7 +76,8 @@ pub(super) fn residuals_on(model: &WalkerModel, gait: &Gait, between_nodes: usiz
             if let (Some(muscles), Some(written)) = (&mut here.muscles, written) {
                 muscles.fibre_length = written;
             }
-            let point = GridPoint { instant: &here, place: CheckLocation::within(trajectory, share), on_mesh: node.is_some() };
+            let point =
+                GridPoint { instant: &here, place: CheckLocation::within(trajectory, share), on_mesh: node.is_some() };
             if let (Some(written), Some(of_cubic)) = (written, of_cubic) {
                 muscle_residuals::note_written(&point, &written, &of_cubic, &mut worst);
             }

@@ -52,7 +52,9 @@ fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -
              gait, give it with --reference.",
             reference.name
         )),
-        Some((name, computed, stated)) => Err(format!("it states {name} as {stated}; computed from the gait it is {computed}.")),
+        Some((name, computed, stated)) => {
+            Err(format!("it states {name} as {stated}; computed from the gait it is {computed}."))
+        }
     }
 }
 

@@ -160,8 +160,7 @@ impl Solve {
         bar.finish_and_clear();
         let lineage = Lineage::of(&outcome, start.as_ref());
         let converged = outcome.report.status == SolveStatus::Converged;
-        let comparisons =
-            if converged { compare_with_references(&outcome.gait, &reference)? } else { Vec::new() };
+        let comparisons = if converged { compare_with_references(&outcome.gait, &reference)? } else { Vec::new() };
         let certificate = if self.certify && converged {
             let gait = outcome.gait.clone();
             Some(pool.run(move |_| certify(&gait)).await??)

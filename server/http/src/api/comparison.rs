@@ -15,7 +15,7 @@ use gaitwright_service::studies::choice::ranking_to_show;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::{self, StudyState};
 use gaitwright_store::trials::{self, TrialCounts};
-use gaitwright_store::{StudyId, consents, schema};
+use gaitwright_store::{ReferenceGaitId, StudyId, consents, schema};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use utoipa::ToSchema;
@@ -37,6 +37,8 @@ pub(super) struct StudyComparison {
     name: String,
     muscles: bool,
     seed: u64,
+    /// The reference gait of Gait RMSE.
+    reference_gait_id: ReferenceGaitId,
     state: StudyState,
     trials: TrialCounts,
     /// Number of the recommended trial.
@@ -44,7 +46,8 @@ pub(super) struct StudyComparison {
     /// Action of the recommended trial.
     #[schema(value_type = Option<schema::Bounds>)]
     best_action: Option<TunedBounds>,
-    /// Gait RMSE of the recommended trial, rad.
+    /// Gait RMSE of the recommended trial, rad. Null in every row if the compared studies have different reference gaits,
+    /// because values against different reference gaits cannot be compared.
     best_gait_rmse_rad: Option<f64>,
     /// Cost of transport of the recommended trial.
     best_cost_of_transport: Option<f64>,
@@ -82,6 +85,9 @@ pub(super) async fn get(
         let id = id.accessible(&mut *app.read().await?, authorized.caller.reach()).await?;
         rows.push(row(&mut app, id).await?);
     }
+    if rows.windows(2).any(|pair| pair[0].reference_gait_id != pair[1].reference_gait_id) {
+        rows.iter_mut().for_each(|row| row.best_gait_rmse_rad = None);
+    }
     Ok(Json(paging.cut_by_place(rows)?))
 }
 
@@ -104,6 +110,7 @@ async fn row(app: &mut AppState, id: StudyId) -> Result<StudyComparison, Refusal
         name: snapshot.study.plan.name.clone(),
         muscles: snapshot.study.plan.muscles,
         seed: snapshot.study.plan.seed,
+        reference_gait_id: snapshot.study.plan.reference_gait_id,
         state: snapshot.study.state,
         trials: counts,
         best_trial: best.map(|trial| trial.number),

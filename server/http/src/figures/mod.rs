@@ -12,4 +12,4 @@ pub(crate) mod trial;
 
 pub(crate) use course::{COURSE, course, warm_starts};
 pub(crate) use outcome::Outcome;
-pub(crate) use study_results::StudyResults;
+pub(crate) use study_results::{StudyResults, have_one_reference_gait};

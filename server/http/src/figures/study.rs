@@ -2,7 +2,7 @@
 
 use super::course::{COURSE, course, warm_starts};
 use super::outcome::Outcome;
-use super::study_results::StudyResults;
+use super::study_results::{StudyResults, have_one_reference_gait};
 use crate::state::AppState;
 use gait_optimizer::walking::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
@@ -104,7 +104,12 @@ pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<Stud
 }
 
 fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {
-    let snapshots: Vec<_> = shown.iter().map(|best| (&best.results.snapshot, &best.outcome)).collect();
+    let mut snapshots: Vec<_> = shown.iter().map(|best| (&best.results.snapshot, &best.outcome)).collect();
+    let mut course_hint = "Figure 3b of the paper, which compares a study with muscles and one without.";
+    if !have_one_reference_gait(&snapshots.iter().map(|(snapshot, _)| *snapshot).collect::<Vec<_>>()) {
+        snapshots.truncate(1);
+        course_hint = "The studies have different reference gaits, so their Gait RMSE cannot be compared.";
+    }
     let gaits: Vec<(&str, &Gait)> = shown.iter().filter_map(|best| Some((best.name(), best.gait.as_ref()?))).collect();
     let mut tiles = Vec::new();
     for (name, gait) in &gaits {
@@ -115,7 +120,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
         Section {
             id: COURSE,
             heading: "Gait RMSE of the best action by iteration",
-            hint: "Figure 3b of the paper, which compares a study with muscles and one without.".to_owned(),
+            hint: course_hint.to_owned(),
             figures: charts(COURSE, course(&snapshots).into_iter().collect()),
         },
         Section {

@@ -7,15 +7,22 @@ use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::trials::TrialCounts;
-use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
+use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
 
 /// How many of the newest trials of a large study are drawn.
 const NEWEST: u32 = 200;
 
-/// A study with its snapshot.
+/// Whether these studies have the same reference gait. Otherwise their Gait RMSE measures different things.
+pub(crate) fn have_one_reference_gait(studies: &[&StudySnapshot]) -> bool {
+    studies.windows(2).all(|pair| pair[0].study.plan.reference_gait_id == pair[1].study.plan.reference_gait_id)
+}
+
+/// A study with its snapshot and its reference gait.
 pub(crate) struct StudyResults {
     pub(crate) snapshot: StudySnapshot,
     pub(crate) subject: String,
+    /// Name of the reference gait.
+    pub(crate) reference_gait: String,
     pub(crate) counts: TrialCounts,
 }
 
@@ -24,13 +31,14 @@ impl StudyResults {
         let study = studies::get(db, id).await?;
         consents::may_be_shown(db, id).await?;
         let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
+        let reference_gait = reference_gaits::get(db, study.plan.reference_gait_id).await?.name;
         let counts = trials::counts(db, id).await?;
         let snapshot = if counts.total as usize >= MANY {
             StudySnapshot::newest(db, study, NEWEST).await?
         } else {
             StudySnapshot::read(db, study).await?
         };
-        Ok(Self { snapshot, subject, counts })
+        Ok(Self { snapshot, subject, reference_gait, counts })
     }
 
     pub(crate) fn outcome(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Outcome, Error> {

@@ -5,7 +5,7 @@ use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extract::Params;
-use crate::figures::{COURSE, Outcome, StudyResults, course};
+use crate::figures::{COURSE, Outcome, StudyResults, course, have_one_reference_gait};
 use crate::format::{self, words};
 use crate::page_error::{Page, page};
 use askama::Template;
@@ -49,6 +49,8 @@ impl SideBySide {
 struct Compared {
     a: Study,
     b: Study,
+    /// Whether the studies have the same reference gait; otherwise no Gait RMSE is shown.
+    comparable: bool,
     chart: Option<Drawn>,
     /// Names of studies without a best action to draw.
     without_course: Vec<String>,
@@ -85,13 +87,15 @@ pub(super) async fn get(
 }
 
 /// The properties and results of the study.
-fn rows(study: &StudyResults, outcome: &Outcome) -> Vec<(String, String)> {
+/// The properties and results of a study.
+fn rows(study: &StudyResults, outcome: &Outcome, comparable: bool) -> Vec<(String, String)> {
     let plan = &study.snapshot.study.plan;
     let best = outcome.best.and_then(|id| study.snapshot.trial(id));
     let seconds: f64 = study.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
     let mut rows = vec![
         ("State".to_owned(), words(study.snapshot.study.state.as_str())),
         ("Subject".to_owned(), study.subject.clone()),
+        ("Reference gait".to_owned(), study.reference_gait.clone()),
         ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
         ("Answered by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
         ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
@@ -100,12 +104,13 @@ fn rows(study: &StudyResults, outcome: &Outcome) -> Vec<(String, String)> {
         ("Converged".to_owned(), study.counts.converged.to_string()),
         ("Total solve time, s".to_owned(), format!("{seconds:.0}")),
         ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
-        ("Gait RMSE of the best trial, rad".to_owned(), format::figure(best.and_then(|trial| trial.gait_rmse_rad))),
-        (
-            "Cost of transport of the best trial".to_owned(),
-            format::figure(best.and_then(|trial| trial.cost_of_transport)),
-        ),
     ];
+    if comparable {
+        let rmse = best.and_then(|trial| trial.gait_rmse_rad);
+        rows.push(("Gait RMSE of the best trial, rad".to_owned(), format::figure(rmse)));
+    }
+    let cost = best.and_then(|trial| trial.cost_of_transport);
+    rows.push(("Cost of transport of the best trial".to_owned(), format::figure(cost)));
     let bounds = best.map(|trial| trial.action.to_array());
     for (place, name) in TunedBounds::NAMES.iter().enumerate() {
         let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
@@ -116,15 +121,19 @@ fn rows(study: &StudyResults, outcome: &Outcome) -> Vec<(String, String)> {
 
 fn compare(pool: &OnPool, a: StudyResults, b: StudyResults, beliefs: &Beliefs) -> Result<Compared, Error> {
     let (of_a, of_b) = (a.outcome(pool, beliefs)?, b.outcome(pool, beliefs)?);
-    let chart = course(&[(&a.snapshot, &of_a), (&b.snapshot, &of_b)]).map(|chart| {
+    let comparable = have_one_reference_gait(&[&a.snapshot, &b.snapshot]);
+    let both = [(&a.snapshot, &of_a), (&b.snapshot, &of_b)];
+    let chart = if comparable { course(&both) } else { None };
+    let chart = chart.map(|chart| {
         let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
         Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
     });
-    let properties = rows(&a, &of_a).into_iter().zip(rows(&b, &of_b));
+    let properties = rows(&a, &of_a, comparable).into_iter().zip(rows(&b, &of_b, comparable));
     let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, outcome)| outcome.course().is_empty());
     Ok(Compared {
         rows: properties.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
         without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
+        comparable,
         chart,
         a: a.snapshot.study,
         b: b.snapshot.study,
