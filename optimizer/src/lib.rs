@@ -21,6 +21,7 @@ pub mod phase_portrait;
 mod quadrature;
 pub mod reference;
 pub mod reference_comparison;
+pub mod sensitivity;
 pub mod settings;
 mod signal_filter;
 pub mod solve;

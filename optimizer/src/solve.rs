@@ -23,12 +23,14 @@ pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use options::{BasinChoice, SolveOptions};
 use outcome::{SolveTally, other_basin, outcome};
 use phases::SolveContext;
+pub(crate) use phases::final_settings;
 pub use progress::{CancelToken, IterationRecord, SolvePhase};
 pub use report::{
     CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus,
     StartedFrom, Violation,
 };
 pub use warm_start::WarmStart;
+pub(crate) use warm_start::check_shape;
 use warm_start::on_mesh_of;
 
 /// Solves a gait problem. Without a time limit ([`SolveOptions::time_limit_s`]), equal inputs give equal bits.

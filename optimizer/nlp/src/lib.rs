@@ -111,6 +111,7 @@ mod primal_dual;
 mod program_checks;
 mod restoration;
 mod search_direction;
+mod sensitivity;
 mod settings;
 mod solve;
 mod start;
@@ -118,6 +119,7 @@ mod status;
 mod vector_instructions;
 
 pub use nonlinear_program::{EliminationBlocks, NonlinearProgram, SparsityPattern};
+pub use sensitivity::{ParameterDerivative, Sensitivity, SensitivityError, sensitivities};
 pub use settings::{BarrierStrategy, BoundMultiplierStart, DualRegularisation, LinearSolver, NlpSettings};
 pub use solve::solve;
 pub use start::{StartPoint, WarmPoint};

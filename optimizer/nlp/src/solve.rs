@@ -36,37 +36,18 @@ pub fn solve(
     }
     check_start(&form, start)?;
 
-    let (x, push, fraction) = match start {
-        StartPoint::Cold(x) => (x, settings.bound_push, settings.bound_fraction),
-        StartPoint::Warm(warm) => (&warm.x, settings.warm_bound_push, settings.warm_bound_fraction),
-    };
-    let mut point = PrimalDual::zeros(&form);
-    for j in 0..form.n {
-        point.w[j] = form.fixed[j].unwrap_or_else(|| pushed(x[j], form.lower[j], form.upper[j], push, fraction));
-    }
-    if let Some(limit) = settings.gradient_scaling {
-        form.scale_by_gradients(&point.w, limit);
-    }
-    // Slacks start at g(x) or at those of the warm point.
-    let mut c = vec![0.0; form.m];
-    form.constraints(&point.w, &mut c);
-    for i in 0..form.m {
-        if let RowForm::Inequality(k) = form.rows[i] {
-            let j = form.n + k;
-            let value = match start {
-                StartPoint::Warm(warm) if !warm.slacks.is_empty() => warm.slacks[i] * form.row_scale[i],
-                _ => c[i],
-            };
-            point.w[j] = pushed(value, form.lower[j], form.upper[j], push, fraction);
+    let multiplier = settings.warm_multiplier_push;
+    let (pushes, mu) = match start {
+        StartPoint::Cold(_) => {
+            let (bound, fraction) = (settings.bound_push, settings.bound_fraction);
+            (Pushes { bound, fraction, multiplier }, settings.mu_initial)
         }
-    }
-    let mu = match start {
-        StartPoint::Cold(_) => settings.mu_initial,
-        StartPoint::Warm(warm) => {
-            take_multipliers(&form, warm, settings, &mut point);
-            settings.mu_warm.unwrap_or(settings.mu_initial)
+        StartPoint::Warm(_) => {
+            let (bound, fraction) = (settings.warm_bound_push, settings.warm_bound_fraction);
+            (Pushes { bound, fraction, multiplier }, settings.mu_warm.unwrap_or(settings.mu_initial))
         }
     };
+    let point = place(&mut form, start, settings, pushes);
     let mut run = Iterate::new(form, point, mu);
     run.evaluate();
     check_evaluations(&run)?;
@@ -110,6 +91,50 @@ pub fn solve(
     Ok(report(&mut run, &session, ending, analysis))
 }
 
+/// Least distances of a start from the boundary of the feasible set.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pushes {
+    /// Relative distance from a bound.
+    pub bound: f64,
+    /// The same as a fraction of the distance between two bounds.
+    pub fraction: f64,
+    /// Smallest bound multiplier of a warm point.
+    pub multiplier: f64,
+}
+
+/// The point of a start within its bounds, in the scaling that it determines. Without multipliers for a cold start.
+pub(crate) fn place(form: &mut Formulation, start: &StartPoint, settings: &NlpSettings, pushes: Pushes) -> PrimalDual {
+    let x = match start {
+        StartPoint::Cold(x) => x,
+        StartPoint::Warm(warm) => &warm.x,
+    };
+    let within = |value: f64, lower: f64, upper: f64| pushed(value, lower, upper, pushes.bound, pushes.fraction);
+    let mut point = PrimalDual::zeros(form);
+    for j in 0..form.n {
+        point.w[j] = form.fixed[j].unwrap_or_else(|| within(x[j], form.lower[j], form.upper[j]));
+    }
+    if let Some(limit) = settings.gradient_scaling {
+        form.scale_by_gradients(&point.w, limit);
+    }
+    // Slacks start at g(x) or at those of the warm point.
+    let mut c = vec![0.0; form.m];
+    form.constraints(&point.w, &mut c);
+    for i in 0..form.m {
+        if let RowForm::Inequality(k) = form.rows[i] {
+            let j = form.n + k;
+            let value = match start {
+                StartPoint::Warm(warm) if !warm.slacks.is_empty() => warm.slacks[i] * form.row_scale[i],
+                _ => c[i],
+            };
+            point.w[j] = within(value, form.lower[j], form.upper[j]);
+        }
+    }
+    if let StartPoint::Warm(warm) = start {
+        take_multipliers(form, warm, pushes.multiplier, &mut point);
+    }
+    point
+}
+
 /// `value`, moved to at least min(push max(1, |bound|), fraction (u - l)) from its bounds (WB06 section 3.6).
 fn pushed(value: f64, lower: f64, upper: f64, push: f64, fraction: f64) -> f64 {
     let width = fraction * (upper - lower);
@@ -123,8 +148,7 @@ fn pushed(value: f64, lower: f64, upper: f64, push: f64, fraction: f64) -> f64 {
     value
 }
 
-fn take_multipliers(form: &Formulation, warm: &WarmPoint, settings: &NlpSettings, point: &mut PrimalDual) {
-    let least = settings.warm_multiplier_push;
+fn take_multipliers(form: &Formulation, warm: &WarmPoint, least: f64, point: &mut PrimalDual) {
     let f = form.objective_scale;
     for j in 0..form.n {
         if form.lower[j].is_finite() {
@@ -151,7 +175,7 @@ fn take_multipliers(form: &Formulation, warm: &WarmPoint, settings: &NlpSettings
     }
 }
 
-fn check_start(form: &Formulation, start: &StartPoint) -> Result<(), NlpError> {
+pub(crate) fn check_start(form: &Formulation, start: &StartPoint) -> Result<(), NlpError> {
     let check = |name: &str, values: &[f64], expected: usize| {
         if values.len() != expected {
             return Err(NlpError::InvalidStart(format!("{name} has length {}, expected {expected}", values.len())));

@@ -42,7 +42,7 @@ impl GaitFigures {
     }
 
     /// The figures of a well-formed gait of this walker.
-    pub(super) fn of_well_formed(gait: &Gait, model: &WalkerModel, reference: &ReferenceGait) -> Self {
+    pub(crate) fn of_well_formed(gait: &Gait, model: &WalkerModel, reference: &ReferenceGait) -> Self {
         let rmse = gait_rmse(gait, reference);
         let energy_j: f64 = gait.domains.iter().map(|domain| energy_j(gait, domain)).sum();
         Self {

@@ -222,17 +222,25 @@ impl<'a> AttemptRun<'a> {
         )
     }
 
-    /// Solves to the final tolerance. The projection into the bounds may change rows by up to a hundred times the
-    /// distance, so bounds are relaxed by little compared with the tolerance, and the violation has a margin.
     fn last_phase(&self, settings: &NlpSettings) -> NlpSettings {
-        let tolerance = self.context.options.tolerance;
-        NlpSettings {
-            tolerance,
-            violation_tolerance: settings.violation_tolerance.min(VIOLATION_SHARE * CONVERGED_VIOLATION),
-            bound_relaxation: settings.bound_relaxation.min(0.01 * tolerance),
-            ..*settings
-        }
+        to_final_tolerance(settings, self.context.options.tolerance)
     }
+}
+
+/// Solves to the final tolerance. The projection into the bounds may change rows by up to a hundred times the distance,
+/// so bounds are relaxed by little compared with the tolerance, and the violation has a margin.
+fn to_final_tolerance(settings: &NlpSettings, tolerance: f64) -> NlpSettings {
+    NlpSettings {
+        tolerance,
+        violation_tolerance: settings.violation_tolerance.min(VIOLATION_SHARE * CONVERGED_VIOLATION),
+        bound_relaxation: settings.bound_relaxation.min(0.01 * tolerance),
+        ..*settings
+    }
+}
+
+/// Settings of the solver in the last phase of a solve.
+pub(crate) fn final_settings(options: &SolveOptions) -> NlpSettings {
+    to_final_tolerance(&options.solver, options.tolerance)
 }
 
 /// The result of a solve that ended at its starting point.

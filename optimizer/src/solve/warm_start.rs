@@ -60,7 +60,7 @@ pub(super) fn on_mesh_of(
     })
 }
 
-fn check_shape(programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveError> {
+pub(crate) fn check_shape(programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveError> {
     let point = &warm.point;
     let (n, m) = (programme.variables(), programme.rows());
     for (name, found, expected) in [

@@ -11,6 +11,7 @@ use super::serve::cores_or;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
+use gait_optimizer::sensitivity::{GaitSensitivities, GaitSensitivityError, sensitivities};
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
 use gait_optimizer::{
     BasinChoice, GaitProblem, InitialGuess, ModelError, SolveError, SolveOptions, SolveOutcome, SolveReport,
@@ -79,6 +80,10 @@ pub(super) struct Solve {
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
     #[arg(long)]
     certify: bool,
+    /// For a converged gait, print how figures change with each tuned bound, to first order, where the bound is active, and
+    /// how far it can move until the active constraints change. With --json, adds the member `sensitivities`.
+    #[arg(long)]
+    sensitivities: bool,
 }
 
 /// The printed figures, with the certificate or the explanation if requested.
@@ -93,6 +98,8 @@ struct Figures<'a> {
     certificate: Option<&'a Certificate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     explanation: Option<&'a Explanation>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensitivities: Option<&'a GaitSensitivities>,
 }
 
 /// The content of the output file.
@@ -137,7 +144,7 @@ impl Solve {
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
         let explain = self.explain;
-        let reference = problem.reference.clone();
+        let (reference, solved_problem) = (problem.reference.clone(), problem.clone());
         let pool = Pool::new(1);
         let solved = pool.run(move |_| {
             let mut observer = |record: &gait_optimizer::IterationRecord| {
@@ -167,6 +174,12 @@ impl Solve {
         } else {
             None
         };
+        let sensitivities = if self.sensitivities && converged {
+            let (problem, warm_start) = (solved_problem, outcome.warm_start.clone());
+            Some(pool.run(move |_| sensitivities(&problem, &warm_start, &options)).await?.map_err(refusal)?)
+        } else {
+            None
+        };
         // Print the figures first, so that they are not lost if the file cannot be written.
         if self.json {
             let figures = Figures {
@@ -175,12 +188,16 @@ impl Solve {
                 reference_gaits: &comparisons,
                 certificate: certificate.as_ref(),
                 explanation: explanation.as_ref(),
+                sensitivities: sensitivities.as_ref(),
             };
             data(&serde_json::to_string_pretty(&figures).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
             data(&for_people(&outcome, &comparisons, &lineage, start.as_ref(), explanation.as_ref()))?;
             if let Some(certificate) = &certificate {
                 data(&super::certify::for_people(certificate))?;
+            }
+            if let Some(sensitivities) = &sensitivities {
+                data(&sensitivities.sentences().join("\n"))?;
             }
         }
         if outcome.report.status == SolveStatus::Cancelled {
@@ -191,6 +208,14 @@ impl Solve {
             out.write(&serde_json::to_string(&kept).map_err(|e| Error::Internal(e.to_string()))?)?;
         }
         Ok(Ended::Done)
+    }
+}
+
+/// Why a gait has no sensitivities.
+fn refusal(error: GaitSensitivityError) -> Error {
+    match error {
+        GaitSensitivityError::Solve(error) => error.into(),
+        other => Error::conflict(format!("The sensitivities of this gait cannot be computed: {other}.")),
     }
 }
 

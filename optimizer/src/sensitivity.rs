@@ -1,0 +1,80 @@
+//! Sensitivities of a gait with respect to the tuned bounds: what changes, to first order, if a bound moves.
+//!
+//! The derivative of the primal-dual point comes from one factorisation at the solution
+//! ([`interior_point::sensitivities`]). Margins that tighten bounds between nodes are constant: a tightened bound moves with
+//! its tuned bound. Derivatives are valid while the active constraints stay the same, which [`BoundSensitivity::interval`]
+//! predicts to first order.
+
+mod active;
+mod figures;
+mod parameter;
+mod words;
+
+pub use active::ActiveConstraint;
+pub use figures::FigureDerivatives;
+
+use crate::gait_problem::GaitProblem;
+use crate::solve::{SolveError, SolveOptions, WarmStart, final_settings};
+use crate::tuned_bounds::TunedBounds;
+use interior_point::SensitivityError;
+use serde::Serialize;
+use thiserror::Error;
+
+/// The sensitivities of a gait with respect to every tuned bound.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GaitSensitivities {
+    /// One for each tuned bound, in the order of an action.
+    pub bounds: Vec<BoundSensitivity>,
+}
+
+/// The sensitivity with respect to one tuned bound. Derivatives are per unit of the bound.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoundSensitivity {
+    /// Name of the bound.
+    pub bound: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// The constraints that it sets and that are active. Empty: small changes of the bound change nothing.
+    pub active: Vec<ActiveConstraint>,
+    /// Derivatives of the figures of the gait.
+    pub derivatives: FigureDerivatives,
+    /// Values of the bound between which the active constraints stay the same, to first order; `None` if they do for every
+    /// value in that direction.
+    pub interval: (Option<f64>, Option<f64>),
+    /// Whether a constraint is about to become active or inactive, so that the derivatives to both sides differ.
+    pub is_weakly_active: bool,
+}
+
+/// Why a gait has no sensitivities.
+#[derive(Debug, Error)]
+pub enum GaitSensitivityError {
+    /// The problem or the warm start is invalid.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The solution is not regular.
+    #[error(transparent)]
+    Sensitivity(#[from] SensitivityError),
+}
+
+/// The sensitivities of the converged gait `solution` of `problem`. `options` are those of its solve.
+///
+/// # Errors
+/// [`GaitSensitivityError`] if the input is invalid or the solution is not regular.
+pub fn sensitivities(
+    problem: &GaitProblem,
+    solution: &WarmStart,
+    options: &SolveOptions,
+) -> Result<GaitSensitivities, GaitSensitivityError> {
+    let points = point_sensitivities(problem, solution, options)?;
+    let bounds = (0..TunedBounds::COUNT).map(|bound| points.of_bound(problem, solution, bound));
+    Ok(GaitSensitivities { bounds: bounds.collect() })
+}
+
+/// The primal-dual sensitivities with respect to every tuned bound.
+fn point_sensitivities(
+    problem: &GaitProblem,
+    solution: &WarmStart,
+    options: &SolveOptions,
+) -> Result<parameter::PointSensitivities, GaitSensitivityError> {
+    parameter::PointSensitivities::new(problem, solution, &final_settings(options))
+}

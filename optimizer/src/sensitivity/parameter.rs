@@ -1,0 +1,130 @@
+//! How the gait problem depends on a tuned bound, and how its solution follows.
+
+use super::active::{self, ActiveSet};
+use super::figures::FigureDerivatives;
+use super::{BoundSensitivity, GaitSensitivityError};
+use crate::gait_problem::{GaitProblem, GaitProgramme};
+use crate::solve::{SolveError, WarmStart, check_shape};
+use crate::subject::ModelError;
+use crate::tuned_bounds::TunedBounds;
+use interior_point::{NlpSettings, NonlinearProgram, ParameterDerivative, Sensitivity};
+
+/// Step of the differences, as a share of the allowed range of a bound. Bounds and rows are piecewise linear in the tuned
+/// bounds, so that differences are exact up to rounding.
+const STEP: f64 = 1e-6;
+
+/// The programme at a solution, how it depends on each tuned bound, and how the solution follows.
+pub(super) struct PointSensitivities {
+    pub(super) programme: GaitProgramme,
+    parameters: Vec<ParameterDerivative>,
+    sensitivities: Vec<Sensitivity>,
+}
+
+impl PointSensitivities {
+    pub(super) fn new(
+        problem: &GaitProblem,
+        solution: &WarmStart,
+        settings: &NlpSettings,
+    ) -> Result<Self, GaitSensitivityError> {
+        let programme = problem.programme(problem.muscles).map_err(SolveError::from)?;
+        if solution.muscles != problem.muscles || solution.mesh != problem.settings.mesh {
+            return Err(SolveError::WarmStartShape("it has another variant or mesh than the problem".to_owned()).into());
+        }
+        check_shape(&programme, solution)?;
+        let programme = programme.tightened(&solution.margins);
+        let parameters: Result<Vec<_>, ModelError> =
+            (0..TunedBounds::COUNT).map(|bound| parameter(problem, &programme, solution, bound)).collect();
+        let parameters = parameters.map_err(SolveError::from)?;
+        let sensitivities = interior_point::sensitivities(&programme, &solution.point, settings, &parameters)?;
+        Ok(Self { programme, parameters, sensitivities })
+    }
+
+    pub(super) fn of_bound(&self, problem: &GaitProblem, solution: &WarmStart, bound: usize) -> BoundSensitivity {
+        let (parameter, sensitivity) = (&self.parameters[bound], &self.sensitivities[bound]);
+        let value = problem.bounds.to_array()[bound];
+        let set = ActiveSet::new(&self.programme, &solution.point);
+        let (back, forth) = set.steps(parameter, &sensitivity.point);
+        BoundSensitivity {
+            bound: TunedBounds::NAMES[bound],
+            value,
+            active: active::of_parameter(&self.programme, &set, parameter),
+            derivatives: FigureDerivatives::along(problem, &self.programme, &solution.point.x, sensitivity),
+            interval: (back.map(|step| value + step), forth.map(|step| value + step)),
+            is_weakly_active: set.is_weak(parameter),
+        }
+    }
+}
+
+/// The derivatives of the programme with respect to a tuned bound.
+fn parameter(
+    problem: &GaitProblem,
+    programme: &GaitProgramme,
+    solution: &WarmStart,
+    bound: usize,
+) -> Result<ParameterDerivative, ModelError> {
+    let (low, high) = TunedBounds::RANGES[bound];
+    let step = STEP * (high - low);
+    let moved = |by: f64| -> Result<Parts, ModelError> {
+        let mut values = problem.bounds.to_array();
+        values[bound] += by;
+        // Not validated: the step may leave the allowed range by little.
+        let bounds = TunedBounds::unvalidated(values);
+        let moved = GaitProblem { bounds, ..problem.clone() }.programme(problem.muscles)?;
+        Ok(Parts::new(&moved.tightened(&solution.margins), solution))
+    };
+    let (more, less) = (moved(step)?, moved(-step)?);
+    let difference = |of: fn(&Parts) -> &Vec<f64>| -> Vec<f64> {
+        let pairs = of(&more).iter().zip(of(&less));
+        // Infinite bounds do not move.
+        pairs.map(|(more, less)| if more == less { 0.0 } else { (more - less) / (2.0 * step) }).collect()
+    };
+    Ok(ParameterDerivative {
+        lagrangian_gradient: difference(|parts| &parts.lagrangian_gradient),
+        rows: difference(|parts| &parts.rows),
+        lower: difference(|parts| &parts.lower),
+        upper: difference(|parts| &parts.upper),
+        row_lower: difference(|parts| &parts.row_lower),
+        row_upper: difference(|parts| &parts.row_upper),
+        // The objective does not depend on tuned bounds.
+        ..ParameterDerivative::zeros(programme.variables(), programme.rows())
+    })
+}
+
+/// The parts of a programme that can depend on a tuned bound, at the point of a solution.
+struct Parts {
+    lagrangian_gradient: Vec<f64>,
+    rows: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    row_lower: Vec<f64>,
+    row_upper: Vec<f64>,
+}
+
+impl Parts {
+    fn new(programme: &GaitProgramme, solution: &WarmStart) -> Self {
+        let (n, m) = (programme.variables(), programme.rows());
+        let (x, y) = (&solution.point.x, &solution.point.row_multipliers);
+        let zeros = |length| vec![0.0; length];
+        let mut parts = Self {
+            lagrangian_gradient: zeros(n),
+            rows: zeros(m),
+            lower: zeros(n),
+            upper: zeros(n),
+            row_lower: zeros(m),
+            row_upper: zeros(m),
+        };
+        programme.variable_bounds(&mut parts.lower, &mut parts.upper);
+        programme.row_bounds(&mut parts.row_lower, &mut parts.row_upper);
+        programme.constraints(x, &mut parts.rows);
+        programme.gradient(x, &mut parts.lagrangian_gradient);
+        let pattern = programme.jacobian_pattern();
+        let mut jacobian = zeros(pattern.row_indices.len());
+        programme.jacobian(x, &mut jacobian);
+        for j in 0..n {
+            for q in pattern.column_starts[j]..pattern.column_starts[j + 1] {
+                parts.lagrangian_gradient[j] += jacobian[q] * y[pattern.row_indices[q]];
+            }
+        }
+        parts
+    }
+}
