@@ -65,16 +65,7 @@ pub fn sensitivities(
     solution: &WarmStart,
     options: &SolveOptions,
 ) -> Result<GaitSensitivities, GaitSensitivityError> {
-    let points = point_sensitivities(problem, solution, options)?;
+    let points = parameter::PointSensitivities::new(problem, solution, &final_settings(options))?;
     let bounds = (0..TunedBounds::COUNT).map(|bound| points.of_bound(problem, solution, bound));
     Ok(GaitSensitivities { bounds: bounds.collect() })
-}
-
-/// The primal-dual sensitivities with respect to every tuned bound.
-fn point_sensitivities(
-    problem: &GaitProblem,
-    solution: &WarmStart,
-    options: &SolveOptions,
-) -> Result<parameter::PointSensitivities, GaitSensitivityError> {
-    parameter::PointSensitivities::new(problem, solution, &final_settings(options))
 }

@@ -43,11 +43,6 @@ macro_rules! tuned_bounds {
                 [$(&mut self.$name),+]
             }
 
-            /// Bounds from values in the order of an action, which may be outside their ranges.
-            pub(crate) fn unvalidated([$($name),+]: [f64; Self::COUNT]) -> Self {
-                Self { $($name),+ }
-            }
-
             /// Validated bounds from values in the order of an action.
             ///
             /// # Errors

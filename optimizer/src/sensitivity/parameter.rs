@@ -64,19 +64,21 @@ fn parameter(
 ) -> Result<ParameterDerivative, ModelError> {
     let (low, high) = TunedBounds::RANGES[bound];
     let step = STEP * (high - low);
-    let moved = |by: f64| -> Result<Parts, ModelError> {
+    let value = problem.bounds.to_array()[bound];
+    // One-sided at the ends of the range.
+    let (least, most) = ((value - step).max(low), (value + step).min(high));
+    let moved = |to: f64| -> Result<Parts, ModelError> {
         let mut values = problem.bounds.to_array();
-        values[bound] += by;
-        // Not validated: the step may leave the allowed range by little.
-        let bounds = TunedBounds::unvalidated(values);
+        values[bound] = to;
+        let bounds = TunedBounds::from_array(values)?;
         let moved = GaitProblem { bounds, ..problem.clone() }.programme(problem.muscles)?;
         Ok(Parts::new(&moved.tightened(&solution.margins), solution))
     };
-    let (more, less) = (moved(step)?, moved(-step)?);
+    let (more, less) = (moved(most)?, moved(least)?);
     let difference = |of: fn(&Parts) -> &Vec<f64>| -> Vec<f64> {
         let pairs = of(&more).iter().zip(of(&less));
         // Infinite bounds do not move.
-        pairs.map(|(more, less)| if more == less { 0.0 } else { (more - less) / (2.0 * step) }).collect()
+        pairs.map(|(more, less)| if more == less { 0.0 } else { (more - less) / (most - least) }).collect()
     };
     Ok(ParameterDerivative {
         lagrangian_gradient: difference(|parts| &parts.lagrangian_gradient),

@@ -11,8 +11,8 @@ use super::serve::cores_or;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
-use gait_optimizer::sensitivity::{GaitSensitivities, GaitSensitivityError, sensitivities};
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
+use gait_optimizer::sensitivity::{GaitSensitivities, GaitSensitivityError, sensitivities};
 use gait_optimizer::{
     BasinChoice, GaitProblem, InitialGuess, ModelError, SolveError, SolveOptions, SolveOutcome, SolveReport,
     SolveStatus, StartedFrom, TunedBounds, solve,
