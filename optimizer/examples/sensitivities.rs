@@ -60,7 +60,7 @@ fn step(bound: &BoundSensitivity) -> f64 {
     let (low, high) = bound.interval;
     let room = [low.map(|low| bound.value - low), high.map(|high| high - bound.value)];
     let room = room.into_iter().flatten().fold(f64::INFINITY, f64::min);
-    (0.3 * room).min(1e-3 * bound.value.abs().max(1e-2))
+    (0.3 * room).min(1e-4 * bound.value.abs().max(1e-2))
 }
 
 /// The places of the active constraints of every bound.

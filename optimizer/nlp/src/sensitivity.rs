@@ -123,8 +123,19 @@ pub fn sensitivities(
     let mut iterate = Iterate::new(form, at, mu);
     iterate.evaluate();
     iterate.form.hessian(&iterate.point.w, Some(&iterate.point.y), &mut iterate.at.hessian);
-    let mut system = factorised(&iterate, settings)?;
-    parameters.iter().map(|parameter| sensitivity(&iterate, settings, &mut system, parameter)).collect()
+    let matrix = KktMatrix::new(&iterate.form);
+    let solver = factorisation::choose(&iterate.form, &matrix, settings)?;
+    let mut system = NewtonSystem::new(matrix, solver);
+    system.fit(&iterate.form);
+    loop {
+        factorise(&iterate, &mut system)?;
+        let found =
+            parameters.iter().map(|parameter| sensitivity(&iterate, settings, &mut system, parameter)).collect();
+        // Another factorisation may be more accurate.
+        if !matches!(found, Err(SensitivityError::Inaccurate(_))) || !system.distrust() {
+            return found;
+        }
+    }
 }
 
 fn check_lengths(form: &Formulation, parameter: &ParameterDerivative) -> Result<(), SensitivityError> {
@@ -144,16 +155,12 @@ fn check_lengths(form: &Formulation, parameter: &ParameterDerivative) -> Result<
     (0..form.n).find(moved).map_or(Ok(()), |j| Err(SensitivityError::FixedVariable(j)))
 }
 
-/// The factorised Newton system without regularisation.
-fn factorised(iterate: &Iterate, settings: &NlpSettings) -> Result<NewtonSystem, SensitivityError> {
-    let matrix = KktMatrix::new(&iterate.form);
-    let solver = factorisation::choose(&iterate.form, &matrix, settings)?;
-    let mut system = NewtonSystem::new(matrix, solver);
-    system.fit(&iterate.form);
+/// Factorises the Newton system without regularisation.
+fn factorise(iterate: &Iterate, system: &mut NewtonSystem) -> Result<(), SensitivityError> {
     loop {
         let inertia = system.factor(&iterate.form, &iterate.point, &iterate.at, (0.0, 0.0), MatrixChange::Any);
         if inertia.is_some_and(|inertia| inertia.zero == 0 && inertia.negative == iterate.form.m) {
-            return Ok(system);
+            return Ok(());
         }
         if !system.distrust() {
             return Err(SensitivityError::Irregular);

@@ -94,11 +94,14 @@ fn solution(problem: &dyn NonlinearProgram, start: &[f64], settings: &NlpSetting
     result
 }
 
+/// Lower bounds of x, and bounds of the two rows.
+type Parameters = ([f64; 4], f64, f64);
+type Change = fn(Parameters, f64) -> Parameters;
+
 #[test]
 fn sensitivities_agree_with_central_differences_of_solves() {
     let start = [1.0, 5.0, 5.0, 1.0];
     let base = ([1.0; 4], 25.0, 40.0);
-    type Change = fn(([f64; 4], f64, f64), f64) -> ([f64; 4], f64, f64);
     let parameters: [(Change, ParameterDerivative); 3] = [
         (|(l, p, s), by| (l, p + by, s), ParameterDerivative { row_lower: vec![1.0, 0.0], ..zeros() }),
         (

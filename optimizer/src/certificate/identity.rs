@@ -51,7 +51,7 @@ impl CertifiedGait {
         let total_mass_kg = WalkerModel::new(&gait.subject, &gait.device)?.total_mass;
         let text = serde_json::to_vec(gait).map_err(|e| unreadable("gait", &e))?;
         Ok(Self {
-            gait_sha256: Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect(),
+            gait_sha256: hexadecimal(&Sha256::digest(&text)),
             optimizer_version: env!("CARGO_PKG_VERSION").to_owned(),
             subject: gait.subject,
             device: gait.device.name.clone(),
@@ -77,6 +77,11 @@ impl Difference {
         let words = |value: &Value| if value.is_null() { "not set".to_owned() } else { value.to_string() };
         format!("{} is {} (built-in: {})", self.name, words(&self.value), words(&self.built_in))
     }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    let digit = |value: u8| char::from_digit(u32::from(value), 16).unwrap_or_default();
+    bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
 }
 
 fn unreadable(what: &str, error: &serde_json::Error) -> ModelError {

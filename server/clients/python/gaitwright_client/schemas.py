@@ -369,6 +369,8 @@ class _CertificateRequired(TypedDict):
 class Certificate(_CertificateRequired, total=False):
     """A certificate: what an independent simulation of a gait found."""
 
+    # The gait that was checked; null if it is malformed.
+    certified: Optional[CertifiedGait]
     # How the simulation ended early; null if it did not.
     fall: Optional[str]
     # The stride-to-stride map with a free hip velocity (zero dynamics).
@@ -395,6 +397,46 @@ class CertificateCheck(_CertificateCheckRequired, total=False):
     limit: Optional[float]
     # Worst value; null if it could not be determined, which counts as failed.
     value: Optional[float]
+
+
+class CertifiedDifference(TypedDict):
+    """A value that differs from the built-in problem."""
+
+    # Value of the built-in problem; null if it is not set.
+    built_in: Any
+    # Name, as in the gait: `settings.limits.friction`, `device.knee_torque_limit_n_m`.
+    name: str
+    # Value of the gait; null if it is not set.
+    value: Any
+
+
+class CertifiedGait(TypedDict):
+    """What a certificate is about, computed from the gait."""
+
+    # Name of the device. `differences` tells whether its values are those of the built-in device.
+    device: str
+    # Values of the device and of the settings that differ from AMPRO3 and the default settings.
+    differences: list[CertifiedDifference]
+    # SHA-256 of the gait as compact JSON, hexadecimal.
+    gait_sha256: str
+    # Whether the muscle constraints were checked.
+    muscles: bool
+    # Version of the optimiser that made the certificate.
+    optimizer_version: str
+    # The subject.
+    subject: CertifiedSubject
+    # Mechanical cost of transport with the magnitudes of the joint powers. The objective, and with it
+    # `cost_of_transport` of a trial, has a smoothed magnitude, which is smaller.
+    unsmoothed_cost_of_transport: float
+
+
+class CertifiedSubject(TypedDict):
+    """Height and mass of a certified walker."""
+
+    # Body mass, kg.
+    body_mass_kg: float
+    # Body height, m.
+    height_m: float
 
 
 class Change(TypedDict, total=False):
@@ -2276,6 +2318,8 @@ class _StudyComparisonRequired(TypedDict):
     id: StudyId
     muscles: bool
     name: str
+    # The reference gait of Gait RMSE.
+    reference_gait_id: ReferenceGaitId
     seed: int
     # Total time of all solves, s.
     solve_seconds: float
@@ -2290,7 +2334,8 @@ class StudyComparison(_StudyComparisonRequired, total=False):
     best_action: Optional[Bounds]
     # Cost of transport of the recommended trial.
     best_cost_of_transport: Optional[float]
-    # Gait RMSE of the recommended trial, rad.
+    # Gait RMSE of the recommended trial, rad. Null in every row if the compared studies have different reference gaits,
+    # because values against different reference gaits cannot be compared.
     best_gait_rmse_rad: Optional[float]
     # Number of the recommended trial.
     best_trial: Optional[int]

@@ -86,7 +86,9 @@ pub(super) async fn get(
         rows.push(row(&mut app, id).await?);
     }
     if rows.windows(2).any(|pair| pair[0].reference_gait_id != pair[1].reference_gait_id) {
-        rows.iter_mut().for_each(|row| row.best_gait_rmse_rad = None);
+        for row in &mut rows {
+            row.best_gait_rmse_rad = None;
+        }
     }
     Ok(Json(paging.cut_by_place(rows)?))
 }

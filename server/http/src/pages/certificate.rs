@@ -31,8 +31,7 @@ impl InWords {
             figures.push(("Gait (SHA-256)", certified.gait_sha256.clone()));
             figures.push(("Walker", certified.walker_in_words()));
             let differences: Vec<String> = certified.differences.iter().map(Difference::in_words).collect();
-            let none = || "none".to_owned();
-            let words = (!differences.is_empty()).then(|| differences.join("; ")).unwrap_or_else(none);
+            let words = if differences.is_empty() { "none".to_owned() } else { differences.join("; ") };
             figures.push(("Differences from the built-in device and the default settings", words));
             let cost = format::number(certified.unsmoothed_cost_of_transport);
             figures.push(("Cost of transport with the magnitudes of the joint powers", cost));
