@@ -25,6 +25,8 @@ mod serve;
 mod solve;
 pub mod study;
 mod sweep;
+#[cfg(feature = "tls")]
+mod tls;
 mod tune;
 mod unattended;
 mod users;
