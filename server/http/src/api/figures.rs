@@ -167,11 +167,13 @@ async fn response(app: &mut AppState, figures: Vec<Figure>, file: String) -> Res
         "csv" => ("text/csv; charset=utf-8", FigureFormat::Csv),
         _ => return Err(missing().into()),
     };
-    let draw = move |_: &OnPool| match format {
-        FigureFormat::Svg => Ok(figure.svg().into_bytes()),
-        FigureFormat::Csv => Ok(figure.csv().into_bytes()),
-        #[cfg(feature = "png")]
-        FigureFormat::Png => figure.png().map_err(|e| Error::Internal(e.to_string())),
+    let draw = move |_: &OnPool| -> Result<Vec<u8>, Error> {
+        match format {
+            FigureFormat::Svg => Ok(figure.svg().into_bytes()),
+            FigureFormat::Csv => Ok(figure.csv().into_bytes()),
+            #[cfg(feature = "png")]
+            FigureFormat::Png => figure.png().map_err(|e| Error::Internal(e.to_string())),
+        }
     };
     let bytes = app.compute(draw).await??;
     let headers = [
