@@ -16,9 +16,9 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::catalogue;
 use gaitwright_service::studies::retention;
 use gaitwright_service::studies::scheduler::Scheduler;
+use gaitwright_service::workers::{AfterSolves, Dispatch, GaitSolver, InProcess};
 #[cfg(feature = "nats")]
-use gaitwright_service::workers::nats::JetStream;
-use gaitwright_service::workers::{AfterSolves, Dispatch, GaitSolver, InProcess, LEASE};
+use gaitwright_service::workers::{LEASE, nats::JetStream};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, commit};
 use hyper_util::rt::{TokioExecutor, TokioTimer};
