@@ -1,10 +1,45 @@
 //! Messages of skipped tests.
 
+use std::fs::OpenOptions;
 use std::io::Write;
 
+/// Variable that names a file to which every skipped test adds a line.
+const FILE: &str = "GAITWRIGHT_SKIPPED";
+
 /// Reports on stderr, past the capture of the test harness, that the current test was skipped, and why.
+///
+/// # Panics
+/// If the file that `GAITWRIGHT_SKIPPED` names cannot be written.
 pub fn skipped(reason: &str) {
     let test = std::thread::current().name().unwrap_or("a test").to_owned();
+    let line = format!("{}{test}: skipped: {reason}\n", program());
     // A closed stderr has no reader, so the error is ignored.
-    let _ = writeln!(std::io::stderr(), "{test}: skipped: {reason}");
+    let _ = std::io::stderr().write_all(line.as_bytes());
+    if let Some(file) = std::env::var_os(FILE) {
+        // One write for each line, because test programs may run at the same time.
+        let written = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&file)
+            .and_then(|mut file| file.write_all(line.as_bytes()));
+        written.unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    }
+}
+
+/// The name of the test program, without the hash that Cargo adds to it: `serve::`.
+fn program() -> String {
+    let path = std::env::current_exe().unwrap_or_default();
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = name.rsplit_once('-').map_or(&*name, |(name, _)| name);
+    if name.is_empty() { String::new() } else { format!("{name}::") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::program;
+
+    #[test]
+    fn test_program_is_named_without_the_hash() {
+        assert_eq!(program(), "gaitwright_tests::");
+    }
 }

@@ -11,6 +11,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::client;
 use gaitwright_tests::large;
 use gaitwright_tests::service::Service;
+use gaitwright_tests::skipped::skipped;
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -119,8 +120,7 @@ impl Drop for SmallDisk {
 #[tokio::test]
 async fn full_file_system_is_reported_and_loses_no_acknowledged_change() {
     let Some(disk) = SmallDisk::mount() else {
-        println!("skipped: a small disk cannot be mounted here");
-        return;
+        return skipped("a small disk cannot be mounted here");
     };
     let service = Service::start(&disk.0.path().join("a.db"), Analytic::default(), 1).await;
     service.store.set_reserve(1 << 20);

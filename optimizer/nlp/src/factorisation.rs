@@ -23,6 +23,7 @@ mod null_space;
 mod ordering;
 mod schedule;
 mod substitution;
+#[cfg(feature = "supernodal")]
 mod supernodal;
 mod symbolic_analysis;
 mod thread_pool;

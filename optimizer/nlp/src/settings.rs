@@ -52,6 +52,7 @@ pub enum LinearSolver {
     #[default]
     Auto,
     /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes; one dense front for matrices of order up to 120.
+    /// Needs the feature `supernodal`, as do larger problems without elimination blocks.
     Supernodal,
     /// Static multifrontal LBL^T over the elimination blocks, with Bunch-Kaufman pivoting inside fronts.
     Multifrontal,

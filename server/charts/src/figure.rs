@@ -1,4 +1,4 @@
-//! Figures for download: a drawing as self-contained SVG, as PNG, or its values as CSV.
+//! Figures for download: a drawing as self-contained SVG, or its values as CSV.
 
 use super::chart::Chart;
 use super::gait_tiles;
@@ -7,14 +7,6 @@ use super::standalone::{self, Inside};
 use super::tree::Tree;
 use crate::csv_table::{CsvTable, cells};
 use gait_optimizer::walking::stick_figure::StickFigure;
-use resvg::usvg::fontdb::Source;
-use std::sync::Arc;
-use thiserror::Error;
-
-/// Pixels of a PNG per unit of the drawing, which gives 1280 for a chart.
-const SCALE: f32 = 2.0;
-/// Maximum number of pixels of a PNG. Large drawings get a smaller scale.
-const MOST_PIXELS: f32 = 1.2e7;
 
 /// A drawing with a file name.
 #[derive(Debug, Clone)]
@@ -36,17 +28,6 @@ pub enum Drawing {
     Map(HeatMap),
     /// The warm-start tree.
     Tree(Tree),
-}
-
-/// Why a PNG cannot be made.
-#[derive(Debug, Error)]
-pub enum PngError {
-    /// The SVG cannot be read.
-    #[error("Cannot draw a figure: {0}.")]
-    Svg(#[from] resvg::usvg::Error),
-    /// The pixels cannot be allocated or encoded.
-    #[error("Cannot draw a figure: {0}.")]
-    Pixels(String),
 }
 
 impl Figure {
@@ -100,24 +81,6 @@ impl Figure {
                 standalone::svg(self.title(), &inside, &[])
             }
         }
-    }
-
-    /// PNG, with text in the embedded font DejaVu Sans.
-    ///
-    /// # Errors
-    /// [`PngError`], which is a bug in the program.
-    pub fn png(&self) -> Result<Vec<u8>, PngError> {
-        let mut options = resvg::usvg::Options { font_family: "DejaVu Sans".to_owned(), ..Default::default() };
-        options.fontdb_mut().load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
-        let tree = resvg::usvg::Tree::from_str(&self.svg(), &options)?;
-        let scale = SCALE.min((MOST_PIXELS / (tree.size().width() * tree.size().height())).sqrt());
-        let size = tree.size().to_int_size().scale_by(scale);
-        let size = size.ok_or_else(|| PngError::Pixels("it has no size".to_owned()))?;
-        let pixels = resvg::tiny_skia::Pixmap::new(size.width(), size.height());
-        let mut pixels = pixels.ok_or_else(|| PngError::Pixels("it is too large".to_owned()))?;
-        let transform = resvg::tiny_skia::Transform::from_scale(scale, scale);
-        resvg::render(&tree, transform, &mut pixels.as_mut());
-        pixels.encode_png().map_err(|e| PngError::Pixels(e.to_string()))
     }
 
     /// The values as CSV, with a row for each point of each line.
@@ -237,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn large_tree_is_self_contained_with_a_legend_and_within_the_pixel_limit() {
+    fn large_tree_is_self_contained_with_a_legend() {
         let node = |i: usize| Node {
             parent: i.checked_sub(1),
             label: format!("trial {}", i + 1),
@@ -252,22 +215,6 @@ mod tests {
         assert!(
             figure.csv().starts_with("what,grew_out_of,state\ntrial 1,,not_converged\ntrial 2,trial 1,not_converged\n")
         );
-        let pixels = resvg::tiny_skia::Pixmap::decode_png(&figure.png().unwrap()).unwrap();
-        assert!((pixels.width() * pixels.height()) as f32 <= MOST_PIXELS * 1.01);
-    }
-
-    #[test]
-    fn png_has_text_lines_and_a_white_background() {
-        let png = figure().png().unwrap();
-        let pixels = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
-        let colour = |x, y| pixels.pixel(x, y).map(|p| (p.red(), p.green(), p.blue(), p.alpha()));
-        assert_eq!(colour(1, 1), Some((255, 255, 255, 255)));
-        // Only the title is above the drawing, so dark pixels there are text.
-        let dark = (0..pixels.width()).any(|x| (4..40).any(|y| colour(x, y).is_some_and(|(r, ..)| r < 100)));
-        assert!(dark, "no title was drawn");
-        let blue = |p: &resvg::tiny_skia::PremultipliedColorU8| (p.red(), p.green(), p.blue()) == (0x0a, 0x6f, 0x8a);
-        assert!(pixels.pixels().iter().any(blue), "no line in its colour was drawn");
-        assert_eq!(png, figure().png().unwrap());
     }
 
     #[test]

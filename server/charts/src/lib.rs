@@ -15,6 +15,8 @@ pub mod gait_series;
 pub mod gait_table;
 mod gait_tiles;
 mod heat_map;
+#[cfg(feature = "png")]
+mod png;
 mod reference_band;
 mod sparkline;
 mod standalone;
@@ -22,9 +24,12 @@ mod tree;
 
 pub use axis::power_of_ten;
 pub use chart::{Band, Chart, Series, Span, Stroke};
-pub use figure::{Drawing, Figure, PngError};
+pub use figure::{Drawing, Figure};
 pub use gait_tiles::gait_tiles;
 pub use heat_map::{Cell, HeatMap};
+#[cfg(feature = "png")]
+pub use png::PngError;
 pub use reference_band::{band_in_words, over_reference};
 pub use sparkline::sparkline;
+pub use standalone::STYLE_SHEET;
 pub use tree::{Node, Tree};

@@ -5,7 +5,8 @@ use super::chart::escape;
 use std::collections::HashMap;
 use std::fmt::Write;
 
-const STYLE_SHEET: &str = include_str!("../../../web/static/gaitwright.css");
+/// The style sheet of the pages, which has the colours and dashes of drawings.
+pub const STYLE_SHEET: &str = include_str!("../gaitwright.css");
 /// Space above the drawing for the title, and to its left.
 const TITLE: f64 = 34.0;
 const MARGIN: f64 = 10.0;

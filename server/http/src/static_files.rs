@@ -8,7 +8,7 @@ use gaitwright_service::error::Error;
 use rust_embed::Embed;
 
 #[derive(Embed)]
-#[folder = "../../web/static"]
+#[folder = "web/static"]
 struct Files;
 
 /// `GET /static/{path}`. Browsers revalidate by content hash, so a new version is used at once.

@@ -26,6 +26,8 @@ mod serve;
 mod solve;
 pub mod study;
 mod sweep;
+#[cfg(feature = "tls")]
+mod tls;
 mod tune;
 mod unattended;
 mod users;

@@ -3,7 +3,8 @@
 use super::config::{Flags, Settings};
 use super::output::tell;
 use super::scheduled_backups::ClaimedPlan;
-use axum_server::tls_rustls::{RustlsAcceptor, RustlsConfig};
+#[cfg(feature = "tls")]
+use super::tls;
 use axum_server::{Handle, Server};
 use clap::Args;
 use gaitwright_http::access_log::keep_pruning;
@@ -15,14 +16,14 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::catalogue;
 use gaitwright_service::studies::retention;
 use gaitwright_service::studies::scheduler::Scheduler;
-use gaitwright_service::workers::nats::JetStream;
-use gaitwright_service::workers::{AfterSolves, Dispatch, GaitSolver, InProcess, LEASE};
+use gaitwright_service::workers::{AfterSolves, Dispatch, GaitSolver, InProcess};
+#[cfg(feature = "nats")]
+use gaitwright_service::workers::{LEASE, nats::JetStream};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, commit};
 use hyper_util::rt::{TokioExecutor, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
 use std::net::{SocketAddr, TcpListener};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -67,8 +68,10 @@ impl Serve {
         let backups = settings.backups()?;
         // Check all settings before any file is created.
         let reserve = settings.reserve_bytes()?;
+        let secure = tls.is_some();
+        #[cfg(feature = "tls")]
         let tls = match tls {
-            Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
+            Some((certificate, key)) => Some(tls::acceptor(certificate, key).await?),
             None => None,
         };
         let cannot_listen = |e: std::io::Error| Error::Malformed(format!("Cannot listen on {listen}: {e}."));
@@ -83,7 +86,7 @@ impl Serve {
         commit(writer).await?;
         let mut access = if sign_in { Access::by_sign_in(sessions.idle_seconds) } else { Access::without_sign_in() };
         access.limits = sessions;
-        access.secure = tls.is_some();
+        access.secure = secure;
 
         let scheme = if access.secure { "https" } else { "http" };
         let origin = format!("{scheme}://{address}");
@@ -91,8 +94,9 @@ impl Serve {
 
         let size = cores_or(workers);
         let engine: Arc<dyn Dispatch> = match settings.nats()? {
+            #[cfg(feature = "nats")]
             Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
-            None => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
+            _ => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
         };
         let scheduler = Scheduler::new(&store, engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
@@ -137,8 +141,9 @@ impl Serve {
         let mut server = Server::<Peer>::from_listener(listener).handle(handle);
         cut_off_silence(server.http_builder());
         let served = match tls {
-            Some(config) => server.acceptor(RustlsAcceptor::new(config)).http1_only().serve(service).await,
-            None => server.http1_only().serve(service).await,
+            #[cfg(feature = "tls")]
+            Some(acceptor) => server.acceptor(acceptor).http1_only().serve(service).await,
+            _ => server.http1_only().serve(service).await,
         };
         scheduler.stop();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
@@ -164,19 +169,6 @@ impl Serve {
 /// Closes connections that send no request.
 fn cut_off_silence(http: &mut Builder<TokioExecutor>) {
     http.http1().timer(TokioTimer::new()).header_read_timeout(SILENCE);
-}
-
-async fn certificate_of(certificate: PathBuf, key: PathBuf) -> Result<RustlsConfig, Error> {
-    // Fails only if the same provider is already installed.
-    let _ = rustls::crypto::ring::default_provider().install_default();
-    let name = certificate.display().to_string();
-    let read = RustlsConfig::from_pem_file(certificate, key)
-        .await
-        .map_err(|e| Error::Malformed(format!("Cannot use the certificate {name} and its key: {e}.")))?;
-    // The timeout above exists for HTTP/1 only.
-    let mut config = rustls::ServerConfig::clone(&read.get_inner());
-    config.alpn_protocols = vec![b"http/1.1".to_vec()];
-    Ok(RustlsConfig::from_config(Arc::new(config)))
 }
 
 /// The given number, or the number of cores.

@@ -2,12 +2,16 @@
 
 use super::config::{Flags, Settings};
 use super::numbers::workers;
+#[cfg(feature = "nats")]
 use super::serve::{cores_or, interrupted};
 use clap::Args;
 use gaitwright_service::error::Error;
+#[cfg(feature = "nats")]
 use gaitwright_service::workers::{GaitSolver, LEASE, nats};
 use std::path::PathBuf;
+#[cfg(feature = "nats")]
 use std::sync::Arc;
+#[cfg(feature = "nats")]
 use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, Args)]
@@ -34,6 +38,14 @@ impl Worker {
         Flags::of_broker(self.config.clone(), self.nats.clone(), self.nats_queue.clone())
     }
 
+    #[cfg(not(feature = "nats"))]
+    #[allow(clippy::unused_async)]
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        settings.nats()?;
+        Err(Error::Malformed("This program was built without the feature nats, which workers need.".to_owned()))
+    }
+
+    #[cfg(feature = "nats")]
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let missing = || settings.refused("nats", "the address of a NATS broker, nats://HOST:PORT");
         let (url, queue) = settings.nats()?.ok_or_else(missing)?;
@@ -60,6 +72,7 @@ impl Worker {
 }
 
 /// The name of this machine, if known.
+#[cfg(feature = "nats")]
 fn host() -> String {
     std::fs::read_to_string("/etc/hostname").map_or_else(|_| "worker".to_owned(), |name| name.trim().to_owned())
 }

@@ -8,18 +8,18 @@ use std::path::Path;
 
 /// Version, description and text of each migration. Never edit a file; add the next one.
 const FILES: &[(i64, &str, &str)] = &[
-    (1, "baseline", include_str!("../../../migrations/0001_baseline.sql")),
-    (2, "checksums", include_str!("../../../migrations/0002_checksums.sql")),
-    (3, "imports", include_str!("../../../migrations/0003_imports.sql")),
-    (4, "sessions", include_str!("../../../migrations/0004_sessions.sql")),
-    (5, "access_log", include_str!("../../../migrations/0005_access_log.sql")),
-    (6, "allocations", include_str!("../../../migrations/0006_allocations.sql")),
-    (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
-    (8, "role changes", include_str!("../../../migrations/0008_role_changes.sql")),
-    (9, "safety reports", include_str!("../../../migrations/0009_safety_reports.sql")),
-    (10, "suggestions by action", include_str!("../../../migrations/0010_suggestions_by_action.sql")),
-    (11, "reviewed safety reports", include_str!("../../../migrations/0011_reviewed_safety_reports.sql")),
-    (12, "names", include_str!("../../../migrations/0012_names.sql")),
+    (1, "baseline", include_str!("../migrations/0001_baseline.sql")),
+    (2, "checksums", include_str!("../migrations/0002_checksums.sql")),
+    (3, "imports", include_str!("../migrations/0003_imports.sql")),
+    (4, "sessions", include_str!("../migrations/0004_sessions.sql")),
+    (5, "access_log", include_str!("../migrations/0005_access_log.sql")),
+    (6, "allocations", include_str!("../migrations/0006_allocations.sql")),
+    (7, "study members", include_str!("../migrations/0007_study_members.sql")),
+    (8, "role changes", include_str!("../migrations/0008_role_changes.sql")),
+    (9, "safety reports", include_str!("../migrations/0009_safety_reports.sql")),
+    (10, "suggestions by action", include_str!("../migrations/0010_suggestions_by_action.sql")),
+    (11, "reviewed safety reports", include_str!("../migrations/0011_reviewed_safety_reports.sql")),
+    (12, "names", include_str!("../migrations/0012_names.sql")),
 ];
 
 /// Newest schema version.

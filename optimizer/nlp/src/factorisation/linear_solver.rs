@@ -8,6 +8,7 @@ use super::kkt_solver::{Inertia, KktSolver, MatrixChange};
 use super::lazy_solver::LazySolver;
 use super::multifrontal::Multifrontal;
 use super::ordering;
+#[cfg(feature = "supernodal")]
 use super::supernodal::Supernodal;
 use crate::formulation::{Formulation, RowForm};
 use crate::kkt::KktMatrix;
@@ -15,6 +16,7 @@ use crate::settings::{LinearSolver, NlpSettings};
 use crate::status::NlpError;
 
 /// The multifrontal factorisation may take this many times the operations of the supernodal one.
+#[cfg(feature = "supernodal")]
 const WORTHWHILE: f64 = 4.0;
 
 /// Up to this order the matrix is one dense front whatever the setting, because pivoting over all of it is cheap. (A
@@ -27,7 +29,6 @@ pub(crate) fn choose(
     matrix: &KktMatrix,
     settings: &NlpSettings,
 ) -> Result<Box<dyn KktSolver>, NlpError> {
-    let supernodal = |order| Supernodal::new(&matrix.column_starts, &matrix.row_indices, order);
     let multifrontal = |front_of: &[usize], kinds: &[PivotKind], threads| {
         let room = RoomForDeferred::Padding;
         Multifrontal::new(&matrix.column_starts, &matrix.row_indices, front_of, kinds, room, threads)
@@ -42,15 +43,20 @@ pub(crate) fn choose(
         if settings.linear_solver == LinearSolver::Multifrontal {
             return Ok(Box::new(multifrontal(&vec![0; matrix.order], &alike, settings.threads)?));
         }
-        let minimum_degree = supernodal(None)?;
-        let front_of = minimum_degree.supernode_of_index();
-        return Ok(with_trusted(settings.linear_solver, minimum_degree, delayed(matrix, front_of)));
+        return without_blocks(matrix, settings.linear_solver);
     };
     let front_of = ordering::block_of_index_raised(form, blocks);
     let trusted = delayed(matrix, front_of.clone());
-    let other = supernodal(Some(ordering::block_order(form, blocks)))?;
-    if matches!(settings.linear_solver, LinearSolver::Supernodal | LinearSolver::DelayedPivots) {
-        return Ok(with_trusted(settings.linear_solver, other, trusted));
+    if settings.linear_solver == LinearSolver::DelayedPivots {
+        return Ok(trusted);
+    }
+    #[cfg(feature = "supernodal")]
+    let other = Supernodal::new(&matrix.column_starts, &matrix.row_indices, Some(ordering::block_order(form, blocks)))?;
+    if settings.linear_solver == LinearSolver::Supernodal {
+        #[cfg(feature = "supernodal")]
+        return Ok(Box::new(other));
+        #[cfg(not(feature = "supernodal"))]
+        return Err(not_built(matrix.order));
     }
     let variables = std::iter::repeat_n(PivotKind::Variable, form.n);
     let rows = form.rows.iter().map(|row| match row {
@@ -59,6 +65,7 @@ pub(crate) fn choose(
     });
     let kinds: Vec<PivotKind> = variables.chain(rows).collect();
     let two_stages = multifrontal(&front_of, &kinds, settings.threads)?;
+    #[cfg(feature = "supernodal")]
     if settings.linear_solver == LinearSolver::Auto && two_stages.flops() > WORTHWHILE * other.flops() {
         return Ok(with_trusted(settings.linear_solver, other, trusted));
     }
@@ -82,8 +89,27 @@ fn delayed(matrix: &KktMatrix, front_of: Vec<usize>) -> Box<dyn KktSolver> {
     Box::new(LazySolver::new(move || Ok(Box::new(DelayedPivots::new(&starts, &indices, &front_of)))))
 }
 
+/// Without elimination blocks: the supernodal factorisation in minimum-degree order.
+#[cfg(feature = "supernodal")]
+fn without_blocks(matrix: &KktMatrix, setting: LinearSolver) -> Result<Box<dyn KktSolver>, NlpError> {
+    let minimum_degree = Supernodal::new(&matrix.column_starts, &matrix.row_indices, None)?;
+    let front_of = minimum_degree.supernode_of_index();
+    Ok(with_trusted(setting, minimum_degree, delayed(matrix, front_of)))
+}
+
+#[cfg(not(feature = "supernodal"))]
+fn without_blocks(matrix: &KktMatrix, _: LinearSolver) -> Result<Box<dyn KktSolver>, NlpError> {
+    Err(not_built(matrix.order))
+}
+
+#[cfg(not(feature = "supernodal"))]
+fn not_built(order: usize) -> NlpError {
+    NlpError::Analysis { order, reason: "the feature supernodal of interior-point is off".to_owned() }
+}
+
 /// By setting: the supernodal factorisation, the trusted one, or (auto) the supernodal one with the trusted one as
 /// fallback.
+#[cfg(feature = "supernodal")]
 fn with_trusted(setting: LinearSolver, supernodal: Supernodal, trusted: Box<dyn KktSolver>) -> Box<dyn KktSolver> {
     match setting {
         LinearSolver::Supernodal => Box::new(supernodal),

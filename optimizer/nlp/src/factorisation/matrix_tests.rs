@@ -4,6 +4,7 @@ use super::delayed_pivots::DelayedPivots;
 use super::front::{PivotKind, RoomForDeferred};
 use super::kkt_solver::{Inertia, KktSolver, MatrixChange};
 use super::multifrontal::Multifrontal;
+#[cfg(feature = "supernodal")]
 use super::supernodal::Supernodal;
 
 /// Deterministic uniform numbers in (-1, 1).
@@ -57,6 +58,7 @@ impl Matrix {
         let order = self.starts.len() - 1;
         let front_of: Vec<usize> = (0..order).map(|i| i / width).collect();
         let mut solvers: Vec<(&'static str, Box<dyn KktSolver>)> = Vec::new();
+        #[cfg(feature = "supernodal")]
         if order > 1 {
             let own = Some((0..order).collect());
             solvers.push(("supernodal, AMD", Box::new(Supernodal::new(&self.starts, &self.rows, None).unwrap())));

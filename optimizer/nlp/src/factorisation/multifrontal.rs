@@ -126,6 +126,7 @@ impl Multifrontal {
     }
 
     /// Multiplications and additions of a factorisation.
+    #[cfg(feature = "supernodal")]
     pub(super) fn flops(&self) -> f64 {
         self.forest.fronts.iter().map(|f| f.flops).sum()
     }

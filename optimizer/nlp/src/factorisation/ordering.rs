@@ -85,6 +85,7 @@ pub(super) fn block_of_index_raised(form: &Formulation, blocks: &EliminationBloc
 }
 
 /// Elimination order from blocks: position -> index.
+#[cfg(feature = "supernodal")]
 pub(super) fn block_order(form: &Formulation, blocks: &EliminationBlocks) -> Vec<usize> {
     let rows: Vec<usize> = (0..form.m).collect();
     let partner = match_rows(form, &rows, |i, j| blocks.block_of_variable[j] == blocks.block_of_row[i]);

@@ -162,16 +162,20 @@ async fn response(app: &mut AppState, figures: Vec<Figure>, file: String) -> Res
     let figure = figures.into_iter().find(|figure| figure.name == name).ok_or_else(missing)?;
     let (kind, format) = match format {
         "svg" => ("image/svg+xml", FigureFormat::Svg),
+        #[cfg(feature = "png")]
         "png" => ("image/png", FigureFormat::Png),
         "csv" => ("text/csv; charset=utf-8", FigureFormat::Csv),
         _ => return Err(missing().into()),
     };
-    let draw = move |_: &OnPool| match format {
-        FigureFormat::Svg => Ok(figure.svg().into_bytes()),
-        FigureFormat::Csv => Ok(figure.csv().into_bytes()),
-        FigureFormat::Png => figure.png(),
+    let draw = move |_: &OnPool| -> Result<Vec<u8>, Error> {
+        match format {
+            FigureFormat::Svg => Ok(figure.svg().into_bytes()),
+            FigureFormat::Csv => Ok(figure.csv().into_bytes()),
+            #[cfg(feature = "png")]
+            FigureFormat::Png => figure.png().map_err(|e| Error::Internal(e.to_string())),
+        }
     };
-    let bytes = app.compute(draw).await?.map_err(|e| Error::Internal(e.to_string()))?;
+    let bytes = app.compute(draw).await??;
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{file}\"")),
@@ -183,6 +187,7 @@ async fn response(app: &mut AppState, figures: Vec<Figure>, file: String) -> Res
 #[derive(Debug, Clone, Copy)]
 enum FigureFormat {
     Svg,
+    #[cfg(feature = "png")]
     Png,
     Csv,
 }

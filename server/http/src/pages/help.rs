@@ -14,7 +14,7 @@ use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd};
 use rust_embed::Embed;
 
 #[derive(Embed)]
-#[folder = "../../docs"]
+#[folder = "docs"]
 struct Files;
 
 /// The guides in the order of the table of contents: name in addresses, title, and file in the repository.
@@ -77,8 +77,8 @@ pub(super) async fn image(Path(name): Path<String>) -> Result<Response, Refusal>
 /// The text of a file of the repository, if it is embedded.
 fn text_of(file: &str) -> Option<String> {
     match file {
-        DATA_FILES => Some(include_str!("../../../../optimizer/data/README.md").to_owned()),
-        LEARNER => Some(include_str!("../../../../learner/README.md").to_owned()),
+        DATA_FILES => Some(include_str!("../../data-files.md").to_owned()),
+        LEARNER => Some(include_str!("../../learner.md").to_owned()),
         _ => {
             let found = Files::get(file.strip_prefix("docs/")?)?;
             Some(String::from_utf8_lossy(&found.data).into_owned())

@@ -30,7 +30,12 @@ impl Drawn {
     /// A figure with its files, which are in a folder, with a query.
     pub(super) fn of(figure: &Figure, folder: &str, query: &str) -> Self {
         let address = |ending: &str| format!("{folder}/{}.{ending}{query}", figure.name);
-        let files = vec![("SVG", address("svg")), ("PNG", address("png")), ("CSV", address("csv"))];
+        let files = vec![
+            ("SVG", address("svg")),
+            #[cfg(feature = "png")]
+            ("PNG", address("png")),
+            ("CSV", address("csv")),
+        ];
         let (svg, legend) = match &figure.drawing {
             Drawing::Chart(chart) => return Self { files, ..Self::new(chart) },
             Drawing::Tiles(_, stick_figures) => (gait_tiles(stick_figures), Vec::new()),

@@ -2,7 +2,7 @@
 //!
 //! A worker receives an [`Assignment`], reports iterations, and returns a [`Finding`]. An engine ([`Dispatch`])
 //! distributes assignments: to threads of this process ([`InProcess`]), or to workers on other machines through a
-//! broker ([`nats`]). Solves are CPU-bound, so each runs on its own thread and never on the async runtime.
+//! broker (`nats`). Solves are CPU-bound, so each runs on its own thread and never on the async runtime.
 
 mod after_solves;
 mod board;
@@ -11,6 +11,7 @@ mod dispatch;
 mod evaluate;
 mod explain;
 mod in_process;
+#[cfg(feature = "nats")]
 pub mod nats;
 
 pub use after_solves::AfterSolves;

@@ -6,11 +6,8 @@ use askama::Template;
 use gait_optimizer::Gait;
 use gait_optimizer::walking::stick_figure::stick_figures;
 use gaitwright_charts::gait_charts;
-use gaitwright_charts::{Chart, Stroke, band_in_words, gait_tiles};
+use gaitwright_charts::{Chart, STYLE_SHEET, Stroke, band_in_words, gait_tiles};
 use gaitwright_service::error::Error;
-
-/// The style sheet of the pages, which has the colours and dashes of charts.
-const STYLE: &str = include_str!("../../../../web/static/gaitwright.css");
 
 #[derive(Template)]
 #[template(path = "reproduce.html")]
@@ -58,7 +55,7 @@ pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
     let pair_comparisons = pair_comparisons(outcomes);
     let pairs = pair_comparisons.iter().map(|comparison| pair(comparison, outcomes)).collect::<Result<_, Error>>()?;
     let report = Report {
-        style: STYLE,
+        style: STYLE_SHEET,
         version: env!("CARGO_PKG_VERSION"),
         trials,
         conclusion: conclusion(&pair_comparisons),

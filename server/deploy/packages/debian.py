@@ -1,0 +1,61 @@
+"""The Debian package: the program, its systemd unit and an empty file of settings."""
+
+import hashlib
+import pathlib
+from typing import Tuple
+
+from archives import File, ar, tar_gz
+
+DEPLOY = pathlib.Path(__file__).resolve().parents[1]
+ROOT = DEPLOY.parents[1]
+DEBIAN_NAME = "gaitwright_{version}_{architecture}.deb"
+CONTROL = """Package: gaitwright
+Version: {version}
+Architecture: {architecture}
+Maintainer: Gaitwright <gaitwright@localhost>
+Installed-Size: {kibibytes}
+Depends: libc6 (>= {glibc}), libgcc-s1
+Section: science
+Priority: optional
+Description: preference-learning tuning service for walking gaits
+ Gaitwright tunes walking gaits of powered prostheses: an optimiser computes
+ gaits, a preference learner proposes bounds, people or motion capture compare.
+"""
+# The service is started by the administrator, after the settings.
+POSTINST = """#!/bin/sh
+set -e
+if [ -d /run/systemd/system ]; then systemctl daemon-reload; fi
+"""
+PRERM = """#!/bin/sh
+set -e
+if [ "$1" = remove ] && [ -d /run/systemd/system ]; then systemctl disable --now gaitwright || true; fi
+"""
+SETTINGS = "# Settings of `gaitwright serve`; `gaitwright config show` lists them. The unit sets the folder of the record.\n"
+
+
+def deb(program: bytes, version: str, architecture: str, glibc: Tuple[int, int]) -> bytes:
+    """The package of a program that needs this version of glibc."""
+    unit = (DEPLOY / "gaitwright.service").read_text().replace("/usr/local/bin/", "/usr/bin/")
+    licences = "".join((ROOT / name).read_text() + "\n" for name in ("LICENSE-MIT", "LICENSE-APACHE"))
+    files = [
+        File("./etc/gaitwright.toml", SETTINGS.encode()),
+        File("./usr/bin/gaitwright", program, 0o755),
+        File("./usr/lib/systemd/system/gaitwright.service", unit.encode()),
+        File("./usr/share/doc/gaitwright/copyright", licences.encode()),
+    ]
+    sums = "".join(f"{hashlib.md5(file.content).hexdigest()}  {file.path[2:]}\n" for file in files)
+    control = CONTROL.format(
+        version=version,
+        architecture=architecture,
+        kibibytes=sum(len(file.content) for file in files) // 1024 + 1,
+        glibc=".".join(map(str, glibc)),
+    )
+    about = [
+        File("./conffiles", b"/etc/gaitwright.toml\n"),
+        File("./control", control.encode()),
+        File("./md5sums", sums.encode()),
+        File("./postinst", POSTINST.encode(), 0o755),
+        File("./prerm", PRERM.encode(), 0o755),
+    ]
+    members = [("control.tar.gz", tar_gz(about)), ("data.tar.gz", tar_gz(files, with_folders=True))]
+    return ar([("debian-binary", b"2.0\n"), *members])
