@@ -25,6 +25,7 @@ pub mod sensitivity;
 pub mod settings;
 mod signal_filter;
 pub mod solve;
+pub mod spatiotemporal;
 mod statistics;
 pub mod subject;
 mod table;

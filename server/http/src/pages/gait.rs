@@ -3,6 +3,7 @@
 use super::bound_use::{self, BoundUse};
 use super::certificate;
 use super::explanation::NoGait;
+use super::gait_summary::GaitSummary;
 use super::page_chart::Drawn;
 use crate::AppState;
 use crate::authorization::Authorized;
@@ -38,6 +39,8 @@ struct GaitPage {
     /// Name of the reference gait.
     reference: String,
     has_gait: bool,
+    /// Spatiotemporal parameters and distances from reference gaits, for a converged gait.
+    summary: Option<GaitSummary>,
     may_run: bool,
     certificate: Option<certificate::InWords>,
     groups: Vec<Group>,
@@ -104,13 +107,14 @@ pub(super) async fn get(
     drop(reader);
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
-    let action = trial.action;
+    let (action, converged) = (trial.action, trial.state == TrialState::Converged);
     let drawn = move |pool: &OnPool| {
         let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
         let (gait, iterations) = gait.transpose()?.unzip();
-        draw(id, gait.as_ref(), &reference, &iterations.unwrap_or_default(), &action)
+        let summary = gait.as_ref().filter(|_| converged).map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
+        Ok::<_, Error>((draw(id, gait.as_ref(), &reference, &iterations.unwrap_or_default(), &action)?, summary))
     };
-    let drawn = app.compute(drawn).await.map_err(Error::from)??;
+    let (drawn, summary) = app.compute(drawn).await.map_err(Error::from)??;
     page(&GaitPage {
         state: words(trial.state.as_str()),
         rmse: format::figure(trial.gait_rmse_rad),
@@ -123,6 +127,7 @@ pub(super) async fn get(
         from,
         reference: reference_name,
         has_gait,
+        summary,
         may_run,
         certificate,
         groups: drawn.groups,
@@ -181,19 +186,11 @@ fn draw(
 
 fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
     let Some(r) = &trial.report else { return Vec::new() };
-    let parts = ["torso", "left hip", "left knee", "left ankle", "right hip"];
-    let parts: Vec<String> =
-        parts.iter().zip(r.gait_rmse_parts_rad).map(|(name, value)| format!("{name} {value:.4}")).collect();
-    let rmse = (trial.state == TrialState::Converged).then(|| ("Gait RMSE by coordinate, rad", parts.join(", ")));
-    let solved = [
-        ("Walking speed, m/s", format!("{:.3}", r.speed_m_s)),
-        ("Stride length, m", format!("{:.3}", r.stride_length_m)),
-        ("Stride time, s", format!("{:.3}", r.durations_s.iter().sum::<f64>())),
+    vec![
         ("Hip velocity in the four intervals between impacts, m/s", r.vhip_m_s.map(|v| format!("{v:.3}")).join(", ")),
         (
             "Problem size",
             format!("{} variables, {} equalities, {} inequalities", r.variables, r.equalities, r.inequalities),
         ),
-    ];
-    rmse.into_iter().chain(solved).collect()
+    ]
 }

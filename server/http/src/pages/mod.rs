@@ -10,6 +10,7 @@ mod devices;
 mod explanation;
 mod figures;
 mod gait;
+mod gait_summary;
 mod help;
 mod home;
 mod lab;
