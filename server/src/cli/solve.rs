@@ -215,7 +215,9 @@ impl Solve {
 fn refusal(error: GaitSensitivityError) -> Error {
     match error {
         GaitSensitivityError::Solve(error) => error.into(),
-        other => Error::conflict(format!("The sensitivities of this gait cannot be computed: {other}.")),
+        GaitSensitivityError::Sensitivity(error) => {
+            Error::conflict(format!("The sensitivities of this gait cannot be computed: {error}."))
+        }
     }
 }
 
