@@ -111,7 +111,9 @@ pub(super) async fn get(
     let drawn = move |pool: &OnPool| {
         let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
         let (gait, iterations) = gait.transpose()?.unzip();
-        let summary = gait.as_ref().filter(|_| converged).map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
+        // Charts show what they can of a malformed gait; figures of it would be false.
+        let well_formed = gait.as_ref().filter(|gait| converged && gait.validate().is_ok());
+        let summary = well_formed.map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
         Ok::<_, Error>((draw(id, gait.as_ref(), &reference, &iterations.unwrap_or_default(), &action)?, summary))
     };
     let (drawn, summary) = app.compute(drawn).await.map_err(Error::from)??;
