@@ -43,6 +43,7 @@ mod action;
 mod action_moments;
 mod comparisons;
 mod error;
+mod excluded;
 mod feedback;
 mod fit;
 mod gaussian_process;
@@ -67,6 +68,7 @@ pub use comparisons::{
     ComparisonReason, ProposedComparison, comparisons_to_ask, comparisons_to_ask_among, what_to_ask,
 };
 pub use error::LearnerError;
+pub use excluded::ExcludedActions;
 pub use feedback::{Feedback, FeedbackLog};
 pub use learner::{Learner, posterior};
 pub use likelihood::Link;
@@ -74,6 +76,6 @@ pub use posterior::agreement::Agreement;
 pub use posterior::best_action::BestProbability;
 pub use posterior::marginals::{Marginal, Slice};
 pub use posterior::{Posterior, Prediction};
-pub use propose::{Proposal, ProposalReason, propose, propose_batch};
+pub use propose::{Proposal, ProposalReason, propose, propose_batch, propose_outside};
 pub use search_space::{Dimension, SearchSpace};
 pub use settings::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Method, Partner, Start};

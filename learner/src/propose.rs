@@ -1,12 +1,11 @@
 //! Proposals: which action to evaluate next.
 
-use std::collections::HashSet;
-
 use serde::{Deserialize, Serialize};
 
-use crate::acquisition::{eubo, information_gain, line_cospar, random_untaken, thompson};
+use crate::acquisition::{eubo, information_gain, line_cospar, thompson};
 use crate::action::ActionIndex;
 use crate::error::{LearnerError, Result};
+use crate::excluded::{ExcludedActions, Taken};
 use crate::feedback::FeedbackLog;
 use crate::learner::Learner;
 use crate::posterior::Posterior;
@@ -63,6 +62,21 @@ pub fn propose(
     Learner::default().propose(space, log, pending, settings, seed)
 }
 
+/// [`propose`], but never an action that is `excluded`, visited or pending, whatever the settings say about repeats.
+///
+/// # Errors
+/// As [`propose`]; [`LearnerError::Exhausted`] also if only excluded actions are left.
+pub fn propose_outside(
+    space: &SearchSpace,
+    log: &FeedbackLog,
+    pending: &[ActionIndex],
+    excluded: &ExcludedActions,
+    settings: &LearnerSettings,
+    seed: u64,
+) -> Result<Proposal> {
+    propose_from(&Learner::default().posterior(space, log, settings)?, pending, Some(excluded), seed)
+}
+
 /// Proposes a batch of `settings.samples_per_iteration` distinct actions, or as many as are left.
 ///
 /// # Errors
@@ -90,7 +104,7 @@ impl Learner {
         settings: &LearnerSettings,
         seed: u64,
     ) -> Result<Proposal> {
-        propose_from(&self.posterior(space, log, settings)?, pending, seed)
+        propose_from(&self.posterior(space, log, settings)?, pending, None, seed)
     }
 
     /// [`propose_batch`] with the cache.
@@ -109,7 +123,7 @@ impl Learner {
         let mut pending = pending.to_vec();
         let mut proposals = Vec::new();
         for _ in 0..settings.samples_per_iteration {
-            match propose_from(&posterior, &pending, seed) {
+            match propose_from(&posterior, &pending, None, seed) {
                 Ok(proposal) => {
                     pending.push(proposal.action);
                     proposals.push(proposal);
@@ -122,60 +136,56 @@ impl Learner {
     }
 }
 
-fn propose_from(posterior: &Posterior, pending: &[ActionIndex], seed: u64) -> Result<Proposal> {
+/// Without `excluded`, repeats are as the settings say.
+fn propose_from(
+    posterior: &Posterior,
+    pending: &[ActionIndex],
+    excluded: Option<&ExcludedActions>,
+    seed: u64,
+) -> Result<Proposal> {
     let space = posterior.space();
     for &action in pending {
         space.check(action)?;
     }
-    let taken: HashSet<ActionIndex> = posterior.visited().iter().chain(pending).copied().collect();
     let settings = posterior.settings();
-    let repeats = settings.repeats && settings.method == Method::LineCoSpar;
-    let barred = if repeats { pending.iter().copied().collect::<HashSet<_>>().len() } else { taken.len() };
+    let repeats = settings.repeats && settings.method == Method::LineCoSpar && excluded.is_none();
+    let none = ExcludedActions::default();
+    let taken = Taken::new(space, posterior.visited().iter().chain(pending).copied(), excluded.unwrap_or(&none));
     let exhausted = LearnerError::Exhausted { actions: space.len() };
-    if barred as u64 >= space.len() {
-        return Err(exhausted);
-    }
     let random = &mut Random::new(seed, (posterior.visited().len() + pending.len()) as u64);
     let Some(best) = posterior.best() else {
-        let action = match centre(space)? {
-            centre if settings.start == Start::Centre && !taken.contains(&centre) => centre,
-            _ => random_untaken(space, &taken, random),
-        };
-        return Ok(Proposal { action, reason: ProposalReason::FirstAction, best: None });
+        let centre = centre(space)?;
+        let at_centre = settings.start == Start::Centre && !taken.contains(centre);
+        let action = if at_centre { Some(centre) } else { taken.random_other(random) };
+        return Ok(Proposal { action: action.ok_or(exhausted)?, reason: ProposalReason::FirstAction, best: None });
     };
     let small = space.enumerable().is_ok();
-    let (action, reason) = match settings.method {
+    let (found, reason) = match settings.method {
         Method::LineCoSpar => {
             let found = if repeats {
                 line_cospar::visited_or_on_line(posterior, best, pending, random)?
             } else {
                 line_cospar::unvisited_on_line(posterior, best, &taken, random)?
             };
-            if let Some(action) = found {
-                (action, ProposalReason::ThompsonOnLine)
+            if found.is_some() {
+                (found, ProposalReason::ThompsonOnLine)
             } else {
-                let action = line_cospar::random_fallback(posterior, pending, &taken, random);
-                (action, ProposalReason::LinesExhausted)
+                let found = line_cospar::random_fallback(posterior, pending, &taken, repeats, random);
+                (found, ProposalReason::LinesExhausted)
             }
         }
-        Method::Eubo => {
-            let found = eubo::proposal(posterior, best, pending, &taken, random);
-            (found.ok_or(exhausted)?, ProposalReason::ExpectedBestUtility)
-        }
-        Method::Thompson if small => {
-            let found = thompson::over_grid(posterior, &taken, random)?;
-            (found.ok_or(exhausted)?, ProposalReason::JointThompson)
-        }
+        Method::Eubo => (eubo::proposal(posterior, best, pending, &taken, random), ProposalReason::ExpectedBestUtility),
+        Method::Thompson if small => (thompson::over_grid(posterior, &taken, random)?, ProposalReason::JointThompson),
         Method::Thompson => {
             (thompson::over_candidates(posterior, best, &taken, random)?, ProposalReason::JointThompson)
         }
         Method::InformationGain => {
-            let action = information_gain::over_candidates(posterior, best, &taken, random);
-            (action, ProposalReason::InformationGain)
+            let found = information_gain::over_candidates(posterior, best, &taken, random);
+            (found, ProposalReason::InformationGain)
         }
-        Method::Random => (random_untaken(space, &taken, random), ProposalReason::RandomAction),
+        Method::Random => (taken.random_other(random), ProposalReason::RandomAction),
     };
-    Ok(Proposal { action, reason, best: Some(best) })
+    Ok(Proposal { action: found.ok_or(exhausted)?, reason, best: Some(best) })
 }
 
 /// The middle level of every dimension; of two middle levels, the lower one.
@@ -185,6 +195,8 @@ fn centre(space: &SearchSpace) -> Result<ActionIndex> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
+
     use super::*;
     use crate::acquisition::avoidance::Avoidance;
     use crate::feedback::Feedback;
@@ -297,6 +309,46 @@ mod tests {
                 propose(&space, &log, &all, &settings, 3),
                 Err(LearnerError::Exhausted { actions: space.len() })
             );
+        }
+    }
+
+    #[test]
+    fn excluded_actions_are_never_proposed() {
+        let levels = |a: usize, b: usize, c: usize| vec![a..3, b..4, c..3];
+        let dimensions = |more: usize| {
+            let long = |d: usize| Dimension {
+                name: format!("long {d}"),
+                values: (0..200).map(f64::from).collect(),
+                lengthscale: 20.0,
+            };
+            [grid().dimensions().to_vec(), (0..more).map(long).collect()].concat()
+        };
+        for method in [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random] {
+            // With three long dimensions, the grid is too large to be listed.
+            for more in [0, 3] {
+                let space = SearchSpace::new(dimensions(more)).unwrap();
+                let whole = |ranges: Vec<std::ops::Range<usize>>| [ranges, vec![0..200; more]].concat();
+                let boxes = vec![whole(levels(1, 0, 0)), whole(levels(0, 2, 0)), whole(levels(0, 0, 2))];
+                let excluded = ExcludedActions::new(&space, boxes).unwrap();
+                let settings = LearnerSettings { repeats: true, ..LearnerSettings::of(method) };
+                let mut log = FeedbackLog::default();
+                // Four combinations of the short dimensions are left.
+                for trial in 0..4 {
+                    let action = propose_outside(&space, &log, &[], &excluded, &settings, 3).unwrap().action;
+                    assert!(!excluded.contains(&space.levels(action)), "{method:?} {trial}");
+                    assert!(!log.visited.contains(&action), "{method:?} repeats at {trial}");
+                    if let Some(&loser) = log.visited.last() {
+                        log.feedback.push(Feedback::Preference { winner: action, loser });
+                    }
+                    log.visited.push(action);
+                }
+                let exhausted = Err(LearnerError::Exhausted { actions: space.len() });
+                if more == 0 {
+                    assert_eq!(propose_outside(&space, &log, &[], &excluded, &settings, 3), exhausted, "{method:?}");
+                }
+                let all = ExcludedActions::new(&space, vec![whole(levels(0, 0, 0))]).unwrap();
+                assert_eq!(propose_outside(&space, &log, &[], &all, &settings, 3), exhausted, "{method:?}");
+            }
         }
     }
 

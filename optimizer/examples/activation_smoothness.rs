@@ -6,8 +6,8 @@
 //! second); the same over the ends of mesh intervals; the alternations (three steps of alternating sign, each above
 //! 0.005) at nodes and at ends of intervals; and the largest step between adjacent nodes.
 
+use gait_optimizer::activation_alternations::{activation_alternations, alternations};
 use gait_optimizer::gait::MuscleTrajectory;
-use gait_optimizer::metrics::{activation_alternations, alternations};
 use gait_optimizer::settings::Regularisation;
 use gait_optimizer::{CancelToken, Gait, GaitProblem, SolveOptions, Subject, WarmStart, solve};
 use std::error::Error;

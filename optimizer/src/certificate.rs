@@ -17,10 +17,10 @@
 
 mod check;
 mod closed_loop;
-mod contact;
-mod control;
+mod contact_kinematics;
 mod domain_differences;
 mod dormand_prince;
+mod feedback_linearization;
 mod findings;
 mod guard;
 mod hybrid_walker;
@@ -49,7 +49,7 @@ pub use return_map::{Multiplier, ReturnMap};
 use crate::body::WalkerModel;
 use crate::gait::Gait;
 use crate::subject::ModelError;
-use control::join;
+use feedback_linearization::join;
 use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};
 

@@ -41,9 +41,9 @@ pub struct Device {
     pub foot_inertia_kg_m2: f64,
     /// Height of the ankle above the sole, m.
     pub ankle_height_m: f64,
-    /// Distance of the heel contact behind the ankle, m.
+    /// Distance of the distance of the heel contact behind the ankle, m.
     pub heel_behind_m: f64,
-    /// Distance of the toe contact ahead of the ankle, m.
+    /// Distance of the distance of the toe contact ahead of the ankle, m.
     pub toe_ahead_m: f64,
     /// Largest magnitude of the knee torque, N m.
     pub knee_torque_limit_n_m: f64,
@@ -93,9 +93,12 @@ impl Device {
         field("knee_housing_mass_kg", "mass at the prosthetic knee that moves with the thigh", (0.0, 10.0), |d| {
             d.knee_housing_mass_kg
         }),
-        field("knee_housing_inertia_kg_m2", "moment of inertia of this mass about its own centre", (0.0, 0.5), |d| {
-            d.knee_housing_inertia_kg_m2
-        }),
+        field(
+            "knee_housing_inertia_kg_m2",
+            "moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh",
+            (0.0, 0.5),
+            |d| d.knee_housing_inertia_kg_m2,
+        ),
         field("adapter_mass_kg", "mass of the adapter, midway between human and prosthetic knee", (0.0, 10.0), |d| {
             d.adapter_mass_kg
         }),
@@ -106,7 +109,7 @@ impl Device {
         field("shank_length_m", "distance from knee to ankle", (0.2, 0.6), |d| d.shank_length_m),
         field(
             "shank_com_fraction",
-            "centre of mass of the shank below the knee, in shank lengths",
+            "distance of the shank's centre of mass below the knee, in shank lengths",
             (0.05, 0.95),
             |d| d.shank_com_fraction,
         ),
@@ -117,16 +120,18 @@ impl Device {
             |d| d.shank_gyration_fraction,
         ),
         field("foot_mass_kg", "mass of the prosthetic foot with shoe", (0.1, 5.0), |d| d.foot_mass_kg),
-        field("foot_com_forward_m", "centre of mass of the foot ahead of the ankle", (-0.1, 0.2), |d| {
+        field("foot_com_forward_m", "distance of the foot's centre of mass ahead of the ankle", (-0.1, 0.2), |d| {
             d.foot_com_forward_m
         }),
-        field("foot_com_down_m", "centre of mass of the foot below the ankle", (0.0, 0.15), |d| d.foot_com_down_m),
+        field("foot_com_down_m", "distance of the foot's centre of mass below the ankle", (0.0, 0.15), |d| {
+            d.foot_com_down_m
+        }),
         field("foot_inertia_kg_m2", "moment of inertia of the foot about its centre of mass", (1e-4, 0.2), |d| {
             d.foot_inertia_kg_m2
         }),
         field("ankle_height_m", "height of the ankle above the sole", (0.01, 0.2), |d| d.ankle_height_m),
-        field("heel_behind_m", "heel contact behind the ankle", (0.01, 0.15), |d| d.heel_behind_m),
-        field("toe_ahead_m", "toe contact ahead of the ankle", (0.05, 0.3), |d| d.toe_ahead_m),
+        field("heel_behind_m", "distance of the heel contact behind the ankle", (0.01, 0.15), |d| d.heel_behind_m),
+        field("toe_ahead_m", "distance of the toe contact ahead of the ankle", (0.05, 0.3), |d| d.toe_ahead_m),
         field("knee_torque_limit_n_m", "largest knee torque", (1.0, 500.0), |d| d.knee_torque_limit_n_m),
         field("ankle_torque_limit_n_m", "largest ankle torque", (1.0, 500.0), |d| d.ankle_torque_limit_n_m),
         field("joint_speed_limit_rad_s", "largest knee and ankle speed", (0.5, 50.0), |d| d.joint_speed_limit_rad_s),

@@ -3,18 +3,16 @@
 //! | constraint | rows here |
 //! |---|---|
 //! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics`] |
-//! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`outputs`], [`hip_velocity`], [`transitions`] |
+//! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity`], [`transitions`] |
 //! | C3 physical limits: friction, unilateral contact, clearance, touchdown | [`contact_limits`] |
 //! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
-//! | C8 fibre kinematics | [`fibres`] |
+//! | C8 fibre kinematics | [`muscle_fibres`] |
 //! | C9-C12 joint torques of the muscles | [`muscle_forces`] |
 
 pub mod contact_limits;
 mod elimination_tree;
-pub mod entries;
 mod evaluation;
-pub mod fibres;
 mod gait_of_variables;
 mod hermite_simpson;
 pub mod hip_velocity;
@@ -23,20 +21,25 @@ pub mod layout;
 pub mod margins;
 pub mod mechanics;
 pub mod mesh_transfer;
+pub mod muscle_fibres;
 pub mod muscle_forces;
 pub mod objective;
-pub mod outputs;
 mod problem_definition;
-pub mod programme;
+pub mod program_data;
 pub mod rows;
+pub mod sparse_entries;
 pub mod stride;
 pub mod transitions;
+mod unchanged_bounds;
 pub mod variable_bounds;
+pub mod virtual_constraint_rows;
 pub mod zero_dynamics;
 
 pub use evaluation::RowViolation;
 pub use gait_of_variables::gait_of;
 pub use layout::{Layout, PointVariables};
 pub use problem_definition::GaitProblem;
-pub use programme::{GaitProgramme, ObjectiveWeights};
+pub use program_data::{GaitProgramme, ObjectiveWeights};
 pub use rows::{RowKind, RowName, RowTable};
+pub(crate) use unchanged_bounds::ConvergedGait;
+pub use unchanged_bounds::UnchangedBound;

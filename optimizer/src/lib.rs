@@ -4,18 +4,21 @@
 //! with Hill-type muscles of Li, Tucker, Gehlhar, Yue and Ames (RA-L 2022) by a sparse interior-point method, certifies
 //! the gait, explains bounds without a gait, and reads recordings. It does no learning, storage or HTTP.
 
+pub mod activation_alternations;
 pub mod body;
 pub mod certificate;
+pub mod cost_of_transport;
 pub mod device;
 pub mod emg;
+pub mod execution;
 pub mod explanation;
 pub mod export;
 pub mod gait;
 pub mod gait_problem;
-mod in_words;
+pub mod gait_rmse;
 pub mod initial_guess;
-pub mod metrics;
 pub mod muscle;
+mod number_format;
 mod opensim;
 pub mod phase_portrait;
 mod quadrature;
@@ -34,8 +37,8 @@ pub mod walking;
 
 pub use device::{Device, DeviceField};
 pub use gait::{DomainTrajectory, Gait};
-pub use gait_problem::GaitProblem;
 pub use gait_problem::margins::Margins;
+pub use gait_problem::{GaitProblem, UnchangedBound};
 pub use interior_point::{NlpSettings, WarmPoint};
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};

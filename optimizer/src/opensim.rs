@@ -1,7 +1,7 @@
 //! OpenSim motion and storage files (.mot, .sto): a header that ends with `endheader`, then a table over time.
 
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table, lines_of, malformed};
+use crate::table::{Separator, Table, TimeColumn, lines_of, malformed};
 
 /// Unit of the angles in an OpenSim file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl StorageFile {
             .ok_or_else(|| malformed(what, lines.len().max(1), None, "the line \"endheader\" is missing".to_owned()))?;
         let header = &lines[..end];
         let unit = unit_said(what, header)?;
-        let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, Clock::Column("time"))?
+        let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, TimeColumn::Column("time"))?
             .with_names(coordinate_name);
         let (rows, columns) = (table.len(), table.width());
         for (name, found) in [("nRows", rows), ("nColumns", columns), ("datarows", rows), ("datacolumns", columns)] {

@@ -9,7 +9,7 @@ use crate::reference::{LARGEST_ANGLE_RAD, MotionRecording};
 use crate::signal_filter::{extension, filter, low_pass};
 use crate::statistics::extremes;
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table, lines_of};
+use crate::table::{Separator, Table, TimeColumn, lines_of};
 use serde::{Deserialize, Serialize};
 
 /// Order of one pass of the low-pass.
@@ -65,7 +65,8 @@ impl JointRecording {
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
         let lines = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
-        let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
+        let table =
+            Table::read(what, &lines[comments..], comments + 1, Separator::Comma, TimeColumn::Column("time_s"))?;
         let joints = JOINTS.into_iter().filter_map(|joint| Some((joint, table.find(&format!("{joint}_rad"))?)));
         Self::whole(&table, joints.collect())
     }

@@ -4,7 +4,7 @@
 //! other references tells more about the gait.
 
 use crate::gait::Gait;
-use crate::metrics::gait_rmse_with_shift;
+use crate::gait_rmse::gait_rmse_with_shift;
 use crate::reference::ReferenceGait;
 use crate::subject::ModelError;
 use serde::Serialize;

@@ -25,7 +25,7 @@ pub(crate) struct Table {
 
 /// Source of the time of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Clock<'a> {
+pub(crate) enum TimeColumn<'a> {
     /// The first column, which has this name, in s and strictly increasing.
     Column(&'a str),
     /// A constant number of rows per second, the first row at 0 s.
@@ -70,14 +70,14 @@ impl Table {
         lines: &[&str],
         first_line: usize,
         separator: Separator,
-        clock: Clock<'_>,
+        clock: TimeColumn<'_>,
     ) -> Result<Self, ModelError> {
         let malformed = |line: usize, reason: String| malformed(what, line, None, reason);
         let mut names: Vec<String> = match lines.first() {
             Some(line) => separator.split(line).into_iter().map(str::to_owned).collect(),
             None => return Err(malformed(first_line, "the line of column names is missing".to_owned())),
         };
-        if let Clock::Column(time_name) = clock
+        if let TimeColumn::Column(time_name) = clock
             && names.first().map(String::as_str) != Some(time_name)
         {
             let found = names.first().map_or("", String::as_str);
@@ -99,7 +99,7 @@ impl Table {
         }
         let body = &lines[1..];
         let filled = body.iter().rposition(|line| !line.trim().is_empty()).map_or(0, |last| last + 1);
-        let rate_hz = if let Clock::Rate(rate_hz) = clock { Some(rate_hz) } else { None };
+        let rate_hz = if let TimeColumn::Rate(rate_hz) = clock { Some(rate_hz) } else { None };
         let mut table = Self {
             what: what.to_owned(),
             first_line,

@@ -43,12 +43,17 @@ macro_rules! tuned_bounds {
                 [$(&mut self.$name),+]
             }
 
+            /// Bounds from values in the order of an action, not validated.
+            pub(crate) fn of_array([$($name),+]: [f64; Self::COUNT]) -> Self {
+                Self { $($name),+ }
+            }
+
             /// Validated bounds from values in the order of an action.
             ///
             /// # Errors
             /// [`ModelError::OutOfRange`] naming the bound.
-            pub fn from_array([$($name),+]: [f64; Self::COUNT]) -> Result<Self, ModelError> {
-                let bounds = Self { $($name),+ };
+            pub fn from_array(values: [f64; Self::COUNT]) -> Result<Self, ModelError> {
+                let bounds = Self::of_array(values);
                 bounds.validate()?;
                 Ok(bounds)
             }

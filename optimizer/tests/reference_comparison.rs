@@ -4,7 +4,7 @@
 
 mod golden_gaits;
 
-use gait_optimizer::metrics::gait_rmse;
+use gait_optimizer::gait_rmse::gait_rmse;
 use gait_optimizer::reference::REFERENCE_ROWS;
 use gait_optimizer::reference_comparison::compare_with_references;
 use gait_optimizer::{Gait, ReferenceGait};

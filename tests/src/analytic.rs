@@ -8,7 +8,7 @@ use gait_optimizer::gait::{ContactRowName, MuscleTrajectory};
 use gait_optimizer::solve::{SolvePhase, StartedFrom};
 use gait_optimizer::{
     CancelToken, DomainTrajectory, Gait, IterationRecord, LinearAlgebra, Margins, SolveOutcome, SolveReport,
-    SolveStatus, Violation, WarmPoint, WarmStart,
+    SolveStatus, TunedBounds, UnchangedBound, Violation, WarmPoint, WarmStart,
 };
 use gaitwright_service::workers::{Assignment, Evaluate};
 use gaitwright_store::TrialId;
@@ -30,6 +30,8 @@ pub struct Analytic {
     pub panics_once: Vec<u32>,
     /// Number of solves that hang after their first iteration and ignore cancellation.
     pub hangs: u32,
+    /// Whether reports state for which bounds a gait is unchanged: every value of the bounds that this solver ignores.
+    pub states_unchanged_bounds: bool,
     /// Number of started solves.
     pub begun: AtomicU32,
     /// Which solve made each iteration, in order: by the trial of its attempt.
@@ -89,8 +91,21 @@ impl Evaluate for Analytic {
             }
             std::thread::sleep(self.pause);
         }
-        Ok(outcome(assignment, status, rmse))
+        let mut outcome = outcome(assignment, status, rmse);
+        if self.states_unchanged_bounds && status == SolveStatus::Converged {
+            outcome.report.unchanged_bounds = unchanged_bounds(a);
+        }
+        Ok(outcome)
     }
+}
+
+fn unchanged_bounds(action: [f64; TunedBounds::COUNT]) -> Vec<UnchangedBound> {
+    let used = ["a1", "a5", "a6", "a7"];
+    let of = |(name, value): (&str, f64)| {
+        let only = Some(value).filter(|_| used.contains(&name));
+        UnchangedBound { bound: name.to_owned(), least: only, most: only }
+    };
+    TunedBounds::NAMES.into_iter().zip(action).map(of).collect()
 }
 
 fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutcome {
@@ -112,6 +127,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             max_violation: if status == SolveStatus::Converged { 1e-9 } else { 0.004 },
             optimality: None,
             tightened_bounds: 0,
+            unchanged_bounds: Vec::new(),
             seconds_total: 0.01,
             seconds_evaluation: 0.005,
             seconds_linear_algebra: 0.005,

@@ -6,9 +6,9 @@ use axum::body::Body;
 use axum::extract::ConnectInfo;
 use axum::http::request::Builder;
 use axum::http::{Method, Request, header};
-use gaitwright_http::Access;
-use gaitwright_service::access::people::{self, NewUser};
+use gaitwright_http::AccessState;
 use gaitwright_service::access::tokens::{self, NewToken};
+use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Right, Role, secret, sign_in};
 use gaitwright_service::studies::membership::{self, NewMember};
 use gaitwright_store::audit::Actor;
@@ -25,7 +25,7 @@ pub const FORM: &str = "application/x-www-form-urlencoded";
 pub async fn service() -> (TempDir, Service) {
     let folder = tempfile::tempdir().unwrap();
     let mut service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    service.access = Arc::new(Access::by_sign_in(3600.0));
+    service.access = Arc::new(AccessState::by_sign_in(3600.0));
     (folder, service)
 }
 
@@ -44,8 +44,8 @@ pub enum As {
 pub async fn user(service: &Service, name: &str, role: Role) -> (UserId, String) {
     let mut writer = service.store.write().await.unwrap();
     let new = NewUser { name: name.to_owned(), role };
-    let user = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
-    let link = people::link(&mut writer, &Actor::program(), user.id).await.unwrap();
+    let user = user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    let link = user_administration::link(&mut writer, &Actor::program(), user.id).await.unwrap();
     commit(writer).await.unwrap();
     (user.id, link)
 }
@@ -148,7 +148,7 @@ pub async fn with_password(service: &Service, name: &str, role: Role, password: 
     let (id, _) = user(service, name, role).await;
     let hashed = secret::hash_password_of(name, password).unwrap();
     let mut writer = service.store.write().await.unwrap();
-    people::set_password(&mut writer, &Actor::program(), id, &hashed).await.unwrap();
+    user_administration::set_password(&mut writer, &Actor::program(), id, &hashed).await.unwrap();
     commit(writer).await.unwrap();
     id
 }

@@ -7,12 +7,12 @@ use axum::body::Body;
 use axum::http::{HeaderMap, HeaderValue, Method, Request, Response, StatusCode, header};
 use axum::middleware::map_request;
 use gait_optimizer::Gait;
-use gaitwright_http::{Access, AppState, Hosts, router};
+use gaitwright_http::{AccessState, AppState, Hosts, router};
 use gaitwright_service::access::Reach;
 use gaitwright_service::backups::Backups;
-use gaitwright_service::studies::catalogue;
-use gaitwright_service::studies::plan::{self, NewStudy};
+use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::scheduler::Scheduler;
+use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::workers::{AfterSolves, Certify, Dispatch, Evaluate, Explain, InProcess};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::certificates::{self, CertificateOnRecord};
@@ -37,7 +37,7 @@ pub struct Service {
     /// What runs its studies.
     pub scheduler: Scheduler,
     /// Access control. By default sign-in is off, so every caller has all rights.
-    pub access: Arc<Access>,
+    pub access: Arc<AccessState>,
     /// Backups on request.
     pub backups: Arc<Backups>,
     work: JoinHandle<()>,
@@ -135,7 +135,7 @@ impl Service {
         Self {
             store,
             scheduler,
-            access: Arc::new(Access::without_sign_in()),
+            access: Arc::new(AccessState::without_sign_in()),
             backups: Arc::default(),
             work,
             certifier: None,
@@ -204,7 +204,7 @@ impl Service {
         let mut new = NewStudy::of(self.subject().await);
         change(&mut new);
         let mut writer = self.store.write().await.unwrap();
-        let study = plan::create(&mut writer, &Actor::program(), new).await.unwrap();
+        let study = study_plan::create(&mut writer, &Actor::program(), new).await.unwrap();
         commit(writer).await.unwrap();
         self.scheduler.changed();
         study.id
@@ -360,7 +360,7 @@ pub async fn for_localhost<B>(mut request: Request<B>) -> Request<B> {
 async fn with_catalogue(database: &Path) -> Store {
     let store = Store::open(database).await.unwrap();
     let mut writer = store.write().await.unwrap();
-    catalogue::ensure(&mut writer).await.unwrap();
+    built_in_entries::ensure(&mut writer).await.unwrap();
     commit(writer).await.unwrap();
     store
 }

@@ -5,8 +5,8 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use futures_util::future::join_all;
-use gaitwright_http::{Access, openapi};
-use gaitwright_service::access::{Right, Role, people, secret};
+use gaitwright_http::{AccessState, openapi};
+use gaitwright_service::access::{Right, Role, secret, user_administration};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::commit;
 use gaitwright_store::members::MemberKind;
@@ -216,19 +216,19 @@ async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     member(&service, study, MemberKind::User, "R1").await;
     let mut writer = service.store.write().await.unwrap();
     let hashed = secret::hash_password("correct horse battery").unwrap();
-    people::set_password(&mut writer, &Actor::program(), rater, &hashed).await.unwrap();
+    user_administration::set_password(&mut writer, &Actor::program(), rater, &hashed).await.unwrap();
     commit(writer).await.unwrap();
     let credentials = "name=R1&password=correct+horse+battery";
     let session = session_of(&send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, credentials).await);
     let taken = send(&service, &session, &Method::POST, &format!("/rate/{study}"), FORM, "").await;
     let pair = taken.headers["location"].to_str().unwrap().to_owned();
 
-    service.access = Arc::new(Access::by_sign_in(0.0));
+    service.access = Arc::new(AccessState::by_sign_in(0.0));
     let answer = "response_ms=900&answer=first&note=%22steady%22+%26+calm";
     let refused = send(&service, &session, &Method::POST, &pair, FORM, answer).await;
     assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
     assert!(refused.text.contains("Your entry was not saved"), "{}", refused.text);
-    service.access = Arc::new(Access::by_sign_in(3600.0));
+    service.access = Arc::new(AccessState::by_sign_in(3600.0));
     let heard = service.feedback(study).await.len();
 
     // A wrong password does not lose the entry either.
@@ -346,7 +346,7 @@ async fn password_change_requires_the_old_password_or_a_recent_link() {
 
     // A user who forgot the password gets a link, and need not enter the current password for an hour.
     let mut writer = service.store.write().await.unwrap();
-    let link = people::link(&mut writer, &Actor::program(), id).await.unwrap();
+    let link = user_administration::link(&mut writer, &Actor::program(), id).await.unwrap();
     commit(writer).await.unwrap();
     let fresh = come(&link).await;
     let page = send(&service, &fresh, &Method::GET, "/account", FORM, "").await;
@@ -367,7 +367,7 @@ async fn wrong_passwords_wait_longer_each_time_and_are_audited() {
     let (id, _) = user(&service, "Ada", Role::Clinician).await;
     let hashed = secret::hash_password("correct horse battery").unwrap();
     let mut writer = service.store.write().await.unwrap();
-    people::set_password(&mut writer, &Actor::program(), id, &hashed).await.unwrap();
+    user_administration::set_password(&mut writer, &Actor::program(), id, &hashed).await.unwrap();
     commit(writer).await.unwrap();
     let wrong = "name=Ada&password=wrong";
     for _ in 0..4 {
@@ -416,7 +416,7 @@ async fn sessions_end_if_idle_or_disabled_and_tokens_if_revoked() {
     assert_eq!(send(&service, &admin, &Method::POST, &revoke, json, "").await.status, StatusCode::OK);
     assert_eq!(send(&service, &script, &Method::GET, me, "", "").await.status, StatusCode::UNAUTHORIZED);
 
-    service.access = Arc::new(Access::by_sign_in(0.0));
+    service.access = Arc::new(AccessState::by_sign_in(0.0));
     tokio::time::sleep(std::time::Duration::from_millis(5)).await;
     assert_eq!(send(&service, &admin, &Method::GET, me, "", "").await.status, StatusCode::UNAUTHORIZED);
     service.stop().await;

@@ -6,7 +6,7 @@
 use axum::http::StatusCode;
 use gait_optimizer::{Gait, GaitFigures, Mesh};
 use gaitwright_service::studies::archive::{self, SigningKey};
-use gaitwright_store::row::Row;
+use gaitwright_store::archived_row::Row;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{Store, StudyId, now};
 use gaitwright_tests::archives::{exported, import, import_trusting};
@@ -236,12 +236,12 @@ const FORGERIES: [Forgery; 68] = [
             }
             state_figures_of(r, &document);
         },
-        "the durations of its gait differ from its motion",
+        "the durations of its gait do not match its motion",
     ),
     (
         "a gait of another subject",
         |r| gait(r.first("gaits"), |g| scale(&mut g["subject"]["body_mass_kg"])),
-        "another height or body mass",
+        "a different height or body mass",
     ),
     (
         "a gait that is not its hash",

@@ -76,6 +76,9 @@ fn other_invalid_arguments_are_refused() {
     refused(&["solve", "--tolerance", "5"], "tolerance is 5;");
     refused(&["solve", "--warm", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
+    refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
+    refused(&["simulate", "nowhere.json", "--walks", "0"], "must be a whole number from 1 to 100000");
+    refused(&["simulate", "nowhere.json", "--ground", "-5"], "ground_heights_m is -0.005; it must be 0 to 0.05.");
 }
 
 #[test]

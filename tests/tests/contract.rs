@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::choice::ranking_to_show;
-use gaitwright_service::studies::recommended::Judged;
+use gaitwright_service::studies::certified_best::Judged;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::summary;
+use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
@@ -29,7 +29,12 @@ fn shape(value: &Value) -> Value {
 #[tokio::test]
 async fn documents_keep_their_shape() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let service = Service::start(
+        &folder.path().join("a.db"),
+        Analytic { states_unchanged_bounds: true, ..Analytic::default() },
+        1,
+    )
+    .await;
     let study = service.study(|new| new.trial_budget = 3).await;
     let present = service.wait_for(study, &[StudyState::Finished]).await;
     let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), present).await.unwrap();

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_store::{Store, clock, commit};
+use gaitwright_store::{Store, access_clock, commit};
 use gaitwright_tests::broker::Broker;
 use gaitwright_tests::cli;
 use gaitwright_tests::every_table::filled;
@@ -51,10 +51,10 @@ async fn doctor_reports_a_clock_that_was_set_back() {
     let (folder, database) = filled().await;
     let (code, lines) = doctor(folder.path(), &["--database", "a.db"]);
     assert_eq!(code, Some(0), "{lines:?}");
-    assert!(lines[3].contains("a.db is whole"), "{lines:?}");
+    assert!(lines[3].contains("a.db is intact"), "{lines:?}");
     let store = Store::open(&database).await.unwrap();
     let mut writer = store.write().await.unwrap();
-    clock::reach(&mut writer, "2099-01-01T00:00:00.000Z".parse().unwrap()).await.unwrap();
+    access_clock::reach(&mut writer, "2099-01-01T00:00:00.000Z".parse().unwrap()).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     let clock = trouble(doctor(folder.path(), &["--database", "a.db"]));

@@ -347,7 +347,7 @@ fn unknown_get_route_fails_until_it_is_classified() {
 }
 
 /// What each command has to do with people and devices.
-const COMMANDS: [(&str, &str); 23] = [
+const COMMANDS: [(&str, &str); 24] = [
     ("convert", "makes tables and pictures of a gait file, and nothing for a device"),
     ("import", "writes the rows of an archive after checking them: `archives.rs` holds its rules"),
     ("signing-key", "makes a key to sign archives"),
@@ -366,6 +366,7 @@ const COMMANDS: [(&str, &str); 23] = [
     ("reproduce", "runs automatic studies"),
     ("restore", "puts a copy in place of a record"),
     ("serve", "serves the entry points that the other tests call"),
+    ("simulate", "simulates walks with a gait file"),
     ("solve", "solves for a gait file"),
     ("sweep", "solves for gait files"),
     ("tune", "runs an automatic study"),

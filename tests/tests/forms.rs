@@ -298,7 +298,7 @@ async fn comparison_page_shows_both_gaits_and_keeps_the_input() {
         assert!(refused.text.contains(kept), "{kept}");
     }
     let none = format!("a={a}&b={b}&source=clinician&author=K&note=&key={UNKNOWN}");
-    is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "one of the answers of the form");
+    is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "one of the answers on the form");
     let itself = format!("a={a}&b={a}&answer=b&source=clinician&author=K&note=&key={UNKNOWN}");
     is_page(&service.post_text(&path, FORM, &itself).await, unprocessable, "compared with itself");
     is_page(&service.fetch(&format!("{path}?a={a}&b={a}")).await, StatusCode::OK, "are the same. Choose two different");

@@ -45,7 +45,7 @@ async fn health_is_ready() {
     let (_folder, service) = service().await;
     let answer = service.fetch("/health").await;
     assert_eq!(answer.status, StatusCode::OK);
-    assert_eq!(answer.json()["status"], "ready");
+    assert_eq!(answer.json()["status"], "healthy");
     service.stop().await;
 }
 

@@ -62,12 +62,12 @@ async fn rater_reports_a_gait_of_an_answered_pair() {
     assert_eq!(rate(&service, &token, "first").await.status, StatusCode::OK);
     assert_eq!(rate(&service, &token, "second").await.status, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/rate/pair/{token}")).await.text;
-    assert!(page.contains("A gait of this pair is unsafe"), "{page}");
+    assert!(page.contains("A gait in this pair is unsafe"), "{page}");
     let form = "answer=unsafe_second&note=knee+buckled";
     let sent = service.post_text(&format!("/rate/pair/{token}"), FORM, form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
     let told = service.fetch(&format!("/rate?saved={token}&reported=true")).await.text;
-    assert!(told.contains("Your safety report is recorded"), "{told}");
+    assert!(told.contains("Your safety report has been recorded"), "{told}");
     assert_eq!(closed(&service, study).await.len(), 1);
     // The other one, too.
     assert_eq!(rate(&service, &token, "unsafe_both").await.status, StatusCode::OK);

@@ -58,6 +58,7 @@ async fn writes_are_refused_after_a_file_of_the_record_is_lost() {
             let pages = service.fetch("/api/v1/subjects").await;
             assert_eq!(pages.status, StatusCode::OK, "what was read before can still be read");
             assert_eq!(service.fetch("/ready").await.status, StatusCode::SERVICE_UNAVAILABLE);
+            assert!(service.fetch("/system").await.text.contains("The record cannot be written"));
             service.abandon().await;
         }
     }

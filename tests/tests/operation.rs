@@ -5,7 +5,7 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::SolveStatus;
-use gaitwright::cli::study::prune;
+use gaitwright::cli::archive_commands::prune;
 use gaitwright_service::studies::archive::file::read_through;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
@@ -280,7 +280,7 @@ async fn record_with_a_hard_link_is_refused() {
     std::fs::hard_link(&database, folder.path().join("b.db")).unwrap();
     for name in ["a.db", "b.db"] {
         let refused = Store::open(&folder.path().join(name)).await.unwrap_err().to_string();
-        assert!(refused.contains("has hard links"), "{refused}");
+        assert!(refused.contains("has other hard links"), "{refused}");
     }
     std::fs::remove_file(folder.path().join("b.db")).unwrap();
     Store::open(&database).await.unwrap().close().await;
@@ -313,7 +313,7 @@ async fn every_command_reads_record_and_second_anchor_from_the_settings_file() {
     Service::start(&database, Analytic::default(), 1).await.stop().await;
     let store = Store::open(&database).await.unwrap();
     let mut writer = store.write().await.unwrap();
-    gaitwright_service::access::people::way_in(&mut writer).await.unwrap();
+    gaitwright_service::access::user_administration::way_in(&mut writer).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     let (done, text) = verified();

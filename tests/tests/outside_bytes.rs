@@ -5,7 +5,7 @@
 
 use axum::body::Body;
 use axum::http::{HeaderValue, Method, Request, StatusCode};
-use gaitwright_http::{Access, openapi};
+use gaitwright_http::{AccessState, openapi};
 use gaitwright_service::studies::archive::file::read_through;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
@@ -203,7 +203,7 @@ async fn malformed_headers_are_refused_without_server_errors() {
         let bytes: Vec<u8> = start.bytes().chain(rest).collect();
         let value = HeaderValue::from_bytes(&bytes).unwrap();
         // Where nobody needs to sign in, a request comes as far as the handlers that read the other headers.
-        for access in [Access::by_sign_in(900.0), Access::without_sign_in()] {
+        for access in [AccessState::by_sign_in(900.0), AccessState::without_sign_in()] {
             target.service.access = Arc::new(access);
             for request in [Request::get(&trials), Request::post(post), Request::post(&starting), Request::get(&events)]
             {

@@ -7,9 +7,9 @@ use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, ReferenceGait, SolveOptions, Subject, TunedBounds,
 };
 use gaitwright_service::access::Reach;
-use gaitwright_service::studies::catalogue;
-use gaitwright_service::studies::plan::{self, NewStudy};
-use gaitwright_service::workers::nats::{Brought, Order, pack};
+use gaitwright_service::studies::built_in_entries;
+use gaitwright_service::studies::study_plan::{self, NewStudy};
+use gaitwright_service::workers::nats::{Order, ResultMessage, pack};
 use gaitwright_service::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
 use gaitwright_store::studies::{Chosen, FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
@@ -19,6 +19,7 @@ use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::skipped::skipped;
 use serde_json::{Value, json};
+use std::collections::HashSet;
 use std::path::Path;
 use std::process::{Output, Stdio};
 use std::time::Duration;
@@ -259,6 +260,35 @@ fn tune_runs_a_study_of_three_trials() {
     insta::assert_json_snapshot!("tune_fields", summary.as_object().unwrap().keys().collect::<Vec<_>>());
 }
 
+#[test]
+fn tune_finds_a_new_gait_in_every_trial_unless_results_may_repeat() {
+    let distinct = |more: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let tune = ["tune", "--muscles", "off", "--trials", "6", "--seed", "7", "--workers", "1", "--json"];
+        let summary = json_of(&gaitwright(folder.path(), &[&tune[..], more].concat()));
+        let rmse = |trial: &Value| trial["gait_rmse_rad"].as_f64().unwrap().to_bits();
+        summary["trials"].as_array().unwrap().iter().map(rmse).collect::<HashSet<_>>().len()
+    };
+    assert_eq!(distinct(&[]), 6);
+    assert!(distinct(&["--repeat-results"]) < 6);
+}
+
+#[test]
+fn tune_takes_the_multi_start_flags_of_solve() {
+    let folder = tempfile::tempdir().unwrap();
+    let flags = ["--muscles", "off", "--json", "--initial-guesses", "3", "--nearest-within", "100"];
+    let tuned = json_of(&gaitwright(folder.path(), &[&["tune", "--trials", "1"][..], &flags].concat()));
+    let trial = &tuned["trials"][0];
+    let values = trial["action"].as_object().unwrap().iter().map(|(name, value)| format!("{name}={value}"));
+    let bounds = values.collect::<Vec<_>>().join(",");
+    let solved = json_of(&gaitwright(folder.path(), &[&["solve", "--bounds", &bounds][..], &flags].concat()));
+    assert_eq!(solved["gait_rmse_rad"], trial["gait_rmse_rad"]);
+
+    let refused = cli::run(BINARY, folder.path(), &["tune", "--trials", "1", "--nearest-within", "101"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("--nearest-within"));
+}
+
 /// Waits for a condition that another process brings about.
 async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
     for _ in 0..6000 {
@@ -274,11 +304,11 @@ async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
 async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyId {
     let store = Store::open(database).await.unwrap();
     let mut writer = store.write().await.unwrap();
-    catalogue::ensure(&mut writer).await.unwrap();
+    built_in_entries::ensure(&mut writer).await.unwrap();
     let subject = subjects::by_pseudonym(&mut writer, "paper-1").await.unwrap().unwrap();
     let mut new = NewStudy { muscles: false, trial_budget: 2, ..NewStudy::of(subject.id) };
     change(&mut new);
-    let study = plan::create(&mut writer, &gaitwright_store::audit::Actor::program(), new).await.unwrap();
+    let study = study_plan::create(&mut writer, &gaitwright_store::audit::Actor::program(), new).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     study.id
@@ -402,7 +432,7 @@ fn broker_delivers_a_result_with_muscles() {
     order.warm_start = Some(outcome.warm_start.clone());
     let order = pack(&Order { program: String::new(), assignment: order }).unwrap().len();
     let finding = Finding::Ended { outcome: Box::new(outcome), iterations };
-    let result = pack(&Brought { attempt, worker: "worker".to_owned(), finding }).unwrap().len();
+    let result = pack(&ResultMessage { attempt, worker: "worker".to_owned(), finding }).unwrap().len();
     eprintln!("a job takes {order} bytes, a result {result}");
     assert!(order.max(result) < 512 << 10, "a job takes {order} bytes, a result {result}");
 }

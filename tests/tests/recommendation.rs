@@ -5,11 +5,11 @@
 use axum::http::StatusCode;
 use gait_learner::SearchSpace;
 use gait_optimizer::{Gait, TunedBounds};
-use gaitwright::cli::study::prune;
+use gaitwright::cli::archive_commands::prune;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::choice::ranking_to_show;
-use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::study_plan::NewStudy;
+use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::gaits;
 use gaitwright_store::studies::StudyState;
@@ -90,8 +90,8 @@ async fn recommendation_states_a_failed_certificate() {
     assert_eq!(failed["certificate"], "failed");
     assert_eq!((&failed["failures"], &failed["passing"]), (&json!(["the simulated walker falls"]), &Value::Null));
     let shown = service.fetch(&page).await.text;
-    assert!(shown.contains("This gait failed its") && shown.contains("the simulated walker falls"), "{shown}");
-    assert!(shown.contains("The next best gait has no certificate"), "{shown}");
+    assert!(shown.contains("This gait failed") && shown.contains("the simulated walker falls"), "{shown}");
+    assert!(shown.contains("The next-best gait has no certificate"), "{shown}");
     assert!(
         service.fetch(&format!("/trials/{best}")).await.text.contains("Read the reasons before anyone walks with it")
     );
@@ -120,7 +120,7 @@ async fn recommendation_states_a_passed_certificate() {
     certified(&service, best, true).await;
     let passed = recommendation(&service, study).await;
     assert_eq!((&passed["certificate"], &passed["passing"]), (&json!("passed"), &Value::Null));
-    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait passed its"));
+    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait passed"));
     service.stop().await;
 }
 

@@ -4,7 +4,7 @@
 
 use async_nats::jetstream::stream::{Config, RetentionPolicy};
 use gait_optimizer::{GaitProblem, SolveOptions, Subject};
-use gaitwright_service::workers::nats::{Brought, JetStream, Worker, pack};
+use gaitwright_service::workers::nats::{JetStream, ResultMessage, Worker, pack};
 use gaitwright_service::workers::{Assignment, Attempt, Dispatch, Evaluate, Finding, News};
 use gaitwright_store::TrialId;
 use gaitwright_tests::analytic::Analytic;
@@ -31,7 +31,7 @@ async fn unrecordable_result_is_delivered_ten_times_and_then_dropped() {
     let engine = JetStream::connect(&broker.url(), QUEUE, 1, Duration::from_millis(200)).await.unwrap();
     let context = async_nats::jetstream::new(async_nats::connect(broker.url()).await.unwrap());
     let attempt = job(1).attempt;
-    let brought = Brought { attempt, worker: "w".to_owned(), finding: Finding::Broke("as asked".to_owned()) };
+    let brought = ResultMessage { attempt, worker: "w".to_owned(), finding: Finding::Broke("as asked".to_owned()) };
     let stream = loop {
         match context.get_stream(format!("{QUEUE}-results")).await {
             Ok(stream) => break stream,

@@ -36,7 +36,8 @@ async fn failed_trials_are_reported_with_their_own_exit_code() {
     let solver = Analytic { panics: vec![2], ..Analytic::default() };
     let service = Service::start(&out.join("studies.db"), solver, 1).await;
     for muscles in [false, true] {
-        let study = service.study(|new| (new.trial_budget, new.muscles) = (3, muscles)).await;
+        let study =
+            service.study(|new| (new.trial_budget, new.muscles, new.repeat_results) = (3, muscles, Some(true))).await;
         service.wait_for(study, &[StudyState::Finished]).await;
     }
     service.stop().await;

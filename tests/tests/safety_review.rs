@@ -62,7 +62,9 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert!(!waits_at_home(&service).await);
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(
-        shown.contains("K1 reviewed the report and decided that the gait stays unsafe: <q>the knee buckles</q>"),
+        shown.contains(
+            "K1 reviewed the report and decided that the gait should remain marked as unsafe: <q>the knee buckles</q>"
+        ),
         "{shown}"
     );
     let heard = service.feedback(study).await;

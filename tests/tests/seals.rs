@@ -375,6 +375,6 @@ async fn every_table_is_sealed_or_has_checksums() {
         let table: &str = row.get(0);
         let mut known = seals::TABLES.iter().chain(seals::CHECKED);
         let known = known.any(|sealed| sealed.table == table) || seals::NOT_SEALED.contains(&table);
-        assert!(known, "{table}: name it in store/seals.rs, in TABLES or in CHECKED");
+        assert!(known, "{table}: name it in store/src/seals/tables.rs, in TABLES or in CHECKED");
     }
 }

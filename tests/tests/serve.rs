@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_service::access::Role;
-use gaitwright_service::access::people::{self, NewUser};
+use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, commit};
 use gaitwright_tests::cli::run;
@@ -199,7 +199,7 @@ fn https_is_served_with_a_certificate_from_files() {
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&answer.stdout).to_lowercase();
-    assert!(text.contains("\"status\":\"ready\""), "{text} {}", String::from_utf8_lossy(&answer.stderr));
+    assert!(text.contains("\"status\":\"healthy\""), "{text} {}", String::from_utf8_lossy(&answer.stderr));
     assert!(text.contains("strict-transport-security"), "{text}");
     assert!(get(process.address(), "/health").is_err(), "plain HTTP is not answered");
 }
@@ -333,7 +333,7 @@ async fn nobody_administers(folder: &Path) {
     let store = Store::open(&folder.join("gaitwright.db")).await.unwrap();
     let mut writer = store.write().await.unwrap();
     let new = NewUser { name: "admin".to_owned(), role: Role::Admin };
-    people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
     sqlx::query("update users set disabled_at = created_at").execute(&mut **writer).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
@@ -361,7 +361,7 @@ async fn users_link_command_prints_a_working_sign_in_link() {
     let store = Store::open(&folder.path().join("gaitwright.db")).await.unwrap();
     let mut writer = store.write().await.unwrap();
     let new = NewUser { name: "Ada".to_owned(), role: Role::Admin };
-    people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     drop(store);
@@ -374,7 +374,7 @@ async fn users_link_command_prints_a_working_sign_in_link() {
     let first = send(process.address(), "POST", link.trim(), "").unwrap();
     assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
     for (arguments, instead) in
-        [(&["users", "list"][..], "page Users and tokens"), (&["users", "link", "ada"], "--sign-in-link")]
+        [(&["users", "list"][..], "Users and tokens page"), (&["users", "link", "ada"], "--sign-in-link")]
     {
         let busy = run(arguments);
         let said = String::from_utf8_lossy(&busy.stderr).into_owned();

@@ -5,11 +5,11 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use futures_util::{StreamExt, stream};
-use gaitwright_http::Access;
+use gaitwright_http::AccessState;
 use gaitwright_service::access::back_off::{self, Origin};
-use gaitwright_service::access::people::{self, NewUser};
-use gaitwright_service::access::sign_in::{self, Limits};
+use gaitwright_service::access::sign_in::{self, SessionLimits};
 use gaitwright_service::access::tokens::{self as making, NewToken};
+use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Caller, Clock, Right, Role};
 use gaitwright_store::audit::{self, Actor, AuditRow};
 use gaitwright_store::members::MemberKind;
@@ -80,18 +80,18 @@ async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<I
 }
 
 /// Sign-in with a stopped clock, so that no wait ends before the next attempt, however slow the machine is.
-fn standing_still() -> Arc<Access> {
+fn standing_still() -> Arc<AccessState> {
     standing_at(now())
 }
 
-fn standing_at(at: Instant) -> Arc<Access> {
-    Arc::new(Access { clock: Clock::over(move || at), ..Access::by_sign_in(3600.0) })
+fn standing_at(at: Instant) -> Arc<AccessState> {
+    Arc::new(AccessState { clock: Clock::over(move || at), ..AccessState::by_sign_in(3600.0) })
 }
 
 #[tokio::test]
 async fn bodies_of_anonymous_callers_are_limited_in_size() {
     let (_folder, mut service) = service().await;
-    service.access = Arc::new(Access::by_sign_in(3600.0));
+    service.access = Arc::new(AccessState::by_sign_in(3600.0));
     let token = token(&service, &[Right::Run]).await;
     let name = |length: usize| format!("name={}&password={RIGHT}", "a".repeat(length));
     for (length, expected) in [(60_000, StatusCode::UNAUTHORIZED), (70_000, StatusCode::PAYLOAD_TOO_LARGE)] {
@@ -131,7 +131,7 @@ async fn with_late_body(
 #[tokio::test]
 async fn change_is_refused_if_rights_or_consent_end_before_its_body_is_complete() {
     let (_folder, mut service) = service().await;
-    service.access = Arc::new(Access::by_sign_in(3600.0));
+    service.access = Arc::new(AccessState::by_sign_in(3600.0));
     let root = signed_in(&service, Role::Admin).await;
     let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
     let (id, link) = user(&service, "Eve", Role::Admin).await;
@@ -294,7 +294,7 @@ async fn ten_thousand_aborted_sign_ins_do_not_erase_the_failures_of_an_account()
     // Nor does a restart.
     service.stop().await;
     let mut service = start_anew(&folder.path().join("a.db")).await;
-    service.access = Arc::new(Access::by_sign_in(3600.0));
+    service.access = Arc::new(AccessState::by_sign_in(3600.0));
     assert_eq!(waits(&service).await.count, 4);
     let mut statuses = Vec::new();
     for _ in 0..2 {
@@ -534,13 +534,13 @@ fn clock(offset: &Arc<AtomicI64>) -> Clock {
     Clock::over(move || now().plus_seconds(offset.load(Ordering::SeqCst)))
 }
 
-fn access(limits: Limits, offset: &Arc<AtomicI64>) -> Arc<Access> {
-    let mut access = Access::by_sign_in(limits.idle_seconds);
+fn access(limits: SessionLimits, offset: &Arc<AtomicI64>) -> Arc<AccessState> {
+    let mut access = AccessState::by_sign_in(limits.idle_seconds);
     (access.limits, access.clock) = (limits, clock(offset));
     Arc::new(access)
 }
 
-const LIMITS: Limits = Limits { idle_seconds: 3600.0, lifetime_seconds: 8.0 * 3600.0 };
+const LIMITS: SessionLimits = SessionLimits { idle_seconds: 3600.0, lifetime_seconds: 8.0 * 3600.0 };
 
 #[tokio::test]
 async fn active_sessions_end_after_their_lifetime() {
@@ -696,13 +696,13 @@ async fn new_administrator_is_created_if_all_are_disabled() {
     let (_folder, service) = service().await;
     let mut writer = service.store.write().await.unwrap();
     let add = NewUser { name: "admin".to_owned(), role: Role::Admin };
-    let admin = people::add(&mut writer, &Actor::program(), &add).await.unwrap();
-    assert_eq!(people::way_in(&mut writer).await.unwrap().id, admin.id);
+    let admin = user_administration::add(&mut writer, &Actor::program(), &add).await.unwrap();
+    assert_eq!(user_administration::way_in(&mut writer).await.unwrap().id, admin.id);
     let disable = "update users set disabled_at = created_at";
     sqlx::query(disable).execute(&mut **writer).await.unwrap();
-    let fresh = people::way_in(&mut writer).await.unwrap();
+    let fresh = user_administration::way_in(&mut writer).await.unwrap();
     assert_eq!((fresh.name.as_str(), fresh.role, fresh.has_password), ("admin-2", Role::Admin, false));
-    assert!(people::link(&mut writer, &Actor::terminal(), fresh.id).await.is_ok());
+    assert!(user_administration::link(&mut writer, &Actor::terminal(), fresh.id).await.is_ok());
     commit(writer).await.unwrap();
     service.stop().await;
 }

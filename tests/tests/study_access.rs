@@ -52,7 +52,7 @@ impl Closed {
     async fn new() -> Self {
         let (folder, service) = service().await;
         let admin = signed_in(&service, Role::Admin).await;
-        let set_up = |new: &mut gaitwright_service::studies::plan::NewStudy| {
+        let set_up = |new: &mut gaitwright_service::studies::study_plan::NewStudy| {
             (new.name, new.feedback_mode, new.trial_budget) = (Some(NAME.to_owned()), FeedbackMode::Mixed, 30);
         };
         let study = service.study(set_up).await;
@@ -501,7 +501,7 @@ async fn study_created_as_restricted_is_never_open() {
 
 /// A finished study in which people may answer, and its first three gaits.
 async fn answered_by_people(service: &Service) -> (StudyId, Vec<String>) {
-    let mixed = |new: &mut gaitwright_service::studies::plan::NewStudy| {
+    let mixed = |new: &mut gaitwright_service::studies::study_plan::NewStudy| {
         (new.feedback_mode, new.trial_budget) = (FeedbackMode::Mixed, 30);
     };
     let study = service.study(mixed).await;

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_learner::{LearnerSettings, Partner};
+use gait_learner::{LearnerSettings, Method, Partner};
 use gaitwright_service::studies::comparison::open_question;
-use gaitwright_service::studies::plan::NewStudy;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::workers::{Attempt, InProcess};
 use gaitwright_store::feedback::{FeedbackContent, Source};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
@@ -16,7 +16,7 @@ use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::engine_without_workers::Away;
 use gaitwright_tests::service::Service;
 use serde_json::json;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -106,6 +106,85 @@ async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
         if let Some(from) = trial.warm_started_from {
             assert!(trials.iter().any(|t| t.id == from && t.state == TrialState::Converged));
         }
+    }
+    service.stop().await;
+}
+
+/// The values of the bounds that the analytic solver uses.
+fn used(trial: &Trial) -> [u64; 4] {
+    let a = trial.action;
+    [a.a1, a.a5, a.a6, a.a7].map(f64::to_bits)
+}
+
+#[tokio::test]
+async fn study_of_thirty_trials_has_no_gait_twice_unless_results_may_repeat() {
+    let folder = tempfile::tempdir().unwrap();
+    let engine = Analytic { states_unchanged_bounds: true, ..Analytic::default() };
+    let service = Service::start(&folder.path().join("a.db"), engine, 1).await;
+    for method in [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain] {
+        for repeats in [false, true] {
+            let study = service
+                .study(|new| {
+                    (new.trial_budget, new.seed) = (30, 5);
+                    (new.learner, new.repeat_results) = (LearnerSettings::of(method), Some(repeats));
+                })
+                .await;
+            service.wait_for(study, &[StudyState::Finished]).await;
+            let trials = service.trials(study).await;
+            assert_eq!(trials.len(), 30);
+            let converged = trials.iter().filter(|trial| trial.state == TrialState::Converged);
+            let distinct: HashSet<_> = converged.clone().map(used).collect();
+            assert_eq!(distinct.len() < converged.count(), repeats, "{method:?}");
+            let page = service.fetch(&format!("/studies/{study}")).await.text;
+            assert!(page.contains("Bounds that have not been active in any gait so far: a2, a3, a4, a8."), "{page}");
+        }
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn gait_page_lists_the_values_that_leave_the_gait_unchanged() {
+    let folder = tempfile::tempdir().unwrap();
+    let engine = Analytic { states_unchanged_bounds: true, ..Analytic::default() };
+    let service = Service::start(&folder.path().join("a.db"), engine, 1).await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await[0].id;
+    let page = service.fetch(&format!("/trials/{trial}")).await.text;
+    assert_eq!(page.matches("any value").count(), 4, "{page}");
+    assert_eq!(page.matches("this value only").count(), 4, "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn study_ends_when_the_gait_of_every_action_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let engine = Analytic { states_unchanged_bounds: true, ..Analytic::default() };
+    let service = Service::start(&folder.path().join("a.db"), engine, 1).await;
+    for (repeats, expected) in [(None, 1), (Some(false), 1), (Some(true), 3)] {
+        let study = service
+            .study(|new| {
+                (new.search_space, new.trial_budget) = (Some(inactive_bound().into()), 30);
+                new.repeat_results = repeats;
+            })
+            .await;
+        let ended = service.wait_for(study, &[StudyState::Finished]).await;
+        assert_eq!(service.trials(study).await.len(), expected);
+        assert_eq!(ended.state_reason.contains("has the gait of one that was tried"), expected == 1, "{ended:?}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn published_learner_repeats_results_by_default() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    for (learner, expected) in
+        [(LearnerSettings::default(), false), (LearnerSettings::published(Method::LineCoSpar), true)]
+    {
+        let study = service.study(|new| new.learner = learner.clone()).await;
+        let ended = service.wait_for(study, &[StudyState::Finished]).await;
+        assert_eq!(ended.plan.repeat_results, expected);
     }
     service.stop().await;
 }

@@ -21,7 +21,7 @@ const V1: &[u8] = include_bytes!("../records/v1.db.zst");
 /// Tables that sign-in alone fills, and the example does not.
 const OF_SIGN_IN: [&str; 3] = ["clock", "sign_in_failures", "sign_in_sources"];
 /// The records that are kept, by the form in which they were written.
-const RECORDS: [(i64, &[u8]); 7] = [
+const RECORDS: [(i64, &[u8]); 8] = [
     (1, V1),
     (7, include_bytes!("../records/v7.db.zst")),
     (8, include_bytes!("../records/v8.db.zst")),
@@ -29,6 +29,7 @@ const RECORDS: [(i64, &[u8]); 7] = [
     (10, include_bytes!("../records/v10.db.zst")),
     (11, include_bytes!("../records/v11.db.zst")),
     (12, include_bytes!("../records/v12.db.zst")),
+    (13, include_bytes!("../records/v13.db.zst")),
 ];
 
 fn unpacked(record: &[u8]) -> (TempDir, PathBuf) {

@@ -1,36 +1,19 @@
 // @ts-check
-// The animated stick figure of a gait, or of two on one clock. The server computes the positions.
+// The walker of a gait, or those of two gaits on one clock. The server draws the walker and computes the positions.
 
+import { followCursor, showCursor } from "./cycle_cursor.mjs";
+import { MovingGround } from "./moving_ground.mjs";
 import { mayMove, showStrips } from "./reduced_motion.mjs";
 import { Clocks } from "./stride_clock.mjs";
+import { Walker } from "./walker_body.mjs";
 
 /**
- * @typedef {[number, number]} Place
- * @typedef {{knee: Place, ankle: Place, heel: Place, toe: Place}} Leg
- * @typedef {{time_s: number, hip: Place, shoulder: Place, left: Leg, right: Leg, domain: string, forces_n: Place[], activations?: number[]}} Frame
- * @typedef {{stride_time_s: number, stride_length_m: number, frames: Frame[]}} Motion
+ * @typedef {import("./walker_body.mjs").Place} Place
+ * @typedef {import("./walker_body.mjs").Leg} Leg
+ * @typedef {import("./walker_body.mjs").Figure} Figure
+ * @typedef {import("./walker_body.mjs").Frame} Frame
+ * @typedef {{stride_time_s: number, stride_length_m: number, frames: (Frame & {time_s: number})[]}} Motion
  */
-
-/**
- * Where the muscles are drawn, in the order of the activations: leg, from and to along hip-knee-ankle (0 to 2), and on
- * which side of the bone, in metres forwards. A scheme: attachments are the model's.
- * @type {["left" | "right", number, number, number][]}
- */
-const MUSCLES = [
-  ["left", 0.05, 1.05, -0.055],
-  ["left", -0.1, 0.4, -0.075],
-  ["left", -0.1, 0.4, 0.06],
-  ["left", 0.92, 1.9, -0.06],
-  ["left", 0.35, 1.08, 0.055],
-  ["left", 1.3, 1.95, -0.035],
-  ["left", 1.15, 1.9, 0.04],
-  ["right", 0.05, 1.0, -0.055],
-  ["right", -0.1, 0.4, -0.075],
-  ["right", -0.1, 0.4, 0.06],
-];
-
-/** Newtons per metre of a drawn force. */
-const FORCE_SCALE = 1600;
 
 /** @type {(a: Place, b: Place, share: number) => Place} */
 const between = (a, b, share) => [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
@@ -57,7 +40,6 @@ export function frameAt(motion, time) {
   const span = b.time_s - a.time_s;
   const share = span > 0 ? Math.min(Math.max((time - a.time_s) / span, 0), 1) : 0;
   return {
-    time_s: time,
     hip: between(a.hip, b.hip, share),
     shoulder: between(a.shoulder, b.shoulder, share),
     left: legBetween(a.left, b.left, share),
@@ -77,120 +59,66 @@ const inWords = (domain) => {
   return `${PHASES[phase] ?? phase}, ${side === "R" ? "right" : "left"} (${domain})`;
 };
 
-/** A gait on a canvas. */
+/**
+ * The reference gait of a figure, which the server wrote into it: joints in mm, one stride at equal time steps.
+ * @param {SVGSVGElement} svg
+ * @returns {Figure[]}
+ */
+function referenceOf(svg) {
+  const written = svg.querySelector("[data-ghost]")?.getAttribute("data-ghost");
+  if (!written) return [];
+  return written.split(";").map((figure) => {
+    const mm = figure.split(" ").map(Number);
+    const joint = (/** @type {number} */ i) => /** @type {Place} */ ([mm[2 * i] / 1000, mm[2 * i + 1] / 1000]);
+    const leg = (/** @type {number} */ i) => ({ knee: joint(i), ankle: joint(i + 1), heel: joint(i + 2), toe: joint(i + 3) });
+    return { hip: joint(0), shoulder: joint(1), left: leg(2), right: leg(6) };
+  });
+}
+
+/** A gait in its figure. */
 class Scene {
   /**
-   * @param {HTMLCanvasElement} canvas
+   * @param {SVGSVGElement} svg
    * @param {Motion} motion
    */
-  constructor(canvas, motion) {
-    this.canvas = canvas;
+  constructor(svg, motion) {
+    this.svg = svg;
     this.motion = motion;
+    this.walker = new Walker(svg);
+    this.ground = new MovingGround(svg);
+    this.reference = referenceOf(svg);
     const stride = `stride ${motion.stride_length_m.toFixed(2)} m in ${motion.stride_time_s.toFixed(2)} s`;
-    canvas.setAttribute("aria-label", `${canvas.getAttribute("aria-label")}: ${stride}`);
+    svg.setAttribute("aria-label", `${svg.getAttribute("aria-label")}: ${stride}`);
+  }
+
+  /** @param {number} share Of the gait cycle, 0 to 1. */
+  frame(share) {
+    return frameAt(this.motion, share * this.motion.stride_time_s);
+  }
+
+  /** @param {number} share @returns {Figure} */
+  referenceAt(share) {
+    const place = share * (this.reference.length - 1);
+    const before = Math.min(Math.floor(place), this.reference.length - 2);
+    const [a, b, within] = [this.reference[before], this.reference[before + 1], place - before];
+    return {
+      hip: between(a.hip, b.hip, within),
+      shoulder: between(a.shoulder, b.shoulder, within),
+      left: legBetween(a.left, b.left, within),
+      right: legBetween(a.right, b.right, within),
+    };
   }
 
   /**
-   * @param {number} share Of the gait cycle, 0 to 1.
-   * @param {number} strides Whole ones before.
+   * @param {number} strides Whole ones and the share of this one.
+   * @param {Figure | null} ghost The second figure.
    */
-  draw(share, strides) {
-    const ratio = window.devicePixelRatio || 1;
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    if (width === 0) return;
-    this.canvas.width = Math.round(width * ratio);
-    this.canvas.height = Math.round(height * ratio);
-    const pen = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
-    pen.scale(ratio, ratio);
-    const style = getComputedStyle(document.documentElement);
-    const colour = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
-    const frame = frameAt(this.motion, share * this.motion.stride_time_s);
-
-    const scale = height / 2.05;
-    const ground = height - 0.22 * scale;
-    const walked = strides * this.motion.stride_length_m;
-    /** @type {(place: Place) => Place} */
-    const at = (place) => [width / 2 + (place[0] - frame.hip[0]) * scale, ground - place[1] * scale];
-    /** @type {(places: Place[]) => void} */
-    const line = (places) => {
-      pen.beginPath();
-      places.forEach((place, i) => (i === 0 ? pen.moveTo(...at(place)) : pen.lineTo(...at(place))));
-      pen.stroke();
-    };
-
-    // Ground with a tick every half metre, so that the walking is seen.
-    pen.lineCap = pen.lineJoin = "round";
-    pen.strokeStyle = colour("--soft");
-    pen.fillStyle = colour("--soft");
-    pen.lineWidth = 1.5;
-    const reach = width / 2 / scale;
-    line([[frame.hip[0] - reach, 0], [frame.hip[0] + reach, 0]]);
-    pen.font = "12px system-ui, sans-serif";
-    pen.textAlign = "center";
-    const first = Math.ceil((walked + frame.hip[0] - reach) * 2);
-    for (let half = first; half / 2 <= walked + frame.hip[0] + reach; half += 1) {
-      const [x, y] = at([half / 2 - walked, 0]);
-      pen.fillRect(x - 0.5, y, 1, half % 2 === 0 ? 8 : 5);
-      // No number is cut in two at the edge.
-      if (half % 2 === 0 && x > 16 && x < width - 16) pen.fillText(`${half / 2} m`.replace("-", "\u2212"), x, y + 22);
-    }
-
-    // Forces.
-    pen.strokeStyle = colour("--c1");
-    pen.lineWidth = 2.5;
-    const feet = [frame.left.heel, frame.left.toe, frame.right.heel, frame.right.toe];
-    frame.forces_n.forEach((force, i) => {
-      if (Math.hypot(...force) < 10) return;
-      const foot = feet[i];
-      line([foot, [foot[0] + force[0] / FORCE_SCALE, foot[1] + force[1] / FORCE_SCALE]]);
-    });
-
-    // Muscles: thicker and darker, the more active.
-    pen.strokeStyle = colour("--c6");
-    frame.activations?.forEach((activation, i) => {
-      const [side, from, to, forwards] = MUSCLES[i];
-      const joints = [frame.hip, frame[side].knee, frame[side].ankle];
-      /** @type {(along: number) => Place} */
-      const beside = (along) => {
-        const bone = along < 1 ? 0 : 1;
-        const [a, b] = [joints[bone], joints[bone + 1]];
-        const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
-        const [x, z] = between(a, b, along - bone);
-        return [x - (forwards * (b[1] - a[1])) / length, z + (forwards * (b[0] - a[0])) / length];
-      };
-      pen.globalAlpha = 0.2 + 0.8 * Math.min(activation, 1);
-      pen.lineWidth = 2 + 6 * Math.min(activation, 1);
-      line([beside(from), beside((from + to) / 2), beside(to)]);
-    });
-    pen.globalAlpha = 1;
-
-    // The prosthetic side is dashed as well as of another colour.
-    const leg = (/** @type {Leg} */ l) => {
-      line([frame.hip, l.knee, l.ankle]);
-      line([l.ankle, l.heel, l.toe, l.ankle]);
-    };
-    pen.lineWidth = 5;
-    pen.strokeStyle = colour("--c0");
-    leg(frame.left);
-    pen.strokeStyle = colour("--c3");
-    line([frame.hip, frame.right.knee]);
-    pen.setLineDash([9, 8]);
-    line([frame.right.knee, frame.right.ankle]);
-    line([frame.right.ankle, frame.right.heel, frame.right.toe, frame.right.ankle]);
-    pen.setLineDash([]);
-    pen.strokeStyle = colour("--ink");
-    line([frame.hip, frame.shoulder]);
-    pen.fillStyle = colour("--ink");
-    for (const joint of [frame.hip, frame.left.knee, frame.right.knee, frame.left.ankle, frame.right.ankle]) {
-      pen.beginPath();
-      pen.arc(...at(joint), 4, 0, 2 * Math.PI);
-      pen.fill();
-    }
-    const [hx, hy] = at(between(frame.hip, frame.shoulder, 1.18));
-    pen.beginPath();
-    pen.arc(hx, hy, 0.1 * scale, 0, 2 * Math.PI);
-    pen.lineWidth = 3;
-    pen.stroke();
+  draw(strides, ghost) {
+    const frame = this.frame(strides % 1);
+    this.walker.pose(frame);
+    this.walker.poseGhost(ghost);
+    const start = this.motion.frames[0].hip[0];
+    this.ground.draw(Math.floor(strides) * this.motion.stride_length_m + frame.hip[0] - start);
   }
 }
 
@@ -213,6 +141,7 @@ function addControls(box, isPair) {
     <label>Speed <select data-speed><option value="0.25">¼</option><option value="0.5">½</option><option value="1" selected>1</option></select></label>
     ${isPair ? PACES : ""}
     <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
+    <label><input type="checkbox" data-overlay autocomplete="off"> ${isPair ? "Overlay the gaits" : "Reference gait"}</label>
     <output data-phase>0 %</output>`;
   box.append(controls);
   return controls;
@@ -246,8 +175,13 @@ class Player {
       this.clocks.keep(/** @type {import("./stride_clock.mjs").Pace} */ (pace.value));
       this.draw();
     });
-    for (const scene of scenes) new ResizeObserver(() => this.draw()).observe(scene.canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    this.overlay = /** @type {HTMLInputElement} */ (controls.querySelector("[data-overlay]"));
+    this.overlay.addEventListener("change", () => this.draw());
+    followCursor((share) => {
+      this.setPlaying(false);
+      this.clocks.place = share;
+      this.draw();
+    });
     this.setPlaying(this.playing);
     this.draw();
   }
@@ -272,11 +206,17 @@ class Player {
     requestAnimationFrame((next) => this.tick(next));
   }
 
+  /** @param {number} place @param {number[]} strides @returns {Figure | null} The figure behind a scene. */
+  ghost(place, strides) {
+    if (!this.overlay.checked) return null;
+    const other = this.scenes[1 - place];
+    return other ? other.frame(strides[1 - place] % 1) : this.scenes[place].referenceAt(strides[place] % 1);
+  }
+
   draw() {
-    this.scenes.forEach((scene, place) => {
-      const strides = this.clocks.strides(place);
-      scene.draw(strides % 1, Math.floor(strides));
-    });
+    const shares = this.scenes.map((_, place) => this.clocks.strides(place));
+    this.scenes.forEach((scene, place) => scene.draw(shares[place], this.ghost(place, shares)));
+    showCursor(shares[0] % 1);
     const share = this.clocks.place;
     this.scrub.value = String(100 * share);
     // Gaits beside each other may be in different phases.
@@ -297,10 +237,12 @@ const load = async (trial) => {
 };
 
 for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker"))) {
-  const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
-  const controls = addControls(box, canvases.length > 1);
+  const figures = /** @type {NodeListOf<SVGSVGElement>} */ (box.querySelectorAll("[data-trial] svg.gait-figure"));
+  const controls = addControls(box, figures.length > 1);
+  for (const hint of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-drag]"))) hint.hidden = false;
   if (!mayMove()) showStrips(box);
-  Promise.all(canvases.map(async (canvas) => new Scene(canvas, await load(canvas.dataset.trial))))
+  const trial = (/** @type {Element} */ svg) => /** @type {HTMLElement} */ (svg.closest("[data-trial]")).dataset.trial;
+  Promise.all([...figures].map(async (svg) => new Scene(svg, await load(trial(svg)))))
     .then((scenes) => new Player(controls, scenes))
     .catch((error) => {
       box.style.minHeight = `${box.offsetHeight}px`;

@@ -1,73 +1,11 @@
 // @ts-check
-// Shows the values of the nearest point of a line chart beside the pointer or finger. They are read from the drawing, to a tenth
-// of its units. The CSV file of each figure has the exact values, even for users without a pointer.
+// Shows values of a chart beside the pointer or finger: over a gait cycle those of all lines, otherwise that of the nearest
+// point. The CSV file of each figure has the exact values, even for users without a pointer.
 
-/** How far from a point the pointer may be, in units of the drawing. */
+import { heightAt, linesOf, nameOf, nearestOn, valueAt } from "./chart_lines.mjs";
+
+/** How far from a line the pointer may be, in units of the drawing. */
 const REACH = 60;
-
-/** @typedef {{ x: number, y: number, key: string }} Place */
-
-/** @type {WeakMap<SVGSVGElement, Place[]>} */
-const known = new WeakMap();
-
-/**
- * The points of a path as drawn here: lines to a place, to the side, up or down.
- * @param {Element} path
- * @returns {Place[]}
- */
-function placesOf(path) {
-  const key = String(path.getAttribute("class"));
-  const places = [];
-  let [x, y] = [0, 0];
-  for (const [, step, numbers] of (path.getAttribute("d") ?? "").matchAll(/([MLHV])([^MLHV]*)/g)) {
-    const [first, second] = numbers.trim().split(/[ ,]+/).map(Number);
-    if (step === "V") y = first;
-    else x = first;
-    if (step === "M" || step === "L") y = second;
-    places.push({ x, y, key });
-  }
-  return places;
-}
-
-/** @param {SVGSVGElement} chart */
-function places(chart) {
-  const before = known.get(chart);
-  if (before) return before;
-  const dots = [...chart.querySelectorAll("circle.dot")].map((dot) => ({
-    x: Number(dot.getAttribute("cx")),
-    y: Number(dot.getAttribute("cy")),
-    key: String(dot.getAttribute("class")),
-  }));
-  const found = [...chart.querySelectorAll("path.line")].flatMap(placesOf).concat(dots);
-  known.set(chart, found);
-  return found;
-}
-
-/**
- * What a place on an axis stands for, with as many digits as the drawing is good for.
- * @param {string | undefined} axis
- * @param {number} place
- */
-function valueAt(axis, place) {
-  const [begin, end, from, to] = String(axis).split(" ").map(Number);
-  const value = from + ((place - begin) / (end - begin)) * (to - from);
-  const step = Math.abs((to - from) / (end - begin)) / 10;
-  const decimals = Math.min(Math.max(-Math.floor(Math.log10(step)) - 1, 0), 8);
-  return Number(value.toFixed(decimals));
-}
-
-/**
- * The name of a line in the legend of its figure.
- * @param {SVGSVGElement} chart
- * @param {string} key
- */
-function nameOf(chart, key) {
-  const colour = key.match(/c\d/)?.[0];
-  const keys = [...(chart.closest("figure")?.querySelectorAll(`.legend .key.${colour}:not(.band)`) ?? [])];
-  const dash = key.split(" ").at(-1);
-  const alike = keys.find((element) => element.classList.contains(String(dash))) ?? keys[0];
-  return alike?.parentElement?.textContent ?? "";
-}
 
 const readout = document.createElement("div");
 readout.className = "readout";
@@ -82,28 +20,61 @@ function hide() {
   here.remove();
 }
 
+/** @param {SVGSVGElement} chart @param {number} y */
+function along(chart, y) {
+  const height = valueAt(chart.dataset.up, y);
+  const value = chart.dataset.logarithmic === "true" ? (10 ** height).toPrecision(2) : String(height);
+  return value.replace("-", "\u2212");
+}
+
+/**
+ * The values of all lines at a place of the cycle.
+ * @param {SVGSVGElement} chart @param {number} x
+ */
+function acrossLines(chart, x) {
+  const values = linesOf(chart).flatMap((line) => {
+    const y = heightAt(line, x);
+    return y === null ? [] : [`${nameOf(chart, line.key)}: ${along(chart, y)}`];
+  });
+  here.remove();
+  return values.length ? [`${valueAt(chart.dataset.right, x)} %; ${chart.dataset.along}`, ...values] : [];
+}
+
+/**
+ * The nearest point of any line.
+ * @param {SVGSVGElement} chart @param {DOMPoint} at
+ */
+function nearest(chart, at) {
+  const away = (/** @type {[number, number]} */ place) => Math.hypot(place[0] - at.x, place[1] - at.y);
+  const places = linesOf(chart).map((line) => ({ key: line.key, place: nearestOn(line, [at.x, at.y]) }));
+  places.sort((a, b) => away(a.place) - away(b.place));
+  const [best] = places;
+  if (!best || away(best.place) > REACH) return [];
+  here.setAttribute("class", `here ${best.key.match(/c\d/)?.[0]}`);
+  here.setAttribute("cx", String(best.place[0]));
+  here.setAttribute("cy", String(best.place[1]));
+  if (here.parentNode !== chart) chart.append(here);
+  const { right, across } = chart.dataset;
+  return [
+    nameOf(chart, best.key),
+    `${across}: ${valueAt(right, best.place[0])}`,
+    `${chart.dataset.along}: ${along(chart, best.place[1])}`,
+  ];
+}
+
 /** @param {PointerEvent} event */
 function show(event) {
   const chart = /** @type {SVGSVGElement | null} */ (/** @type {Element} */ (event.target).closest?.("svg[data-right]"));
   const matrix = chart?.getScreenCTM();
   if (!chart || !matrix) return hide();
   const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
-  const away = (/** @type {Place} */ place) => Math.hypot(place.x - at.x, place.y - at.y);
-  const nearest = places(chart).reduce((/** @type {Place | null} */ best, place) => (best && away(best) <= away(place) ? best : place), null);
-  if (!nearest || away(nearest) > REACH) return hide();
-  const { right, up, across, along, logarithmic } = chart.dataset;
-  const height = valueAt(up, nearest.y);
-  const value = logarithmic === "true" ? (10 ** height).toPrecision(2) : height;
-  const lines = [nameOf(chart, nearest.key), `${across}: ${valueAt(right, nearest.x)}`, `${along}: ${value}`];
+  const lines = chart.dataset.cycles ? acrossLines(chart, at.x) : nearest(chart, at);
+  if (lines.length === 0) return hide();
   readout.replaceChildren(...lines.map((line) => Object.assign(document.createElement("div"), { textContent: line })));
   readout.hidden = false;
   const room = document.documentElement.clientWidth - readout.offsetWidth - 8;
   readout.style.left = `${Math.max(Math.min(event.pageX + 14, room), 4)}px`;
   readout.style.top = `${event.pageY + 18}px`;
-  here.setAttribute("class", `here ${nearest.key.match(/c\d/)?.[0]}`);
-  here.setAttribute("cx", String(nearest.x));
-  here.setAttribute("cy", String(nearest.y));
-  if (here.parentNode !== chart) chart.append(here);
 }
 
 for (const kind of ["pointermove", "pointerdown"]) document.addEventListener(kind, (event) => show(/** @type {PointerEvent} */ (event)));

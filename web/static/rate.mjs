@@ -1,15 +1,19 @@
 // @ts-check
-// Two motions, synchronised by gait cycle or by time, with the same scale and colours. The server computes the positions.
+// Two motions, synchronised by gait cycle or by time, with the same scale and colours. The server computes the positions, and
+// draws the body in the pictures for those without scripts.
 
 import { mayMove, showStrips } from "./reduced_motion.mjs";
 import { Clocks } from "./stride_clock.mjs";
+import { Body, UNITS, placements } from "./walker_body.mjs";
 
 /** @typedef {[number, number]} Place */
 
 /** A stride where both are shown at the same share of their cycles, s. */
 const STRIDE_S = 1.4;
-/** Size of the drawing in its own units; it is drawn with the points that the screen has. */
-const [WIDTH, HEIGHT] = [640, 420];
+/** Half the width of the drawing and the space below the ground, in its units. */
+const [HALF_WIDTH, BELOW] = [80, 8];
+/** From hip to the top of the head and a little more, in lengths of the trunk. */
+const TOP_OF_HEAD = 1.7;
 const box = /** @type {HTMLElement | null} */ (document.querySelector("[data-pair]"));
 
 if (box) {
@@ -19,11 +23,13 @@ if (box) {
   const pace = /** @type {HTMLSelectElement} */ (document.querySelector("[data-pace]"));
   const form = /** @type {HTMLFormElement} */ (document.querySelector("[data-answer]"));
   const save = /** @type {HTMLButtonElement} */ (form.querySelector("[type=submit]"));
-  const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
+  const drawings = /** @type {SVGSVGElement[]} */ ([...box.querySelectorAll("svg[data-side]")]);
   const speed = /** @type {HTMLSelectElement} */ (document.querySelector("[data-speed]"));
-  const clocks = new Clocks(canvases.map((canvas) => Number(canvas.dataset.seconds) || STRIDE_S), STRIDE_S);
+  const clocks = new Clocks(drawings.map((svg) => Number(svg.dataset.seconds) || STRIDE_S), STRIDE_S);
   save.disabled = true;
   let playing = mayMove();
+  const strips = new DOMParser().parseFromString(document.querySelector("[data-strips]")?.textContent ?? "", "text/html");
+  const pictures = strips.querySelectorAll("svg.tiles");
   if (!playing) showStrips(document);
   let last = 0;
 
@@ -34,54 +40,33 @@ if (box) {
     return (await reply.json()).figures;
   };
 
-  /** @param {HTMLCanvasElement} canvas @param {Place[][]} motion @param {number} phase */
-  const draw = (canvas, motion, phase) => {
-    const points = canvas.clientWidth * (window.devicePixelRatio || 1);
-    if (points === 0) return;
-    const size = [Math.round(points), Math.round((points * HEIGHT) / WIDTH)];
-    // Setting it wipes the canvas, also to the same size.
-    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
-    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-    pen.setTransform(size[0] / WIDTH, 0, 0, size[1] / HEIGHT, 0, 0);
-    const figure = motion[Math.min(Math.floor(phase * motion.length), motion.length - 1)];
-    const scale = HEIGHT / 2.1;
-    const middle = figure[0][0];
-    /** @param {Place} place @returns {Place} */
-    const at = ([x, z]) => [WIDTH / 2 + (x - middle) * scale, HEIGHT - 30 - z * scale];
-    /** @param {number[]} joints @param {number} width @param {number[]} dash */
-    const line = (joints, width, dash) => {
-      pen.lineWidth = width;
-      pen.setLineDash(dash);
-      pen.beginPath();
-      joints.forEach((joint, i) => (i ? pen.lineTo(...at(figure[joint])) : pen.moveTo(...at(figure[joint]))));
-      pen.stroke();
+  /** @param {Place[]} joints @returns {import("./walker_body.mjs").Figure} */
+  const figureOf = ([hip, shoulder, ...legs]) => {
+    const leg = ([knee, ankle, heel, toe] = legs) => ({ knee, ankle, heel, toe });
+    return { hip, shoulder, left: leg(legs.slice(0, 4)), right: leg(legs.slice(4)) };
+  };
+
+  /** @param {SVGSVGElement} svg @param {Element | undefined} picture @param {Place[][]} motion */
+  const walker = (svg, picture, motion) => {
+    const parts = picture?.querySelector(".gait-figure")?.children ?? [];
+    if (parts.length === 0) throw new Error("no body");
+    svg.append(...[...parts].map((part) => document.importNode(part, true)));
+    const [hip, shoulder] = motion[0];
+    const top = Math.ceil((hip[1] + TOP_OF_HEAD * Math.hypot(shoulder[0] - hip[0], shoulder[1] - hip[1])) * UNITS);
+    svg.setAttribute("viewBox", `${-HALF_WIDTH} ${-top} ${2 * HALF_WIDTH} ${top + BELOW}`);
+    const body = new Body(svg);
+    return (/** @type {number} */ phase) => {
+      const place = Math.min(Math.floor(phase * motion.length), motion.length - 1);
+      body.pose(placements(figureOf(motion[place])));
     };
-    const colour = getComputedStyle(canvas).color;
-    pen.clearRect(0, 0, WIDTH, HEIGHT);
-    pen.strokeStyle = colour;
-    pen.lineCap = "round";
-    line([1, 0], 6, []);
-    const [hip, shoulder] = [figure[0], figure[1]];
-    const head = at([hip[0] + (shoulder[0] - hip[0]) * 1.18, hip[1] + (shoulder[1] - hip[1]) * 1.18]);
-    pen.lineWidth = 3;
-    pen.beginPath();
-    pen.arc(...head, 0.1 * scale, 0, 2 * Math.PI);
-    pen.stroke();
-    line([0, 2, 3, 4, 5, 3], 4, []);
-    line([0, 6, 7, 8, 9, 7], 4, [9, 7]);
-    pen.setLineDash([]);
-    pen.lineWidth = 1;
-    pen.beginPath();
-    pen.moveTo(0, HEIGHT - 30);
-    pen.lineTo(WIDTH, HEIGHT - 30);
-    pen.stroke();
   };
 
   try {
-    const motions = await Promise.all(canvases.map((canvas) => load(String(canvas.dataset.side))));
+    const motions = await Promise.all(drawings.map((svg) => load(String(svg.dataset.side))));
+    const walkers = drawings.map((svg, i) => walker(svg, pictures[i], motions[i]));
     const begun = performance.now();
     const show = () => {
-      canvases.forEach((canvas, i) => draw(canvas, motions[i], clocks.strides(i) % 1));
+      walkers.forEach((pose, i) => pose(clocks.strides(i) % 1));
       const percent = 100 * clocks.place;
       scrub.value = String(percent);
       scrub.setAttribute("aria-valuetext", `${percent.toFixed(0)} %`);

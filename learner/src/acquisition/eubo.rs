@@ -5,13 +5,12 @@
 //! search ranks the actions by an upper bound and computes exact values in that order, until no bound exceeds the best
 //! value. The result is the exact maximiser over the grid, or over candidates if the grid is too large.
 
-use std::collections::HashSet;
-
 use crate::acquisition::avoidance::Avoidance;
 use crate::acquisition::candidates::near_best_or_random;
 use crate::acquisition::line;
 use crate::action::ActionIndex;
 use crate::action_moments::{ActionMoments, ActionSet};
+use crate::excluded::Taken;
 use crate::gaussian_process::GaussianProcess;
 use crate::linalg::BLOCK;
 use crate::posterior::Posterior;
@@ -233,7 +232,7 @@ impl<'a> Chance<'a> {
 pub(crate) fn against(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &HashSet<ActionIndex>,
+    taken: &Taken<'_>,
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
 ) -> Option<ActionIndex> {
@@ -256,7 +255,7 @@ fn maximiser(
     posterior: &Posterior,
     set: &ActionSet,
     best: ActionIndex,
-    taken: &HashSet<ActionIndex>,
+    taken: &Taken<'_>,
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
     avoidance: Option<&Avoidance<'_>>,
@@ -275,15 +274,15 @@ fn maximiser(
         gain * chance.as_ref().map_or(1.0, |chance| chance.bound(x))
     };
     let mut free = vec![among.is_none(); set.len()];
-    let mut mark = |action: &ActionIndex, value: bool| {
-        if let Some(free) = set.position(*action).and_then(|x| free.get_mut(x)) {
+    let mut mark = |action: ActionIndex, value: bool| {
+        if let Some(free) = set.position(action).and_then(|x| free.get_mut(x)) {
             *free = value;
         }
     };
-    for action in among.unwrap_or_default() {
-        mark(action, true);
+    for &action in among.unwrap_or_default() {
+        mark(action, !taken.contains(action));
     }
-    for action in taken {
+    for action in taken.listed() {
         mark(action, false);
     }
     if let Some(avoidance) = avoidance {
@@ -339,7 +338,7 @@ pub(crate) fn proposal(
     posterior: &Posterior,
     best: ActionIndex,
     pending: &[ActionIndex],
-    taken: &HashSet<ActionIndex>,
+    taken: &Taken<'_>,
     random: &mut Random,
 ) -> Option<ActionIndex> {
     let lines = posterior.settings().lines;
@@ -360,6 +359,7 @@ pub(crate) fn proposal(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::excluded::ExcludedActions;
     use crate::feedback::{Feedback, FeedbackLog};
     use crate::learner::posterior;
     use crate::search_space::Dimension;
@@ -395,10 +395,11 @@ mod tests {
             }
             let posterior = posterior(&space, &log, &settings).unwrap();
             let best = posterior.best().unwrap();
-            let taken: HashSet<ActionIndex> = log.visited.iter().copied().collect();
+            let excluded = ExcludedActions::default();
+            let taken = Taken::new(&space, log.visited.iter().copied(), &excluded);
             let incumbent = posterior.utility.view(best, space.levels(best));
             let mut top = (0.0, ActionIndex(0));
-            for action in (0..space.len()).map(ActionIndex).filter(|a| !taken.contains(a)) {
+            for action in (0..space.len()).map(ActionIndex).filter(|a| !taken.contains(*a)) {
                 let (mean, variance) =
                     posterior.utility.difference(&posterior.utility.view(action, space.levels(action)), &incumbent);
                 let chance = posterior.feasibility.as_ref().map_or(1.0, |feasibility| {
@@ -451,7 +452,8 @@ mod tests {
             let posterior = posterior(&space, &log, &settings).unwrap();
             let best = posterior.best().unwrap();
             let pending = [ActionIndex(5), ActionIndex(77), ActionIndex(130)];
-            let taken: HashSet<ActionIndex> = log.visited.iter().chain(&pending).copied().collect();
+            let excluded = ExcludedActions::default();
+            let taken = Taken::new(&space, log.visited.iter().chain(&pending).copied(), &excluded);
             let avoidance = Avoidance::of(&posterior);
             let all: Vec<ActionIndex> = (0..space.len()).rev().map(ActionIndex).collect();
             let [on_grid, on_list] = [ActionSet::Grid(180), ActionSet::list(all)]
@@ -469,7 +471,8 @@ mod tests {
             let log = random_log(&space, 20, converges, seed);
             let posterior = posterior(&space, &log, &settings).unwrap();
             let best = posterior.best().unwrap();
-            let taken: HashSet<ActionIndex> = log.visited.iter().copied().collect();
+            let excluded = ExcludedActions::default();
+            let taken = Taken::new(&space, log.visited.iter().copied(), &excluded);
             let mut random = Random::new(seed, 20);
             let candidates = near_best_or_random(&posterior, best, &taken, CANDIDATES, &mut random);
             let incumbent = posterior.utility.view(best, space.levels(best));

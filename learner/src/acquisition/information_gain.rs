@@ -8,11 +8,9 @@
 //! given only for a feasible action. The two processes are independent, so the information is that of feasibility plus
 //! that of the others times the probability that the action is feasible.
 
-use std::collections::HashSet;
-
 use crate::acquisition::avoidance::Avoidance;
-use crate::acquisition::candidates::random_untaken;
 use crate::action::ActionIndex;
+use crate::excluded::Taken;
 use crate::likelihood::Interval;
 use crate::posterior::Posterior;
 use crate::random::Random;
@@ -113,13 +111,14 @@ impl<'a> InformationGain<'a> {
     }
 }
 
-/// The most informative of some random actions outside `taken`, and outside the region of avoidance if possible.
+/// The most informative of some random actions outside `taken`, and outside the region of avoidance if possible. `None`
+/// if every action is taken.
 pub(crate) fn over_candidates(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &HashSet<ActionIndex>,
+    taken: &Taken<'_>,
     random: &mut Random,
-) -> ActionIndex {
+) -> Option<ActionIndex> {
     let space = posterior.space();
     let gain = InformationGain::new(posterior.settings(), posterior.preference_noise, random);
     let avoidance = Avoidance::of(posterior);
@@ -134,7 +133,7 @@ pub(crate) fn over_candidates(
     let compared = posterior.feasibility.is_none() || !posterior.infeasible.contains(&partner);
     let mut top: Option<((bool, f64), ActionIndex)> = None;
     for _ in 0..CANDIDATES {
-        let action = random_untaken(space, taken, random);
+        let action = taken.random_other(random)?;
         let view = utility.view(action, space.levels(action));
         let pair = Pair {
             mean: [view.mean, other.mean],
@@ -151,12 +150,15 @@ pub(crate) fn over_candidates(
             top = Some((rank, action));
         }
     }
-    top.map_or(best, |(_, action)| action)
+    top.map(|(_, action)| action)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashSet;
+
+    use crate::excluded::ExcludedActions;
     use crate::feedback::{Feedback, FeedbackLog};
     use crate::learner::posterior;
     use crate::search_space::{Dimension, SearchSpace};
@@ -225,11 +227,12 @@ mod tests {
         }
         let mut posterior = posterior(&space, &log, &settings).unwrap();
         let best = posterior.best().unwrap();
-        let taken: HashSet<ActionIndex> = log.visited.iter().copied().collect();
+        let excluded = ExcludedActions::default();
+        let taken = Taken::new(&space, log.visited.iter().copied(), &excluded);
         let mut proposals = HashSet::new();
         for preference_noise in [0.02, 1.0, 20.0] {
             posterior.preference_noise = preference_noise;
-            proposals.insert(over_candidates(&posterior, best, &taken, &mut Random::new(3, 0)));
+            proposals.insert(over_candidates(&posterior, best, &taken, &mut Random::new(3, 0)).unwrap());
         }
         assert!(proposals.len() > 1, "{proposals:?}");
     }

@@ -3,10 +3,11 @@
 use std::collections::HashSet;
 
 use crate::acquisition::avoidance::Avoidance;
-use crate::acquisition::candidates::{highest, random_untaken};
+use crate::acquisition::candidates::highest;
 use crate::acquisition::line;
 use crate::action::ActionIndex;
 use crate::error::Result;
+use crate::excluded::{ExcludedActions, Taken};
 use crate::posterior::Posterior;
 use crate::random::Random;
 
@@ -21,16 +22,16 @@ const MAX_SAMPLES: usize = 50;
 pub(crate) fn unvisited_on_line(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &HashSet<ActionIndex>,
+    taken: &Taken<'_>,
     random: &mut Random,
 ) -> Result<Option<ActionIndex>> {
     let suggested: Vec<ActionIndex> =
-        posterior.utility.observed().points.iter().copied().filter(|a| !taken.contains(a)).collect();
+        posterior.utility.observed().points.iter().copied().filter(|a| !taken.contains(*a)).collect();
     let avoidance = Avoidance::of(posterior);
     for attempt in 0..MAX_LINES {
         let mut candidates = suggested.clone();
         for action in line::through(posterior.space(), best, random) {
-            if !taken.contains(&action) && !candidates.contains(&action) {
+            if !taken.contains(action) && !candidates.contains(&action) {
                 candidates.push(action);
             }
         }
@@ -41,7 +42,7 @@ pub(crate) fn unvisited_on_line(
             continue;
         }
         let sample = posterior.sampler(&candidates)?.sample(random);
-        return Ok(Some(highest(&candidates, &sample)));
+        return Ok(highest(&candidates, &sample));
     }
     Ok(None)
 }
@@ -84,17 +85,18 @@ pub(crate) fn visited_or_on_line(
     Ok(chosen)
 }
 
-/// A random action if no line has a candidate. If all actions are visited or pending, it may be a visited one.
+/// A random action if no line has a candidate. If repeats are allowed and all actions are visited or pending, it may be a
+/// visited one. `None` without an action.
 pub(crate) fn random_fallback(
     posterior: &Posterior,
     pending: &[ActionIndex],
-    taken: &HashSet<ActionIndex>,
+    taken: &Taken<'_>,
+    repeats: bool,
     random: &mut Random,
-) -> ActionIndex {
-    let space = posterior.space();
-    if taken.len() as u64 >= space.len() {
-        random_untaken(space, &pending.iter().copied().collect(), random)
-    } else {
-        random_untaken(space, taken, random)
-    }
+) -> Option<ActionIndex> {
+    taken.random_other(random).or_else(|| {
+        let none = ExcludedActions::default();
+        let pending = Taken::new(posterior.space(), pending.iter().copied(), &none);
+        pending.random_other(random).filter(|_| repeats)
+    })
 }

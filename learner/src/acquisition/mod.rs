@@ -7,5 +7,3 @@ pub(crate) mod information_gain;
 pub(crate) mod line;
 pub(crate) mod line_cospar;
 pub(crate) mod thompson;
-
-pub(crate) use candidates::random_untaken;

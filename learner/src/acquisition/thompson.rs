@@ -1,11 +1,10 @@
 //! Thompson sampling: the maximiser of a joint sample of the utility.
 
-use std::collections::HashSet;
-
 use crate::acquisition::avoidance::Avoidance;
 use crate::acquisition::candidates::{highest, near_best_or_random};
 use crate::action::ActionIndex;
 use crate::error::Result;
+use crate::excluded::Taken;
 use crate::grid_sample::posterior_sample;
 use crate::posterior::Posterior;
 use crate::random::Random;
@@ -15,16 +14,12 @@ use crate::whole_grid::WholeGrid;
 const CANDIDATES: usize = 200;
 
 /// The maximiser over all actions outside `taken`, and outside the region of avoidance if possible.
-pub(crate) fn over_grid(
-    posterior: &Posterior,
-    taken: &HashSet<ActionIndex>,
-    random: &mut Random,
-) -> Result<Option<ActionIndex>> {
+pub(crate) fn over_grid(posterior: &Posterior, taken: &Taken<'_>, random: &mut Random) -> Result<Option<ActionIndex>> {
     let space = posterior.space();
     let grid = WholeGrid::new(space, &posterior.utility);
     let sample = posterior_sample(space, &posterior.utility, &grid, random)?;
     let mut ranked: Vec<(f64, ActionIndex)> =
-        sample.into_iter().zip((0..).map(ActionIndex)).filter(|(_, action)| !taken.contains(action)).collect();
+        sample.into_iter().zip((0..).map(ActionIndex)).filter(|(_, action)| !taken.contains(*action)).collect();
     ranked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let avoidance = Avoidance::of(posterior);
     let allowed =
@@ -32,18 +27,21 @@ pub(crate) fn over_grid(
     Ok(allowed.or(ranked.first()).map(|&(_, action)| action))
 }
 
-/// The maximiser over candidates, for a large grid.
+/// The maximiser over candidates, for a large grid. `None` without a candidate.
 pub(crate) fn over_candidates(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &HashSet<ActionIndex>,
+    taken: &Taken<'_>,
     random: &mut Random,
-) -> Result<ActionIndex> {
+) -> Result<Option<ActionIndex>> {
     let mut candidates = near_best_or_random(posterior, best, taken, CANDIDATES, random);
     if let Some(avoidance) = Avoidance::of(posterior)
         && candidates.iter().any(|&action| avoidance.allows(action))
     {
         candidates.retain(|&action| avoidance.allows(action));
+    }
+    if candidates.is_empty() {
+        return Ok(None);
     }
     let sample = posterior.sampler(&candidates)?.sample(random);
     Ok(highest(&candidates, &sample))

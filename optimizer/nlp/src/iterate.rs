@@ -7,7 +7,7 @@ use crate::formulation::{Formulation, Objective, RowForm};
 use crate::inertia_correction::InertiaCorrection;
 use crate::line_search_filter::Filter;
 use crate::line_search_state::LineSearchState;
-use crate::newton::NewtonSystem;
+use crate::newton_system::NewtonSystem;
 use crate::optimality::OptimalityError;
 use crate::primal_dual::{Linearisation, PrimalDual};
 use crate::settings::NlpSettings;

@@ -104,7 +104,7 @@ mod kkt;
 mod line_search;
 mod line_search_filter;
 mod line_search_state;
-mod newton;
+mod newton_system;
 mod nonlinear_program;
 mod optimality;
 mod primal_dual;
@@ -114,7 +114,7 @@ mod search_direction;
 mod sensitivity;
 mod settings;
 mod solve;
-mod start;
+mod starting_point;
 mod status;
 mod vector_instructions;
 
@@ -122,6 +122,6 @@ pub use nonlinear_program::{EliminationBlocks, NonlinearProgram, SparsityPattern
 pub use sensitivity::{ParameterDerivative, Sensitivity, SensitivityError, sensitivities};
 pub use settings::{BarrierStrategy, BoundMultiplierStart, DualRegularisation, LinearSolver, NlpSettings};
 pub use solve::solve;
-pub use start::{StartPoint, WarmPoint};
+pub use starting_point::{StartPoint, WarmPoint};
 pub use status::{NlpCounts, NlpError, NlpIteration, NlpPhase, NlpResult, NlpStatus, Residuals, Timing};
 pub use vector_instructions::vector_instructions;

@@ -3,7 +3,7 @@
 use crate::barrier::{self, DAMPING};
 use crate::iterate::{Iterate, SolveSession, StepRecord};
 use crate::line_search_filter::{GAMMA_PHI, GAMMA_THETA, not_above};
-use crate::line_search_state::{Reference, Watch};
+use crate::line_search_state::{MeritReference, Watch};
 
 /// Type of an accepted trial point.
 #[derive(Clone, Copy)]
@@ -25,7 +25,7 @@ const SOFT_REDUCTION: f64 = 0.9999;
 /// Largest increase of phi, in powers of ten (IPOPT `obj_max_inc`).
 const MAX_PHI_INCREASE: f64 = 5.0;
 
-impl Reference {
+impl MeritReference {
     /// m(alpha) < 0 and alpha (-slope)^s_phi > delta theta^s_theta (WB06 eq. 19).
     fn switches(&self, alpha: f64) -> bool {
         self.slope < 0.0 && alpha * (-self.slope).powf(S_PHI) > DELTA * self.theta.powf(S_THETA)
@@ -53,7 +53,7 @@ impl Iterate<'_> {
     pub(crate) fn line_search(&mut self, session: &mut SolveSession, tiny: bool) -> bool {
         let settings = session.settings;
         let tau = barrier::boundary_fraction(settings, self.mu);
-        let mut reference = Reference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
+        let mut reference = MeritReference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
         let mut alpha =
             barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
         let mut corrects = true;
@@ -178,7 +178,7 @@ impl Iterate<'_> {
     }
 
     /// Tests a trial point against the reference and the filter.
-    fn judge(&self, reference: &Reference, alpha: f64, theta: f64, phi: f64) -> Option<Accepted> {
+    fn judge(&self, reference: &MeritReference, alpha: f64, theta: f64, phi: f64) -> Option<Accepted> {
         if !self.filter.accepts(theta, phi) {
             return None;
         }
@@ -204,7 +204,7 @@ impl Iterate<'_> {
     fn second_order_correction(
         &mut self,
         session: &mut SolveSession,
-        reference: &Reference,
+        reference: &MeritReference,
         alpha: f64,
         tau: f64,
         first_theta: f64,
@@ -258,7 +258,7 @@ impl Iterate<'_> {
     fn finish(
         &mut self,
         session: &mut SolveSession,
-        reference: &Reference,
+        reference: &MeritReference,
         kind: Accepted,
         alpha: f64,
         tau: f64,

@@ -26,7 +26,7 @@ pub(crate) struct LineSearchState {
 /// The watchdog: its reference, the length of its first step and the number of its trials.
 #[derive(Clone, Copy)]
 pub(crate) struct Watch {
-    pub reference: Reference,
+    pub reference: MeritReference,
     pub alpha: f64,
     pub trials: usize,
 }
@@ -57,7 +57,7 @@ impl LineSearchState {
 
 /// Merit values that trial points are compared with.
 #[derive(Clone, Copy)]
-pub(crate) struct Reference {
+pub(crate) struct MeritReference {
     pub theta: f64,
     pub phi: f64,
     /// Directional derivative of phi.

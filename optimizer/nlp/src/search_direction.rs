@@ -3,7 +3,7 @@
 use crate::barrier::DAMPING;
 use crate::factorisation::MatrixChange;
 use crate::iterate::{Iterate, SolveSession};
-use crate::newton::NewtonSystem;
+use crate::newton_system::NewtonSystem;
 use crate::status::NlpPhase;
 
 /// In an iteration, the wrong inertia at which the factorisation itself is checked. The first one is usually right,

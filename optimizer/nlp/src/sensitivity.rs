@@ -12,12 +12,12 @@ use crate::factorisation::{self, MatrixChange, check_blocks};
 use crate::formulation::{Formulation, RowForm};
 use crate::iterate::Iterate;
 use crate::kkt::KktMatrix;
-use crate::newton::NewtonSystem;
+use crate::newton_system::NewtonSystem;
 use crate::nonlinear_program::NonlinearProgram;
 use crate::primal_dual::PrimalDual;
 use crate::settings::NlpSettings;
 use crate::solve::{Pushes, check_start, place};
-use crate::start::{StartPoint, WarmPoint};
+use crate::starting_point::{StartPoint, WarmPoint};
 use crate::status::NlpError;
 use thiserror::Error;
 
@@ -92,7 +92,7 @@ pub enum SensitivityError {
     )]
     Irregular,
     /// No factorisation solves the linear system to the residual limit of the settings.
-    #[error("the linear system is solved to a relative residual of {0:.1e} only")]
+    #[error("the linear system is solved only to a relative residual of {0:.1e}")]
     Inaccurate(f64),
 }
 

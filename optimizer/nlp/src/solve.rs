@@ -7,11 +7,11 @@ use crate::factorisation::{self, check_blocks};
 use crate::formulation::{Formulation, RowForm, entries};
 use crate::iterate::{Ending, Iterate, SolveSession, StepRecord};
 use crate::kkt::KktMatrix;
-use crate::newton::NewtonSystem;
+use crate::newton_system::NewtonSystem;
 use crate::nonlinear_program::NonlinearProgram;
 use crate::primal_dual::PrimalDual;
 use crate::settings::{BoundMultiplierStart, NlpSettings};
-use crate::start::{StartPoint, WarmPoint};
+use crate::starting_point::{StartPoint, WarmPoint};
 use crate::status::{NlpCounts, NlpError, NlpIteration, NlpResult, NlpStatus, Residuals, Timing};
 
 /// Minimises f(x) subject to the bounds of `problem` from `start`.

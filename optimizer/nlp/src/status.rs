@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::start::WarmPoint;
+use crate::starting_point::WarmPoint;
 
 /// Why the solver stopped. Only `Converged` is a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,7 +1,7 @@
 //! A check of a certificate: the worst value of a quantity, its place, and its limit.
 
 use crate::gait::DomainTrajectory;
-use crate::in_words::figure;
+use crate::number_format::figure;
 use serde::{Deserialize, Serialize};
 
 /// The worst value of a quantity, with its limit.

@@ -1,7 +1,7 @@
 //! The closed loop: consecutive strides, and contacts, friction and torques over the periodic stride.
 
 use super::check::{Check, CheckLocation, Quantity, Worst};
-use super::control::{State, split};
+use super::feedback_linearization::{State, split};
 use super::hybrid_walker::{Fall, HybridWalker, Passage};
 use super::limit_excess::{AllowedRanges, CONTACT_THRESHOLD_N, FRICTION_THRESHOLD_N, depth_below_ground};
 use crate::body::PointState;

@@ -9,7 +9,7 @@
 //! Richardson extrapolation of central differences with three steps (Romberg's table) gives the limit. The change by
 //! the last extrapolation estimates the resolution.
 
-use super::control::{Control, State, split};
+use super::feedback_linearization::{Control, State, split};
 use super::hybrid_walker::{Fall, HybridWalker};
 use super::poincare_section::{SECTION, Section, section, with_section};
 use crate::body::{Axis, PointState};

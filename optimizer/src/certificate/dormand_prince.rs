@@ -61,7 +61,7 @@ const CHANGE: (f64, f64) = (0.2, 5.0);
 const SMALLEST_STEP_S: f64 = 1e-11;
 
 /// A step with its dense output.
-pub(super) struct Step<const N: usize> {
+pub(super) struct DenseStep<const N: usize> {
     /// Length, s.
     pub(super) length: f64,
     /// State at the start.
@@ -71,7 +71,7 @@ pub(super) struct Step<const N: usize> {
     stages: [SVector<f64, N>; 7],
 }
 
-impl<const N: usize> Step<N> {
+impl<const N: usize> DenseStep<N> {
     /// A step of a given length from `start`, where the derivative is `first`.
     pub(super) fn take(
         system: &impl System<N>,
@@ -149,12 +149,12 @@ impl<'a, const N: usize, S: System<N>> Integrator<'a, N, S> {
     }
 
     /// The next step that keeps the tolerance.
-    pub(super) fn step(&mut self) -> Result<Step<N>, StepError> {
+    pub(super) fn step(&mut self) -> Result<DenseStep<N>, StepError> {
         loop {
             if self.next_length < SMALLEST_STEP_S {
                 return Err(StepError::TooSmall);
             }
-            let step = Step::take(self.system, &self.state, &self.derivative, self.next_length)?;
+            let step = DenseStep::take(self.system, &self.state, &self.derivative, self.next_length)?;
             let error = step.error(self.tolerance);
             let factor = if error > 0.0 { SAFETY * error.powf(-0.2) } else { CHANGE.1 };
             let accepted = error <= 1.0;
@@ -212,7 +212,7 @@ mod tests {
             let mut x = start;
             for _ in 0..steps {
                 let first = Pendulum.derivative(&x).unwrap();
-                x = Step::take(&Pendulum, &x, &first, 2.0 / steps as f64).unwrap().end;
+                x = DenseStep::take(&Pendulum, &x, &first, 2.0 / steps as f64).unwrap().end;
             }
             x
         };

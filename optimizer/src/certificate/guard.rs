@@ -1,6 +1,6 @@
 //! Guards: functions of the state that are positive in a domain and vanish at its end.
 
-use super::contact::Contact;
+use super::contact_kinematics::Contact;
 use crate::body::{Axis, FootPoint, WalkerModel};
 use crate::walking::{ContactRow, Domain, DomainKind};
 

@@ -1,7 +1,7 @@
 //! The closed-loop hybrid system: each of the eight domains is integrated to its guard, followed by its reset.
 
-use super::control::{Control, State, StateMatrix, Variational, join_variational, split_variational};
-use super::dormand_prince::{Integrator, Step, StepError, System, Tolerance};
+use super::dormand_prince::{DenseStep, Integrator, StepError, System, Tolerance};
+use super::feedback_linearization::{Control, State, StateMatrix, Variational, join_variational, split_variational};
 use super::reset::{reset, reset_by_state};
 use crate::body::WalkerModel;
 use crate::gait::Gait;
@@ -25,7 +25,9 @@ pub enum Fall {
         planned_s: f64,
     },
     /// The domain begins beyond its guard.
-    #[error("the simulated walker falls: {domain} begins beyond the event that ends it (by {amount:.2e})")]
+    #[error(
+        "the simulated walker falls: {domain} begins after the event that should end it (already passed by {amount:.2e})"
+    )]
     BeginsBeyondGuard {
         /// `DS2_R`, ...
         domain: &'static str,
@@ -203,9 +205,9 @@ impl<'a> HybridWalker<'a> {
 fn refine<const N: usize, S: System<N>>(
     control: &Control<'_>,
     system: &S,
-    step: &Step<N>,
+    step: &DenseStep<N>,
     guess: f64,
-) -> Result<Step<N>, Fall> {
+) -> Result<DenseStep<N>, Fall> {
     let name = control.domain.name();
     let failed = |e: StepError| not_integrable(name, &e.to_string());
     let singular = || failed(StepError::Singular);

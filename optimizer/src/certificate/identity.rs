@@ -1,9 +1,9 @@
 //! What a certificate is about: which gait of which walker, and every value that differs from the built-in problem.
 
 use crate::body::WalkerModel;
+use crate::cost_of_transport::unsmoothed_cost_of_transport;
 use crate::device::Device;
 use crate::gait::Gait;
-use crate::metrics::unsmoothed_cost_of_transport;
 use crate::settings::GaitSettings;
 use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! The section of the stride-to-stride map: the state after right heel strike without px, on which nothing depends.
 
-use super::control::State;
+use super::feedback_linearization::State;
 use nalgebra::SVector;
 
 /// Dimension of the section.

@@ -5,7 +5,7 @@
 //! reaches its guard, the ground never pulls on the foot in single support, and the motion is periodic again after some
 //! strides. The torques are those of the ideal controller without limits.
 
-use super::control::{State, join, split};
+use super::feedback_linearization::{State, join, split};
 use super::hybrid_walker::{COARSE, Fall, HybridWalker};
 use crate::body::{InverseDynamics, PointState};
 use nalgebra::{DMatrix, DVector};

@@ -1,7 +1,7 @@
 //! The reset between domains, with its derivative: a plastic impact before DS2 and DS3, otherwise the identity.
 
-use super::contact::{Contact, force_by_angle};
-use super::control::{State, StateMatrix, join, split};
+use super::contact_kinematics::{Contact, force_by_angle};
+use super::feedback_linearization::{State, StateMatrix, join, split};
 use crate::body::{InverseDynamics, PointState, WalkerModel};
 use crate::walking::{Domain, Impact, impact};
 use nalgebra::DMatrix;

@@ -1,7 +1,7 @@
 //! Residuals of C1 to C4 at the nodes and on a finer grid between them.
 
 use super::check::{Check, CheckLocation, Quantity, Worst};
-use super::contact::Contact;
+use super::contact_kinematics::Contact;
 use super::findings::{Findings, GridPoint, Measured};
 use super::limit_excess::{AllowedRanges, FRICTION_THRESHOLD_N, depth_below_ground};
 use super::muscle_residuals;

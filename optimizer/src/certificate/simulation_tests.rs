@@ -1,7 +1,7 @@
 //! Tests of the simulation against mechanics and finite differences, on a gait of a coarse mesh.
 
-use super::control::{BANDWIDTH, Control, State, join, split};
 use super::dormand_prince::System;
+use super::feedback_linearization::{BANDWIDTH, Control, State, join, split};
 use super::hybrid_walker::HybridWalker;
 use super::limit_excess::AllowedRanges;
 use super::residuals::{residuals, residuals_on};

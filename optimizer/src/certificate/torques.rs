@@ -6,7 +6,7 @@
 //! together. Optimal gaits leave the trailing foot almost unloaded, on the boundary of the limits, and the periodic
 //! motion may cross it slightly; the slack measures by how much.
 
-use super::control::{Control, State, split};
+use super::feedback_linearization::{Control, State, split};
 use super::limit_excess::AllowedRanges;
 use crate::body::{Axis, InverseDynamics, PointState, Side};
 use crate::walking::DomainKind;

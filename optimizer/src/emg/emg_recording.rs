@@ -5,7 +5,7 @@ use crate::opensim::StorageFile;
 use crate::reference::{contacts, given};
 use crate::signal_filter::{self, band_pass, low_pass};
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table, lines_of};
+use crate::table::{Separator, Table, TimeColumn, lines_of};
 
 /// Allowed sampling rates of a file without a time column, Hz.
 const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
@@ -40,8 +40,8 @@ impl EmgRecording {
     /// [`ModelError::Malformed`] with line and column, [`ModelError::OutOfRange`] for a rate out of range.
     pub fn from_csv(what: &str, text: &str, rate_hz: Option<f64>) -> Result<Self, ModelError> {
         let clock = match rate_hz {
-            Some(rate_hz) => Clock::Rate(checked_rate(rate_hz)?),
-            None => Clock::Column("time_s"),
+            Some(rate_hz) => TimeColumn::Rate(checked_rate(rate_hz)?),
+            None => TimeColumn::Column("time_s"),
         };
         let lines = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();

@@ -26,7 +26,7 @@ pub struct Relaxation {
     pub undecided: bool,
     /// Solves that this took.
     pub solves: usize,
-    /// Number of starts of the search with `not_with`. 0 if unknown, or if only the explained solve was done.
+    /// Number of starts of the search at the `not_with` value. 0 if unknown, or if only the explained solve was done.
     #[serde(default)]
     pub starts: usize,
     /// Warm start of the gait with `to`. The search found it from nearby gaits; other starts may not reach it.

@@ -2,7 +2,7 @@
 
 use super::given_bound::GivenBound;
 use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
-use crate::in_words::figure;
+use crate::number_format::figure;
 use crate::solve::{SolveStatus, Violation};
 use crate::walking::CYCLE;
 

@@ -1,10 +1,10 @@
 //! Rows of C3: friction cones, foot heights, swing clearance, touchdown speed, and forward hip velocity in SS1.
 
-use super::entries::Entries;
 use super::layout::{FORCE, PointVariables, Q, QD};
 use super::mechanics::{add_contact_hessian, leg_angles, position_gradient, velocity_angle_gradient};
-use super::programme::{GaitProgramme, PointContext};
+use super::program_data::{GaitProgramme, PointContext};
 use super::rows::{HeightRow, PointRows};
+use super::sparse_entries::Entries;
 use crate::body::dynamics::LinkHessian;
 use crate::body::{Axis, PointState, Side};
 use crate::walking::{DomainKind, clearance_profile};
@@ -73,6 +73,11 @@ pub(super) fn height_row(
         value -= HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[0];
     }
     value
+}
+
+/// How much a metre of swing clearance lowers the value of a height row.
+pub(super) fn clearance_weight(programme: &GaitProgramme, d: usize, sigma: f64, x: &[f64]) -> f64 {
+    HEIGHT_SCALE * clearance_profile(swing_share(programme, d, sigma, x).w)[0]
 }
 
 /// Values.

@@ -2,11 +2,11 @@
 //! structure of the derivatives once.
 
 use super::elimination_tree::elimination_tree;
-use super::entries::{Compressed, Entries};
-use super::programme::{GaitProgramme, Structure};
+use super::program_data::{GaitProgramme, Structure};
+use super::sparse_entries::{Compressed, Entries};
 use super::{
-    contact_limits, fibres, hip_velocity, mechanics, muscle_forces, objective, outputs, stride, transitions,
-    zero_dynamics,
+    contact_limits, hip_velocity, mechanics, muscle_fibres, muscle_forces, objective, stride, transitions,
+    virtual_constraint_rows, zero_dynamics,
 };
 use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
@@ -78,14 +78,14 @@ impl GaitProgramme {
                 let state = PointState::new(&point.q, &point.qd, &point.qdd);
                 let p = context.layout.point(k);
                 mechanics::jacobian(self, &context, point_rows, &point, &state, p, out);
-                outputs::jacobian(self, &context, point_rows, &point, x, p, out);
+                virtual_constraint_rows::jacobian(self, &context, point_rows, &point, x, p, out);
                 hip_velocity::jacobian(&context, point_rows, p, out);
                 contact_limits::jacobian(self, &context, point_rows, &state, x, p, out);
                 muscle_forces::jacobian(self, context.layout, point_rows, &point, p, out);
             }
             let context = self.domain_context(x, d);
             zero_dynamics::jacobian(self, &context, rows, x, out);
-            fibres::jacobian(self, &context, rows, x, out);
+            muscle_fibres::jacobian(self, &context, rows, x, out);
             transitions::jacobian(self, d, rows, x, out);
         }
         stride::jacobian(self, x, out);
@@ -102,13 +102,13 @@ impl GaitProgramme {
                 mechanics::hessian(self, &context, point_rows, &point, &state, p, multipliers, &mut link, out);
                 contact_limits::hessian(self, &context, point_rows, &state, x, multipliers, &mut link, out);
                 mechanics::write_link_hessian(&link, p, out);
-                outputs::hessian(self, &context, point_rows, &point, x, p, multipliers, out);
+                virtual_constraint_rows::hessian(self, &context, point_rows, &point, x, p, multipliers, out);
                 hip_velocity::hessian(&context, point_rows, multipliers, out);
                 muscle_forces::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
             }
             let context = self.domain_context(x, d);
             zero_dynamics::hessian(&context, rows, multipliers, out);
-            fibres::hessian(&context, rows, multipliers, out);
+            muscle_fibres::hessian(&context, rows, multipliers, out);
             transitions::hessian(self, d, rows, x, multipliers, out);
         }
         stride::hessian(self, x, multipliers, out);
@@ -180,14 +180,14 @@ impl NonlinearProgram for GaitProgramme {
                 let point = self.layout.point_variables(x, d, k);
                 let state = PointState::new(&point.q, &point.qd, &point.qdd);
                 mechanics::values(self, &context, point_rows, &point, &state, values);
-                outputs::values(self, &context, point_rows, &point, x, values);
+                virtual_constraint_rows::values(self, &context, point_rows, &point, x, values);
                 hip_velocity::values(self, &context, point_rows, &point, x, values);
                 contact_limits::values(self, &context, point_rows, &point, &state, x, values);
                 muscle_forces::values(self, point_rows, &point, values);
             }
             let context = self.domain_context(x, d);
             zero_dynamics::values(self, &context, rows, x, values);
-            fibres::values(self, &context, rows, x, values);
+            muscle_fibres::values(self, &context, rows, x, values);
             transitions::values(self, d, rows, x, values);
         }
         stride::values(self, x, values);

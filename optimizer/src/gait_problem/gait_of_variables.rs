@@ -1,7 +1,7 @@
 //! Conversion of variables to a gait in physical units.
 
 use super::problem_definition::GaitProblem;
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
 use crate::gait::{ContactRowName, DomainTrajectory, FORMAT_VERSION, Gait, MuscleTrajectory};
 use crate::walking::BEZIER_COEFFICIENTS;
 

@@ -3,10 +3,10 @@
 //! In the fully actuated domains `dp = pa + v_hip T sigma_k`, `dp_dot = v_hip` and `dp_ddot = 0` (divided by 10). At
 //! the first node of every domain `dp = pa`.
 
-use super::entries::Entries;
 use super::layout::{PointVariables, Q, QD, QDD};
-use super::programme::{GaitProgramme, PointContext};
+use super::program_data::{GaitProgramme, PointContext};
 use super::rows::PointRows;
+use super::sparse_entries::Entries;
 
 const ACCELERATION_SCALE: f64 = 0.1;
 

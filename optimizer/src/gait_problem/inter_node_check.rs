@@ -4,10 +4,11 @@
 //! becomes a margin of the bound at both nodes, and the problem is solved again (an exchange method of semi-infinite
 //! programming, Hettich and Kortanek 1993, section 7).
 
-use super::contact_limits::{FRICTION_SCALE, HEIGHT_SCALE, height_row};
+use super::contact_limits::{FRICTION_SCALE, HEIGHT_SCALE, clearance_weight, height_row};
 use super::layout::{DomainLayout, FORCE, Q, QD, QDD, U};
 use super::margins::Margins;
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
+use super::rows::HeightRow;
 use crate::body::{Axis, COORDINATES, JOINTS, PointState};
 use crate::gait::Gait;
 use crate::gait::motion::{Instant, instant};
@@ -22,6 +23,8 @@ const SPEED_RAD_S: f64 = 0.05;
 const ACCELERATION_RAD_S2: f64 = 2.5;
 const TORQUE_N_M: f64 = 1.0;
 const HEIGHT_M: f64 = 5e-4;
+/// The tolerance of heights, in units of the rows.
+const HEIGHT_TOLERANCE: f64 = HEIGHT_M * HEIGHT_SCALE;
 const NORMAL_FORCE_N: f64 = 2.5;
 const FRICTION_N: f64 = 6.0;
 /// Share of the largest activation and of the largest fibre velocity.
@@ -70,62 +73,113 @@ pub fn inter_node_excess(programme: &GaitProgramme, gait: &Gait, x: &[f64]) -> I
     let mut values = vec![0.0; programme.rows.names.len()];
     programme.constraints(x, &mut values);
     let mut excess = InterNodeExcess::default();
+    visit(programme, gait, |d, gap, share, now| {
+        let mut note = |nodes, value, tolerance| excess.note_variable(programme, nodes, value, tolerance);
+        visit_variables(programme, &programme.layout.domains[d], gap, now, &mut note);
+        let mut note = |height: HeightRow, value: f64| excess.note_row(height.row, -value, HEIGHT_TOLERANCE);
+        visit_heights(programme, (d, gap, share), now, x, &mut note);
+        note_forces(programme, (d, gap, share), now, &values, &mut excess);
+    });
+    excess
+}
+
+/// Calls `note` at the instants of the check, with domain, interval between adjacent nodes, and relative time in the domain.
+fn visit(programme: &GaitProgramme, gait: &Gait, mut note: impl FnMut(usize, usize, f64, &Instant)) {
     for (d, layout) in programme.layout.domains.iter().enumerate() {
         let gaps = layout.points - 1;
         for gap in 0..gaps {
             for part in 1..PARTS {
                 let share = (gap as f64 + part as f64 / PARTS as f64) / gaps as f64;
-                let now = instant(&gait.domains[d], share);
-                note_variables(programme, layout, gap, &now, &mut excess);
-                note_heights(programme, (d, gap, share), &now, x, &mut excess);
-                note_forces(programme, (d, gap, share), &now, &values, &mut excess);
+                note(d, gap, share, &instant(&gait.domains[d], share));
             }
         }
     }
-    excess
 }
 
-fn note_variables(
+/// The values between the nodes of a gait that tuned bounds limit.
+pub(super) struct BetweenNodes {
+    /// For each variable, the smallest and the largest bound that adjacent values satisfy to their tolerance, scaled.
+    pub(super) reach: Vec<[f64; 2]>,
+    /// The heights of the swing foot.
+    pub(super) clearances: Vec<ClearanceBetween>,
+}
+
+/// A height with a clearance between nodes.
+pub(super) struct ClearanceBetween {
+    /// Value of the row, plus its tolerance.
+    pub(super) room: f64,
+    /// Decrease of the value per metre of clearance.
+    pub(super) per_metre: f64,
+}
+
+impl BetweenNodes {
+    /// The values of `gait`, the gait of the point `x` of `programme`.
+    pub(super) fn new(programme: &GaitProgramme, gait: &Gait, x: &[f64]) -> Self {
+        let mut reach = vec![[f64::INFINITY, f64::NEG_INFINITY]; programme.layout.variables];
+        let mut clearances = Vec::new();
+        visit(programme, gait, |d, gap, share, now| {
+            let layout = &programme.layout.domains[d];
+            visit_variables(programme, layout, gap, now, &mut |nodes, value, tolerance| {
+                for variable in nodes {
+                    let scale = programme.layout.scale[variable];
+                    let [least, most] = &mut reach[variable];
+                    *least = least.min((value + tolerance) / scale);
+                    *most = most.max((value - tolerance) / scale);
+                }
+            });
+            visit_heights(programme, (d, gap, share), now, x, &mut |height, value| {
+                if height.clearance {
+                    let per_metre = clearance_weight(programme, d, share, x);
+                    clearances.push(ClearanceBetween { room: value + HEIGHT_TOLERANCE, per_metre });
+                }
+            });
+        });
+        Self { reach, clearances }
+    }
+}
+
+/// Calls `note` for each variable with a bound: the two nodes beside the instant, the value, and its tolerance.
+fn visit_variables(
     programme: &GaitProgramme,
     layout: &DomainLayout,
     gap: usize,
     now: &Instant,
-    excess: &mut InterNodeExcess,
+    note: &mut dyn FnMut([usize; 2], f64, f64),
 ) {
     let beside = |offset: usize| [layout.point(gap) + offset, layout.point(gap + 1) + offset];
     for i in 0..COORDINATES {
         // The bounds of the hip position are artificial.
         if i >= 2 {
-            excess.note_variable(programme, beside(Q + i), now.q[i], ANGLE_RAD);
+            note(beside(Q + i), now.q[i], ANGLE_RAD);
         }
-        excess.note_variable(programme, beside(QD + i), now.qd[i], SPEED_RAD_S);
-        excess.note_variable(programme, beside(QDD + i), now.qdd[i], ACCELERATION_RAD_S2);
+        note(beside(QD + i), now.qd[i], SPEED_RAD_S);
+        note(beside(QDD + i), now.qdd[i], ACCELERATION_RAD_S2);
     }
     for i in 0..JOINTS {
-        excess.note_variable(programme, beside(U + i), now.u[i], TORQUE_N_M);
+        note(beside(U + i), now.u[i], TORQUE_N_M);
     }
     if let Some(muscles) = &now.muscles {
         for m in 0..MUSCLE_COUNT {
             let fastest = programme.muscles[m].max_speed;
             let velocity = muscles.fibre_velocity[m];
-            excess.note_variable(programme, beside(layout.activation() + m), muscles.activation[m], MUSCLE_SHARE);
-            excess.note_variable(programme, beside(layout.fibre_velocity() + m), velocity, MUSCLE_SHARE * fastest);
+            note(beside(layout.activation() + m), muscles.activation[m], MUSCLE_SHARE);
+            note(beside(layout.fibre_velocity() + m), velocity, MUSCLE_SHARE * fastest);
         }
     }
 }
 
-fn note_heights(
+/// Calls `note` with the value of each height row of the two nodes beside the instant.
+fn visit_heights(
     programme: &GaitProgramme,
     (d, gap, share): (usize, usize, f64),
     now: &Instant,
     x: &[f64],
-    excess: &mut InterNodeExcess,
+    note: &mut dyn FnMut(HeightRow, f64),
 ) {
     let state = PointState::new(&now.q, &now.qd, &now.qdd);
     for k in [gap, gap + 1] {
         for height in &programme.rows.domains[d].points[k].heights {
-            let value = height_row(programme, d, share, &state, *height, x);
-            excess.note_row(height.row, -value, HEIGHT_M * HEIGHT_SCALE);
+            note(*height, height_row(programme, d, share, &state, *height, x));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Margins by which bounds at nodes are tightened, so that the gait also satisfies them between the nodes.
 
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
 use interior_point::NonlinearProgram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -91,13 +91,18 @@ impl Margins {
         kept
     }
 
-    /// Tightens bounds: those of variables by at most a share of their range, those of fixed variables not at all.
-    fn apply(&self, lower: &mut [f64], upper: &mut [f64], row_lower: &mut [f64]) {
+    /// Tightens bounds of variables by at most a share of their range, those of fixed variables not at all.
+    pub(super) fn tighten_variables(&self, lower: &mut [f64], upper: &mut [f64]) {
         for (&at, [low, high]) in &self.variables {
             let most = LARGEST_SHARE * (upper[at] - lower[at]);
             lower[at] += low.min(most);
             upper[at] -= high.min(most);
         }
+    }
+
+    /// Tightens bounds of variables and rows.
+    fn apply(&self, lower: &mut [f64], upper: &mut [f64], row_lower: &mut [f64]) {
+        self.tighten_variables(lower, upper);
         for (&at, margin) in &self.rows {
             row_lower[at] += margin;
         }

@@ -4,10 +4,10 @@
 //! positions and contact velocities. The Hessians of all rows of a node, including the heights of
 //! [`super::contact_limits`], are summed in link space and transformed once.
 
-use super::entries::Entries;
 use super::layout::{FORCE, PointVariables, Q, QD, QDD, U};
-use super::programme::{GaitProgramme, PointContext};
+use super::program_data::{GaitProgramme, PointContext};
 use super::rows::PointRows;
+use super::sparse_entries::Entries;
 use crate::body::coordinates::{LINKS, link_angles, to_generalised, transform_rows};
 use crate::body::dynamics::LinkHessian;
 use crate::body::point::angles_of;

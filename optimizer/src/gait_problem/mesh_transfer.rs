@@ -6,7 +6,7 @@
 //! are interpolated directly.
 
 use super::layout::DomainLayout;
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
 use super::rows::{RowKind, RowName, RowPlace};
 use interior_point::WarmPoint;
 use std::collections::HashMap;

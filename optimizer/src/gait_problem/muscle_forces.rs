@@ -3,10 +3,10 @@
 //! C5 to C7 are the force equilibrium of fibre and tendon, `s f_l(l_ce) f_v(v_ce) = f_se(e)`, with the tendon strain e
 //! from the posture. C9 to C12 equate joint torques and muscle torques (divided by 100).
 
-use super::entries::Entries;
 use super::layout::{DomainLayout, PointVariables, Q, U};
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
 use super::rows::PointRows;
+use super::sparse_entries::Entries;
 use crate::muscle::unit::AttachmentValue;
 use crate::muscle::{CurveValue, MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
 

@@ -7,9 +7,9 @@
 //!   activation is its second difference `s_(k-1) - 2 s_k + s_(k+1)` over adjacent nodes of a domain,
 //! - `track = sum_domains (1/K) sum_k |q[2..] - q_ref|^2`.
 
-use super::entries::Entries;
 use super::layout::{FORCE, Q, QD, QDD, U};
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
+use super::sparse_entries::Entries;
 use crate::body::{COORDINATES, GRAVITY, JOINTS};
 use crate::muscle::MUSCLE_COUNT;
 use crate::settings::Regularisation;

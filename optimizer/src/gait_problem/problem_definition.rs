@@ -1,6 +1,6 @@
 //! The definition of a gait problem: subject, device, bounds, variant, settings and reference gait.
 
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
 use crate::device::Device;
 use crate::reference::ReferenceGait;
 use crate::settings::GaitSettings;

@@ -1,7 +1,7 @@
 //! Rows of C4 over the whole stride: step lengths x_L and D - x_L (m), and walking speed D / sum T (m/s).
 
-use super::entries::Entries;
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
+use super::sparse_entries::Entries;
 
 fn stride_time(programme: &GaitProgramme, x: &[f64]) -> f64 {
     programme.layout.domains.iter().map(|d| programme.layout.value(x, d.duration)).sum()

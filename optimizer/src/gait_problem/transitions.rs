@@ -4,11 +4,11 @@
 //! `M(q) (qd+ - qd-) = J^T Lambda` with the contact rows of the new domain (divided by 5). Otherwise velocities are
 //! continuous (divided by 3). Fibre lengths are continuous. The impulse of the landing heel is in its friction cone.
 
-use super::entries::Entries;
 use super::layout::{PointVariables, Q, QD};
 use super::mechanics::{axis_index, coupled, leg_angles, position_gradient, subtract_force};
-use super::programme::GaitProgramme;
+use super::program_data::GaitProgramme;
 use super::rows::DomainRows;
+use super::sparse_entries::Entries;
 use crate::body::coordinates::{LINKS, congruence, link_angles, transform_rows};
 use crate::body::dynamics::LinkHessian;
 use crate::body::point::angles_of;

@@ -3,11 +3,11 @@
 //! In each interval of length h = T/N with nodes 0, m and 1, `z_m = (z_0 + z_1)/2 + h/8 (f_0 - f_1)` and `z_1 = z_0 +
 //! h/6 (f_0 + 4 f_m + f_1)` for (z, f) = (dp, dp_dot) and (dp_dot, dp_ddot). The phase limit pb is dp at the last node.
 
-use super::entries::Entries;
 use super::hermite_simpson::{SLOPE, STATE};
 use super::layout::{Q, QD, QDD};
-use super::programme::{DomainContext, GaitProgramme};
+use super::program_data::{DomainContext, GaitProgramme};
 use super::rows::DomainRows;
+use super::sparse_entries::Entries;
 
 /// Values.
 pub(super) fn values(

@@ -4,7 +4,7 @@ use super::reference_gait::{LARGEST_ANGLE_RAD, REFERENCE_COLUMNS};
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::statistics::extremes;
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table, lines_of};
+use crate::table::{Separator, Table, TimeColumn, lines_of};
 
 /// Index of the left knee among the angles of a reference gait.
 const KNEE: usize = 2;
@@ -112,7 +112,8 @@ impl MotionRecording {
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
         let lines = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
-        let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
+        let table =
+            Table::read(what, &lines[comments..], comments + 1, Separator::Comma, TimeColumn::Column("time_s"))?;
         let mut steps: Vec<String> =
             lines[..comments].iter().map(|line| line.trim_start_matches('#').trim().to_owned()).collect();
         steps.push(format!("{what}: table in the walker's convention, {} rows", table.len()));
@@ -225,5 +226,5 @@ fn backward_knee(flexion_rad: &[f64]) -> Option<String> {
 /// Parses a table of Camargo et al. 2021, whose first column is the time in s.
 fn camargo_table(what: &str, text: &str) -> Result<Table, ModelError> {
     let lines = lines_of(text);
-    Table::read(what, &lines, 1, Separator::Comma, Clock::Column("Header"))
+    Table::read(what, &lines, 1, Separator::Comma, TimeColumn::Column("Header"))
 }

@@ -1,7 +1,7 @@
 //! Sensitivities as sentences.
 
 use super::{BoundSensitivity, GaitSensitivities};
-use crate::in_words::figure;
+use crate::number_format::figure;
 use crate::tuned_bounds::TunedBounds;
 
 /// For each bound: a change that a person would make, its unit in the sentence, and the change in units of the bound.

@@ -12,7 +12,7 @@ use crate::gait::Gait;
 use crate::gait_problem::gait_of;
 use crate::gait_problem::inter_node_check::inter_node_excess;
 use crate::gait_problem::margins::Margins;
-use crate::metrics::gait_rmse;
+use crate::gait_rmse::gait_rmse;
 use interior_point::{NlpResult, NonlinearProgram};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;

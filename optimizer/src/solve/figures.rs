@@ -4,7 +4,7 @@ use super::report::SolveReport;
 use crate::body::WalkerModel;
 use crate::gait::{DomainTrajectory, Gait};
 use crate::gait_problem::objective::{cost_of_transport, mean_power};
-use crate::metrics::gait_rmse;
+use crate::gait_rmse::gait_rmse;
 use crate::quadrature::simpson;
 use crate::reference::ReferenceGait;
 use crate::subject::ModelError;

@@ -1,6 +1,6 @@
 //! Multi-start: the initial guesses of a cold start. There are several because the problem has several local optima.
 
-use crate::gait_problem::programme::{EVEN_TIMING, StrideTiming};
+use crate::gait_problem::program_data::{EVEN_TIMING, StrideTiming};
 use crate::gait_problem::{GaitProblem, GaitProgramme};
 use crate::initial_guess::{self, GuessSettings};
 use crate::subject::ModelError;

@@ -8,7 +8,7 @@ use super::report::{
 };
 use super::warm_start::WarmStart;
 use crate::gait_problem::margins::Margins;
-use crate::gait_problem::{GaitProgramme, RowViolation};
+use crate::gait_problem::{ConvergedGait, GaitProgramme, RowViolation};
 use interior_point::{NlpResult, NonlinearProgram};
 
 /// Total cost of the attempts of a solve.
@@ -37,6 +37,17 @@ pub(super) fn outcome(
     let figures = GaitFigures::of_well_formed(&gait, &programme.model, &problem.reference);
     let margins = margins.bearing_on(programme, x);
     let violations = programme.violations(x);
+    let warm_start = warm_start(context, &result, margins);
+    let converged = ConvergedGait {
+        problem,
+        programme,
+        margins: &warm_start.margins,
+        gait: &gait,
+        point: &warm_start.point,
+        tolerance: context.options.tolerance,
+        checks_between_nodes: context.options.tightening_rounds > 0,
+    };
+    let unchanged_bounds = if status == SolveStatus::Converged { converged.unchanged_bounds() } else { Vec::new() };
     let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
     let report = SolveReport {
         status,
@@ -53,7 +64,8 @@ pub(super) fn outcome(
             barrier: result.mu,
         })
         .filter(|o| o.dual_infeasibility.is_finite() && o.complementarity.is_finite()),
-        tightened_bounds: margins.count(),
+        tightened_bounds: warm_start.margins.count(),
+        unchanged_bounds,
         seconds_total: context.started.elapsed().as_secs_f64(),
         seconds_evaluation: tally.evaluation_s,
         seconds_linear_algebra: tally.linear_algebra.seconds(),
@@ -72,7 +84,6 @@ pub(super) fn outcome(
     } else {
         violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
     };
-    let warm_start = warm_start(context, &result, margins);
     SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
 }
 

@@ -2,6 +2,7 @@
 
 use super::warm_start::WarmStart;
 use crate::gait::Gait;
+use crate::gait_problem::UnchangedBound;
 use interior_point::{NlpResult, NlpStatus};
 use serde::{Deserialize, Serialize};
 
@@ -159,6 +160,10 @@ pub struct SolveReport {
     /// Number of bounds at nodes that are tightened so that the gait satisfies them between nodes.
     #[serde(default)]
     pub tightened_bounds: usize,
+    /// For each tuned bound, the values with which a converged gait stays a solution, whatever the others are in their
+    /// intervals; empty if unknown.
+    #[serde(default)]
+    pub unchanged_bounds: Vec<UnchangedBound>,
     /// Wall time, s.
     pub seconds_total: f64,
     /// Time of function and derivative evaluations, s. This and the following times are sums over attempts, which may

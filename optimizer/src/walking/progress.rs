@@ -8,7 +8,7 @@ use crate::subject::ModelError;
 
 /// Phase and hip velocity at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
+pub struct PhaseProgress {
     /// Phase of the domain: 0 at its start, 1 at its end.
     pub phase: f64,
     /// Rate of the linearised hip position, m/s.
@@ -19,14 +19,14 @@ pub struct Progress {
 ///
 /// # Errors
 /// [`ModelError`] if subject or device of the gait is invalid.
-pub fn progress(gait: &Gait) -> Result<Vec<Progress>, ModelError> {
+pub fn progress(gait: &Gait) -> Result<Vec<PhaseProgress>, ModelError> {
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
     let of_domain = |(domain, trajectory): (_, &crate::gait::DomainTrajectory)| {
         let gradient = phase_gradient(&model, domain);
         let along =
             |coordinates: &[f64; 9]| -> f64 { gradient.iter().zip(&coordinates[2..]).map(|(g, c)| g * c).sum() };
         let (start, width) = (trajectory.phase_start_m, trajectory.phase_end_m - trajectory.phase_start_m);
-        let point = |(q, qd): (&[f64; 9], &[f64; 9])| Progress {
+        let point = |(q, qd): (&[f64; 9], &[f64; 9])| PhaseProgress {
             phase: (along(q) - start) / width,
             hip_velocity_m_s: along(qd),
         };

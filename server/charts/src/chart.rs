@@ -1,6 +1,7 @@
 //! Line charts as SVG.
 
 use super::axis::{Axis, power_of_ten};
+use super::simplified::simplified;
 use std::fmt::Write;
 
 /// Style of a series. Lines differ by dash pattern, not by colour alone.
@@ -63,6 +64,17 @@ pub struct Span {
     pub shaded: bool,
 }
 
+/// The cycle of a leg on an x axis in percent: from its own heel strike, or from that of the other leg.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LegCycle {
+    /// Colour of the lines of this leg; `None`: all lines.
+    pub colour: Option<usize>,
+    /// Where in the stride the axis begins, percent from right heel strike.
+    pub begins_percent: f64,
+    /// End of stance, percent of the axis; `None`: not marked.
+    pub toe_off_percent: Option<f64>,
+}
+
 /// A chart of lines over one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
@@ -80,6 +92,11 @@ pub struct Chart {
     pub marks: Vec<(f64, String)>,
     /// Named intervals of the x axis.
     pub spans: Vec<Span>,
+    /// The cycles of the x axis, if it is one: for the marks of stance and swing, and for the cursor of the page.
+    pub cycles: Vec<LegCycle>,
+    /// Where lines are at equal shares of the stride, from its start to its end, for the cursor of the page: colour and
+    /// points. For charts whose x axis is not the cycle.
+    pub moments: Vec<(usize, Vec<(f64, f64)>)>,
     /// Whether the x axis shows whole numbers only.
     pub whole_x: bool,
     /// Whether the y axis is logarithmic.
@@ -98,6 +115,8 @@ const LEFT: f64 = 74.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 60.0;
+/// Distance between the bars of two legs.
+const STANCE_ROW: f64 = 10.0;
 /// Least gap between the numbers of two marks.
 const MARK_GAP: f64 = 6.0;
 /// Width of a character of a name above the chart, at the largest text size.
@@ -116,6 +135,8 @@ impl Chart {
             series: Vec::new(),
             marks: Vec::new(),
             spans: Vec::new(),
+            cycles: Vec::new(),
+            moments: Vec::new(),
             whole_x: false,
             log_y: false,
             y_range: None,
@@ -158,8 +179,29 @@ impl Chart {
         );
         let labels = format!("data-across=\"{}\" data-along=\"{}\"", escape(&self.x_label), escape(&self.y_label));
         format!(
-            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name}\" {plot} {labels}>{body}</svg>"
+            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name}\" {plot} {labels}{}>{body}</svg>",
+            self.cursor_data(&x, &y)
         )
+    }
+
+    /// For the script of the cursor: the lines of each cycle and where in the stride it begins, and places of lines.
+    fn cursor_data(&self, x: &Axis, y: &Axis) -> String {
+        let cycle = |cycle: &LegCycle| {
+            let lines = cycle.colour.map_or_else(|| "*".to_owned(), |colour| format!("c{}", colour % 10));
+            format!("{lines} {:.2}", cycle.begins_percent)
+        };
+        let moments = |(colour, points): &(usize, Vec<(f64, f64)>)| {
+            let place = |&(right, up): &(f64, f64)| {
+                let across = LEFT + x.place(right) * (WIDTH - RIGHT - LEFT);
+                format!(" {across:.1} {:.1}", HEIGHT - BOTTOM - y.place(self.height(up)) * (HEIGHT - BOTTOM - TOP))
+            };
+            format!("c{}{}", colour % 10, points.iter().map(place).collect::<String>())
+        };
+        let attribute = |name: &str, values: Vec<String>| {
+            if values.is_empty() { String::new() } else { format!(" data-{name}=\"{}\"", values.join(",")) }
+        };
+        let cycles = attribute("cycles", self.cycles.iter().map(cycle).collect());
+        cycles + &attribute("moments", self.moments.iter().map(moments).collect())
     }
 
     /// The elements of the drawing.
@@ -211,6 +253,7 @@ impl Chart {
         let at_height = |height: f64| bottom - y.place(height) * (bottom - TOP);
         let py = |value: f64| at_height(self.height(value));
         self.draw_spans(svg, &px)?;
+        self.draw_stances(svg, &px)?;
         for &tick in &y.ticks {
             let at = at_height(tick);
             let text = if self.log_y { power_of_ten(format_args!("{tick:.0}")) } else { y.text(tick) };
@@ -251,6 +294,20 @@ impl Chart {
         }
         for (x, text) in numbers(&places) {
             write!(svg, "<text class=\"label\" x=\"{x:.1}\" y=\"{}\">{text}</text>", TOP - 6.0)?;
+        }
+        Ok(())
+    }
+
+    /// Draws a bar above the chart for each leg, thick in stance and thin in swing, and a line at the end of stance.
+    fn draw_stances(&self, svg: &mut String, px: &impl Fn(f64) -> f64) -> std::fmt::Result {
+        let bottom = HEIGHT - BOTTOM;
+        for (row, cycle) in self.cycles.iter().enumerate() {
+            let (Some(colour), Some(toe_off)) = (cycle.colour, cycle.toe_off_percent) else { continue };
+            let (y, colour) = (TOP - 20.0 + STANCE_ROW * row as f64, colour % 10);
+            let (strike, toe_off, end) = (px(0.0), px(toe_off), px(100.0));
+            write!(svg, "<path class=\"stance c{colour}\" d=\"M{strike:.1} {y}H{toe_off:.1}\"/>")?;
+            write!(svg, "<path class=\"swing c{colour}\" d=\"M{toe_off:.1} {y}H{end:.1}\"/>")?;
+            write!(svg, "<path class=\"toe_off c{colour}\" d=\"M{toe_off:.1} {TOP}V{bottom}\"/>")?;
         }
         Ok(())
     }
@@ -331,17 +388,19 @@ impl Series {
         let colour = self.colour % 10;
         if self.stroke != Stroke::Points {
             write!(svg, "<path class=\"line c{colour} {}\" d=\"", self.stroke.class())?;
-            let mut pen_down = false;
-            for &(x, y) in &self.points {
-                if !(x.is_finite() && y.is_finite()) {
-                    pen_down = false;
-                } else if !pen_down {
-                    write!(svg, "M{:.1} {:.1}", px(x), py(y))?;
-                    pen_down = true;
-                } else if matches!(self.stroke, Stroke::Steps | Stroke::DashedSteps) {
-                    write!(svg, "H{:.1}V{:.1}", px(x), py(y))?;
-                } else {
-                    write!(svg, "L{:.1} {:.1}", px(x), py(y))?;
+            let seen = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+            for run in self.points.split(|point| !seen(point)) {
+                let mut places: Vec<(f64, f64)> = run.iter().map(|&(x, y)| (px(x), py(y))).collect();
+                let steps = matches!(self.stroke, Stroke::Steps | Stroke::DashedSteps);
+                if Stroke::APART.contains(&self.stroke) {
+                    places = simplified(&places);
+                }
+                for (place, (x, y)) in places.into_iter().enumerate() {
+                    match (place, steps) {
+                        (0, _) => write!(svg, "M{x:.1} {y:.1}")?,
+                        (_, true) => write!(svg, "H{x:.1}V{y:.1}")?,
+                        (_, false) => write!(svg, "L{x:.1} {y:.1}")?,
+                    }
                 }
             }
             write!(svg, "\"/>")?;
@@ -411,6 +470,28 @@ mod tests {
         let svg = chart.svg();
         assert!(svg.contains(">SS2_R</text>") && !svg.contains("DS2_R"), "{svg}");
         assert_eq!((svg.matches("class=\"span\"").count(), svg.matches("class=\"mark\"").count()), (1, 1));
+    }
+
+    #[test]
+    fn stance_and_swing_of_each_leg_are_marked_on_its_own_cycle() {
+        let mut chart = Chart::new("", "", "").with("left", 0, Stroke::Solid, vec![(0.0, 1.0), (100.0, 2.0)]);
+        let cycle = |colour, begins_percent, toe_off_percent| LegCycle { colour, begins_percent, toe_off_percent };
+        chart.cycles = vec![cycle(Some(0), 49.6, Some(50.0)), cycle(Some(3), 0.0, Some(62.0))];
+        let svg = chart.svg();
+        assert!(svg.contains("data-cycles=\"c0 49.60,c3 0.00\""), "{svg}");
+        // The middle of the axis from 74 to 616.
+        assert!(svg.contains("<path class=\"stance c0\" d=\"M74.0 38H345.0\"/>"), "{svg}");
+        assert_eq!((svg.matches("class=\"swing").count(), svg.matches("class=\"toe_off").count()), (2, 2));
+        chart.cycles = vec![cycle(None, 0.0, None)];
+        assert!(chart.svg().contains("data-cycles=\"* 0.00\"") && !chart.svg().contains("class=\"stance"));
+    }
+
+    #[test]
+    fn places_of_a_line_at_moments_of_the_stride_are_in_units_of_the_drawing() {
+        let mut chart = Chart::new("", "", "").with("orbit", 3, Stroke::Solid, vec![(0.0, 0.0), (10.0, 10.0)]);
+        chart.moments = vec![(3, vec![(0.0, 0.0), (10.0, 5.0)])];
+        let svg = chart.svg();
+        assert!(svg.contains("data-moments=\"c3 74.0 270.0 616.0 164.0\""), "{svg}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::gait_tiles;
 use super::heat_map::HeatMap;
 use super::standalone::{self, Inside};
 use super::tree::Tree;
+use super::walker::Animation;
 use crate::csv_table::{CsvTable, cells};
 use gait_optimizer::walking::stick_figure::StickFigure;
 
@@ -22,8 +23,10 @@ pub struct Figure {
 pub enum Drawing {
     /// A line chart.
     Chart(Chart),
-    /// A stride as a row of stick figures, with a title.
+    /// A stride as a row of pictures, with a title.
     Tiles(String, Vec<StickFigure>),
+    /// A walker that moves, with a title.
+    Animation(String, Animation),
     /// A heat map.
     Map(HeatMap),
     /// The warm-start tree.
@@ -46,16 +49,21 @@ impl Figure {
         Self { name: file_name("", &tree.title), drawing: Drawing::Tree(tree) }
     }
 
-    /// The stride as a row of stick figures.
+    /// The stride as a row of pictures.
     pub fn tiles(title: &str, figures: Vec<StickFigure>) -> Self {
         Self { name: file_name("", title), drawing: Drawing::Tiles(title.to_owned(), figures) }
+    }
+
+    /// The stride as a picture that moves.
+    pub fn animation(title: &str, animation: Animation) -> Self {
+        Self { name: file_name("", title), drawing: Drawing::Animation(title.to_owned(), animation) }
     }
 
     /// The title.
     pub fn title(&self) -> &str {
         match &self.drawing {
             Drawing::Chart(chart) => &chart.title,
-            Drawing::Tiles(title, _) => title,
+            Drawing::Tiles(title, _) | Drawing::Animation(title, _) => title,
             Drawing::Map(map) => &map.title,
             Drawing::Tree(tree) => &tree.title,
         }
@@ -70,6 +78,10 @@ impl Figure {
             }
             Drawing::Tiles(title, figures) => {
                 let inside = Inside { class: "tiles", size: gait_tiles::SIZE, body: gait_tiles::body(figures) };
+                standalone::svg(title, &inside, &[])
+            }
+            Drawing::Animation(title, animation) => {
+                let inside = Inside { class: "gait-figure", size: animation.size(), body: animation.body() };
                 standalone::svg(title, &inside, &[])
             }
             Drawing::Map(map) => {
@@ -88,6 +100,7 @@ impl Figure {
         let table = match &self.drawing {
             Drawing::Chart(chart) => chart_csv(chart),
             Drawing::Tiles(_, figures) => tiles_csv(figures),
+            Drawing::Animation(_, animation) => tiles_csv(animation.figures()),
             Drawing::Map(map) => map_csv(map),
             Drawing::Tree(tree) => tree_csv(tree),
         };

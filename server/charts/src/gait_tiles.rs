@@ -1,18 +1,16 @@
-//! A stride as a row of stick figures, in place of an animation.
+//! A stride as a row of pictures, in place of an animation.
 
-use gait_optimizer::walking::stick_figure::{LegPoints, StickFigure};
+use crate::walker::{UNITS_PER_M, parts};
+use gait_optimizer::walking::stick_figure::StickFigure;
 use std::fmt::Write;
 
-/// Number of stick figures of a stride.
+/// Number of pictures of a stride.
 const TILES: usize = 9;
-const WIDTH: f64 = 104.0;
+const WIDTH: f64 = 112.0;
 const HEIGHT: f64 = 190.0;
-const GROUND: f64 = 164.0;
-/// Units of the drawing per metre.
-const SCALE: f64 = 86.0;
-/// Centre of the head, in torso lengths above the hip, and its radius, m. The model has no head.
-const HEAD_AT: f64 = 1.18;
-const HEAD_M: f64 = 0.1;
+const GROUND: f64 = 166.0;
+/// Scale of the body, whose outlines are in other units.
+const SCALE: f64 = 88.0 / UNITS_PER_M;
 
 /// Width and height of the drawing.
 pub(super) const SIZE: (f64, f64) = (WIDTH * TILES as f64, HEIGHT);
@@ -20,7 +18,7 @@ pub(super) const SIZE: (f64, f64) = (WIDTH * TILES as f64, HEIGHT);
 /// Figures at equal time steps as one SVG element. Each is centred on its hip, with the percentage of the cycle below.
 pub fn gait_tiles(figures: &[StickFigure]) -> String {
     let (width, body) = (SIZE.0, body(figures));
-    let name = format!("The stride as {TILES} stick figures");
+    let name = format!("The stride in {TILES} pictures");
     format!("<svg class=\"tiles\" viewBox=\"0 0 {width} {HEIGHT}\" role=\"img\" aria-label=\"{name}\">{body}</svg>")
 }
 
@@ -34,30 +32,24 @@ pub(super) fn body(figures: &[StickFigure]) -> String {
 
 fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
     let end = figures.last().map_or(0.0, |figure| figure.time_s);
+    write!(svg, "<path class=\"ground\" d=\"M0 {GROUND}H{}\"/>", SIZE.0)?;
+    // One body for all pictures: its outlines do not change.
+    let body = figures.first().map(parts).unwrap_or_default();
     for tile in 0..TILES {
         let share = tile as f64 / (TILES - 1) as f64;
         let Some(figure) = figures.iter().find(|figure| figure.time_s >= share * end - 1e-9) else { continue };
         let middle = WIDTH * (tile as f64 + 0.5);
-        let at = |[x, z]: [f64; 2]| (middle + (x - figure.hip[0]) * SCALE, GROUND - z * SCALE);
-        let mut line = |class: &str, joints: &[[f64; 2]]| -> std::fmt::Result {
-            write!(svg, "<path class=\"{class}\" d=\"")?;
-            for (i, (x, y)) in joints.iter().map(|joint| at(*joint)).enumerate() {
-                write!(svg, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' })?;
+        write!(svg, "<g class=\"gait-figure\" transform=\"translate({middle} {GROUND})scale({SCALE})\">")?;
+        for part in &body {
+            let place = part.segment.placement(figure).transform();
+            write!(svg, "<path class=\"{}\" transform=\"{place}\" d=\"{}\"", part.class, part.outline)?;
+            // The page of a rater moves the first one.
+            if tile == 0 {
+                write!(svg, " data-segment=\"{}\"", part.segment.name())?;
             }
-            write!(svg, "\"/>")
-        };
-        let half = WIDTH / 2.0 / SCALE;
-        line("ground", &[[figure.hip[0] - half, 0.0], [figure.hip[0] + half, 0.0]])?;
-        let foot = |leg: &LegPoints| [leg.ankle, leg.heel, leg.toe, leg.ankle];
-        line("left", &[figure.hip, figure.left.knee, figure.left.ankle])?;
-        line("left", &foot(&figure.left))?;
-        line("right", &[figure.hip, figure.right.knee, figure.right.ankle])?;
-        line("right", &foot(&figure.right))?;
-        line("torso", &[figure.hip, figure.shoulder])?;
-        let along = |i: usize| figure.hip[i] + HEAD_AT * (figure.shoulder[i] - figure.hip[i]);
-        let (x, y) = at([along(0), along(1)]);
-        write!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{:.1}\"/>", HEAD_M * SCALE)?;
-        write!(svg, "<text x=\"{middle:.1}\" y=\"{}\">{:.0} %</text>", HEIGHT - 6.0, 100.0 * share)?;
+            write!(svg, "/>")?;
+        }
+        write!(svg, "</g><text x=\"{middle}\" y=\"{}\">{:.0} %</text>", HEIGHT - 6.0, 100.0 * share)?;
     }
     Ok(())
 }

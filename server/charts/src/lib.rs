@@ -18,18 +18,22 @@ mod heat_map;
 #[cfg(feature = "png")]
 mod png;
 mod reference_band;
+mod simplified;
 mod sparkline;
 mod standalone;
 mod tree;
+mod walker;
 
 pub use axis::power_of_ten;
-pub use chart::{Band, Chart, Series, Span, Stroke};
+pub use chart::{Band, Chart, LegCycle, Series, Span, Stroke};
 pub use figure::{Drawing, Figure};
 pub use gait_tiles::gait_tiles;
 pub use heat_map::{Cell, HeatMap};
 #[cfg(feature = "png")]
 pub use png::PngError;
+pub(crate) use reference_band::over_reference_of_leg;
 pub use reference_band::{band_in_words, over_reference};
 pub use sparkline::sparkline;
 pub use standalone::STYLE_SHEET;
 pub use tree::{Node, Tree};
+pub use walker::{Animation, Ghost, WalkerFigure};

@@ -107,7 +107,12 @@ fn concerns_drawings(line: &str) -> bool {
     let palette = line.strip_prefix(".c").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
     let chart = line.starts_with(".chart ") && !line.starts_with(".chart {");
     let tree = line.starts_with(".tree ") && !line.starts_with(".tree {") && !line.starts_with(".tree a:");
-    chart || line.starts_with(".chart.map ") || line.starts_with(".tiles ") || tree || palette
+    chart
+        || line.starts_with(".chart.map ")
+        || line.starts_with(".gait-figure ")
+        || line.starts_with(".tiles ")
+        || tree
+        || palette
 }
 
 /// The first value of each variable, which is that of the light scheme.

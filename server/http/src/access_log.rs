@@ -6,7 +6,7 @@
 
 use super::AppState;
 use super::client_address::ClientAddress;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::extract::{MatchedPath, RawPathParams, Request, State};
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;

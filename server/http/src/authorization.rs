@@ -1,7 +1,7 @@
 //! Authorisation as a handler's argument: a handler gets its caller only together with a right.
 
 use crate::page_error::{PageError, is_for_programs};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::extract::{FromRequestParts, OriginalUri};
 use axum::http::Extensions;
 use axum::http::request::Parts;

@@ -12,7 +12,7 @@ const FIGURES: usize = 101;
 
 /// One figure: hip, shoulder, and knee, ankle, heel, toe of the left and the right leg; forward and up, m.
 #[derive(Debug, Serialize)]
-pub(crate) struct Figure([[f64; 2]; 10]);
+pub(crate) struct BlindFigure([[f64; 2]; 10]);
 
 /// The phase at which both motions of a pair start, as a fraction of the stride. It differs between pairs, so that no
 /// motion has the same bytes as an earlier one. A rater may still recognise a gait by its movement.
@@ -23,15 +23,15 @@ pub(crate) fn phase(token: &str) -> f64 {
 }
 
 /// The motion of a gait for a rater.
-pub(crate) fn blind_motion(gait: &Gait, phase: f64) -> Result<Vec<Figure>, Error> {
-    Ok(blind_stride(gait, phase)?.iter().map(Figure::of).collect())
+pub(crate) fn blind_motion(gait: &Gait, phase: f64) -> Result<Vec<BlindFigure>, Error> {
+    Ok(blind_stride(gait, phase)?.iter().map(BlindFigure::of).collect())
 }
 
 /// The same, as stick figures.
 pub(crate) fn blind_stride(gait: &Gait, phase: f64) -> Result<Vec<StickFigure>, Error> {
     let figures = stick_figures(gait)?;
     let (Some(first), Some(last)) = (figures.first(), figures.last()) else {
-        return Err(Error::Internal("a gait without any node".to_owned()));
+        return Err(Error::Internal("a gait without any nodes".to_owned()));
     };
     let (stride_s, stride_m) = (last.time_s - first.time_s, last.hip[0] - first.hip[0]);
     let origin = between(&figures, first.time_s + stride_s * phase).hip[0];
@@ -79,7 +79,7 @@ fn between(figures: &[StickFigure], time: f64) -> StickFigure {
     }
 }
 
-impl Figure {
+impl BlindFigure {
     fn of(figure: &StickFigure) -> Self {
         let (l, r) = (&figure.left, &figure.right);
         Self([figure.hip, figure.shoulder, l.knee, l.ankle, l.heel, l.toe, r.knee, r.ankle, r.heel, r.toe])

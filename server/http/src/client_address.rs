@@ -1,7 +1,7 @@
 //! The client address of a request, for sign-in limits, sessions and logs.
 
 use super::{AppState, forwarded};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::extract::{ConnectInfo, FromRequestParts, Request, State};
 use axum::http::request::Parts;
 use axum::http::{Extensions, HeaderValue, header};

@@ -34,14 +34,14 @@ const WANTED: u64 = 65_536;
 
 /// Limits of open connections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
+pub struct ConnectionLimits {
     /// In total.
     pub total: usize,
     /// Per IPv4 address or /64 network of IPv6. Trusted proxies are exempt.
     pub per_address: usize,
 }
 
-impl Limits {
+impl ConnectionLimits {
     /// Raises the descriptor limit of the process, and lowers these limits to what it allows.
     #[must_use]
     pub fn within_descriptors(self) -> Self {
@@ -94,7 +94,7 @@ impl LimitedListener {
     ///
     /// # Errors
     /// If the runtime cannot use the listener.
-    pub fn new(listener: std::net::TcpListener, limits: Limits, proxies: Proxies) -> io::Result<Self> {
+    pub fn new(listener: std::net::TcpListener, limits: ConnectionLimits, proxies: Proxies) -> io::Result<Self> {
         let connections = Arc::new(Connections::new(limits));
         Ok(Self { listener: TcpListener::from_std(listener)?, connections, proxies })
     }
@@ -104,7 +104,7 @@ impl AddrListener<Held, Peer> for LimitedListener {
     async fn bind_to(address: Peer) -> io::Result<Self> {
         let listener = std::net::TcpListener::bind(address.0)?;
         listener.set_nonblocking(true)?;
-        let limits = Limits { total: usize::MAX, per_address: usize::MAX };
+        let limits = ConnectionLimits { total: usize::MAX, per_address: usize::MAX };
         Self::new(listener, limits.within_descriptors(), Proxies::default())
     }
 
@@ -126,7 +126,7 @@ impl AddrListener<Held, Peer> for LimitedListener {
 /// The open connections.
 #[derive(Debug)]
 struct Connections {
-    limits: Limits,
+    limits: ConnectionLimits,
     /// Permits for descriptors. A connection returns its permit when it is closed.
     room: Arc<Semaphore>,
     begun: Instant,
@@ -157,7 +157,7 @@ struct Connection {
 }
 
 impl Connections {
-    fn new(limits: Limits) -> Self {
+    fn new(limits: ConnectionLimits) -> Self {
         let room = Arc::new(Semaphore::new(limits.total.min(Semaphore::MAX_PERMITS)));
         Self { limits, room, begun: Instant::now(), held: Mutex::default() }
     }
@@ -256,7 +256,7 @@ impl Connections {
         if (closed, refused) == (0, 0) || table.told_at.is_some_and(|at| at.elapsed() < SAY_EVERY) {
             return;
         }
-        let Limits { total, per_address } = self.limits;
+        let ConnectionLimits { total, per_address } = self.limits;
         let held = table.by_number.len();
         tracing::warn!(held, closed, refused, total, per_address, "too many connections; closing idle ones");
         (table.untold, table.told_at) = ((0, 0), Some(Instant::now()));

@@ -1,7 +1,7 @@
 //! Responses that are CSV files.
 
 use crate::AppState;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use gaitwright_charts::csv_table::CsvTable;

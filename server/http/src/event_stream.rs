@@ -5,10 +5,10 @@
 //! withdraws consent.
 
 use super::AppState;
+use super::authentication::Credential;
 use super::authorization::Refused;
-use super::identify::Credential;
 use super::visible::Visible;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::extract::{FromRequestParts, State};
 use axum::http::request::Parts;
 use axum::response::sse::{Event, KeepAlive, Sse};

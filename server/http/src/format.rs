@@ -108,8 +108,8 @@ pub(crate) fn besides_solves(mode: FeedbackMode) -> &'static str {
 /// The answer of the subject in a lab session; first is walk 2.
 pub(crate) fn walks_in_words(judgement: Judgement) -> &'static str {
     match judgement {
-        Judgement::First => "walk 2 was better, the first with the device",
-        Judgement::Second => "walk 3 was better, the second with the device",
+        Judgement::First => "walk 2, the first with the device, was better",
+        Judgement::Second => "walk 3, the second with the device, was better",
         Judgement::NoDifference => "no difference between walk 2 and walk 3",
         Judgement::CannotTell => "cannot tell which walk was better",
         Judgement::UnsafeFirst => "walk 2 was unsafe",
@@ -138,7 +138,7 @@ pub(crate) fn source(row: &FeedbackRow) -> &'static str {
     // A rater need not be the subject or a clinician; known is only whether the answer is blind.
     match (row.by_rater, row.unblinded) {
         (true, false) => "a rater",
-        (true, true) => "a rater, not blind",
+        (true, true) => "an unblinded rater",
         (false, _) => source_name(row.source),
     }
 }

@@ -70,7 +70,7 @@ pub struct Proxies {
 
 /// The origin of a request according to trusted proxies.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Believed {
+pub(super) struct TrustedOrigin {
     /// Address of the client.
     pub(super) client: IpAddr,
     /// Whether the client used TLS; `None` if the proxy does not say.
@@ -107,8 +107,8 @@ impl Proxies {
     ///
     /// # Errors
     /// [`Error::Malformed`] if the headers of a trusted proxy are malformed.
-    pub(super) fn believe(&self, peer: IpAddr, headers: &HeaderMap) -> Result<Believed, Error> {
-        let mut believed = Believed { client: peer.to_canonical(), secure: None, host: None };
+    pub(super) fn believe(&self, peer: IpAddr, headers: &HeaderMap) -> Result<TrustedOrigin, Error> {
+        let mut believed = TrustedOrigin { client: peer.to_canonical(), secure: None, host: None };
         if !self.trust(peer) {
             return Ok(believed);
         }

@@ -3,8 +3,8 @@
 use super::AppState;
 use super::accessible::OfStudy;
 use super::authorization::permitted;
-use super::extract::{body, unreadable};
-use crate::problem::Refusal;
+use super::extractors::{body, unreadable};
+use crate::problem_details::Refusal;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};

@@ -2,7 +2,7 @@
 
 use super::AppState;
 use super::authorization::Authorized;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::request_counts::{BUCKETS, Requests};
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{Method, header};

@@ -5,7 +5,7 @@
 //! schemes.
 
 use super::paging::{DEFAULT_LIMIT, LARGEST_LIMIT};
-use super::problem::{PROBLEM_JSON, Problem};
+use super::problem_details::{PROBLEM_JSON, Problem};
 use super::{api, openapi_rules};
 use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
@@ -119,14 +119,14 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
         parameters.push(json!({
             "name": "limit", "in": "query", "required": false,
             "schema": { "type": "integer", "format": "int32", "minimum": 1, "maximum": LARGEST_LIMIT, "default": DEFAULT_LIMIT },
-            "description": "Maximum number of entries of the page"
+            "description": "Maximum number of entries on the page"
         }));
     }
     if changes && !shown_once {
         parameters.push(json!({
             "name": "Idempotency-Key", "in": "header", "required": false,
             "schema": { "type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[!-~]([ -~]*[!-~])?$" },
-            "description": "A request that is repeated with the same key has one effect and the same response"
+            "description": "A request repeated with the same key takes effect only once and gets the same response"
         }));
     }
     let body = operation.pointer("/requestBody/content/application~1json/schema");

@@ -4,16 +4,16 @@
 //! the same rules everywhere, so they are stated once. The ranges of solver and learner settings come from the errors
 //! of their own checks.
 
-use super::openapi_depends;
+use super::openapi_dependent_rules;
 use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
 use gait_optimizer::{BasinChoice, Device, GaitSettings, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
-use gaitwright_service::document;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::plan::LARGEST_SEED;
-use gaitwright_store::listing::SORTS;
+use gaitwright_service::json_document;
+use gaitwright_service::studies::study_plan::LARGEST_SEED;
+use gaitwright_store::trials_table::SORTS;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
@@ -153,7 +153,7 @@ pub(super) fn state(document: &mut Value) {
         ] {
             put(schemas, name, schema);
         }
-        openapi_depends::state(schemas);
+        openapi_dependent_rules::state(schemas);
     }
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
         for (_, item) in paths {
@@ -190,7 +190,7 @@ fn state_bounds(schemas: &mut Map<String, Value>) {
     let Some(bounds) = schemas.get("Bounds").and_then(Value::as_object) else { return };
     let mut given = bounds.clone();
     given.remove("required");
-    given.insert("description".to_owned(), json!("Values of bounds. Absent bounds have their defaults."));
+    given.insert("description".to_owned(), json!("Values of bounds. Absent bounds take their default values."));
     schemas.insert("BaseBounds".to_owned(), Value::Object(given));
     for (name, usual) in TunedBounds::NAMES.iter().zip(TunedBounds::default().to_array()) {
         add(schemas, "BaseBounds", name, &json!({ "default": usual }));
@@ -426,7 +426,7 @@ where
 {
     let Ok(default) = serde_json::to_value(default) else { return json!({ "type": "object" }) };
     let refusal = |changed: &Value| -> Option<Error> {
-        match serde_json::to_vec(changed).map(|bytes| document::read::<T>(&bytes)) {
+        match serde_json::to_vec(changed).map(|bytes| json_document::read::<T>(&bytes)) {
             Ok(Ok(settings)) => check(&settings),
             Ok(Err(error)) => Some(error),
             Err(_) => None,

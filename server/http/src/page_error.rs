@@ -1,7 +1,7 @@
 //! Errors as pages.
 
-use crate::problem::{Problem, Refusal};
-use crate::refusal;
+use crate::form_errors;
+use crate::problem_details::{Problem, Refusal};
 use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::http::{Method, Uri};
@@ -33,7 +33,7 @@ impl IntoResponse for PageError {
             return Redirect::to("/sign-in").into_response();
         }
         let error = match self.0 {
-            Error::Invalid(fault) => Error::Invalid(Box::new(refusal::with_label(*fault))),
+            Error::Invalid(fault) => Error::Invalid(Box::new(form_errors::with_label(*fault))),
             other => other,
         };
         // `responses::complete` renders it with the navigation of the caller.

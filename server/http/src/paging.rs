@@ -1,8 +1,8 @@
 //! Lists by pages: one envelope, one cursor and one limit for every list of the REST interface.
 
 use super::AppState;
-use crate::problem::Refusal;
-use crate::query;
+use crate::problem_details::Refusal;
+use crate::query_string;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use gaitwright_service::error::Error;
@@ -122,7 +122,7 @@ fn cursor<K: Serialize>(key: &K) -> Result<String, Error> {
 impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
     fn read(query: &str) -> Result<Self, Error> {
         let (mut after, mut limit, mut filter) = (None, None, Vec::new());
-        for (name, value) in query::pairs(query)? {
+        for (name, value) in query_string::pairs(query)? {
             let given = match name.as_str() {
                 "cursor" => after.replace(read_cursor(&value)?).is_some(),
                 "limit" => limit.replace(read_limit(&value)?).is_some(),
@@ -132,10 +132,10 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
                 }
             };
             if given {
-                return Err(Error::Malformed(query::occurs_twice(&name)));
+                return Err(Error::Malformed(query_string::occurs_twice(&name)));
             }
         }
-        let filter = query::read(&filter, &["cursor", "limit"])?;
+        let filter = query_string::read(&filter, &["cursor", "limit"])?;
         Ok(Self { after, filter, limit: limit.unwrap_or(DEFAULT_LIMIT) })
     }
 }

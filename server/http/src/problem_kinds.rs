@@ -134,7 +134,7 @@ impl Kind {
                 "Conflict with the current state",
                 "The request is valid, but the current state does not allow it: for example, the study has ended, the name is \
                  taken, or the subject withdrew consent. Nothing was changed.",
-                "Read the detail and the current state, then decide again.",
+                "Read the detail and the current state, then decide whether to repeat the request.",
             ),
             Self::Changed => entry(
                 "/problems/changed",
@@ -147,7 +147,7 @@ impl Kind {
                 "/problems/too-large",
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The request is too large",
-                "The body exceeds the limit of this address. Nothing was changed.",
+                "The body exceeds the limit for this address. Nothing was changed.",
                 "Send a smaller body. The detail names the limit.",
             ),
             Self::UnsupportedMediaType => entry(
@@ -204,8 +204,8 @@ impl Kind {
                 "/problems/storage-full",
                 StatusCode::INSUFFICIENT_STORAGE,
                 "The disk is full",
-                "The disk of the record has too little space for the change, or for the work that it would start. Nothing was \
-                 changed.",
+                "The disk that holds the record has too little space for the change, or for the work that it \
+                 would start. Nothing was changed.",
                 "Free some space, then send the request again. The service does not need a restart.",
             ),
             Self::RecordVanished => entry(

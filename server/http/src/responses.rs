@@ -2,7 +2,7 @@
 //! page.
 
 use super::page_error::{is_for_programs, shown};
-use super::problem::Problem;
+use super::problem_details::Problem;
 use super::problem_kinds::Kind;
 use super::responded_to::RespondedTo;
 use axum::extract::{MatchedPath, Request};

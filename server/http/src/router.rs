@@ -1,10 +1,10 @@
 //! The router: all routes, and the layers around them.
 
 use super::{
-    AppState, access_log, api, client_address, host, identify, metrics, openapi, page_error, pages, responses,
-    same_origin, static_files,
+    AppState, access_log, api, authentication, client_address, host_header, metrics, openapi, page_error, pages,
+    responses, same_origin, static_files,
 };
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, Request};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
@@ -45,11 +45,11 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
     };
     routes
         .layer(middleware::from_fn(access_log::say_caller))
-        .layer(middleware::from_fn_with_state(state.clone(), identify::identify))
+        .layer(middleware::from_fn_with_state(state.clone(), authentication::identify))
         .layer(middleware::from_fn_with_state(state.clone(), access_log::note))
         .layer(middleware::from_fn_with_state(state.clone(), metrics::count))
         .layer(middleware::from_fn(same_origin::check))
-        .layer(middleware::from_fn_with_state(state.hosts.clone(), host::check))
+        .layer(middleware::from_fn_with_state(state.hosts.clone(), host_header::check))
         .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, state.slowest_answer))
         // The whole body is in memory before a handler reads it.
         .layer(DefaultBodyLimit::disable())

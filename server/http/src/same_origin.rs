@@ -3,9 +3,9 @@
 //! Browsers state the origin of every request (`Sec-Fetch-Site`, `Origin`), and pages cannot forge it. Together with a
 //! `SameSite` cookie this covers every form and REST call, so no form needs a hidden field.
 
+use super::authentication::session_of;
 use super::client_address::Secure;
-use super::identify::session_of;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::extract::Request;
 use axum::http::{HeaderMap, Method, header};
 use axum::middleware::Next;

@@ -1,6 +1,6 @@
 //! Serves styles, scripts and images, which are embedded in the binary.
 
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::extract::Path;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};

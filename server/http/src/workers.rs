@@ -1,6 +1,6 @@
 //! The workers of the service, for the page *System* and for REST.
 
-use crate::state::AppState;
+use crate::shared_state::AppState;
 use gaitwright_store::{StoreResult, jobs};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -123,7 +123,7 @@ impl Backups {
             _ if has(CANCELLED) => Some((JobState::Cancelled, None)),
             Some(Progress::Running(_)) => Some((JobState::Running, None)),
             Some(Progress::Failed(reason)) => Some((JobState::Failed, Some(reason))),
-            None => Some((JobState::Failed, Some("The service ended before the backup was complete.".to_owned()))),
+            None => Some((JobState::Failed, Some("The service stopped before the backup was complete.".to_owned()))),
         })
     }
 

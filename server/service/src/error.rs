@@ -209,7 +209,8 @@ impl From<StoreError> for Error {
             withdrawn if withdrawn.is_withdrawal() => Self::Conflict(StoreError::Withdrawn.to_string()),
             full if full.is_full() => Self::StorageFull(match full {
                 StoreError::NearlyFull { .. } | StoreError::CopyFull { .. } => full.to_string(),
-                _ => "The disk of the record is full. Nothing was changed. Free some space and try again.".to_owned(),
+                _ => "The disk that holds the record is full. Nothing was changed. Free some space and try again."
+                    .to_owned(),
             }),
             closed if closed.is_unwritable() => {
                 Self::NotReady(format!("The record cannot be written. Nothing was changed. {closed}"))

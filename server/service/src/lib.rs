@@ -8,8 +8,8 @@
 
 pub mod access;
 pub mod backups;
-pub mod document;
 pub mod error;
+pub mod json_document;
 pub mod printable;
 pub mod scheduled_backups;
 pub mod studies;

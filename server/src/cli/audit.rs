@@ -37,9 +37,8 @@ impl Audit {
         data(&format!("audit trail intact: {rows} rows, last hash {last}"))?;
         data(&match found.seals {
             Some((seals, last)) => format!("seals intact: {seals} seals, last hash {last}"),
-            None => {
-                "no seals: an older version wrote this record; the next start of the service will seal it".to_owned()
-            }
+            None => "no seals: an older version wrote this record; the service will seal it the next time it starts"
+                .to_owned(),
         })?;
         for (anchor, ends) in &found.anchors {
             let (audit, seals) = (ends.audit.seq, ends.seals.seq);

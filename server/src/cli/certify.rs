@@ -2,7 +2,7 @@
 
 use super::gait_file::{GaitFile, read_gait_file};
 use super::output::data;
-use super::problem::reference_of;
+use super::problem_flags::reference_of;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, RECOVERY_STRIDES, STRIDES, certify};
 use gait_optimizer::{Gait, GaitFigures, ReferenceGait, SolveReport};
@@ -15,7 +15,7 @@ pub(super) struct Certify {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// Reference gait of the solve, as in `solve`, for the Gait RMSE that a file of `solve --out` states.
+    /// Reference gait used in the solve, given as for `solve`; needed to check the Gait RMSE stated in a file written by `solve --out`.
     #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Print the certificate as one JSON object.
@@ -48,8 +48,8 @@ fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -
     match figures.difference(&GaitFigures::stated_in(report)) {
         None => Ok(()),
         Some((name, computed, stated)) if name.starts_with("gait_rmse") => Err(format!(
-            "it states {name} as {stated}; with the reference gait {:?} it is {computed}. If the solve had another reference \
-             gait, give it with --reference.",
+            "it states {name} as {stated}; with the reference gait {:?} it is {computed}. If the solve used \
+             another reference gait, give it with --reference.",
             reference.name
         )),
         Some((name, computed, stated)) => {
@@ -97,7 +97,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(pushes) = certificate.pushes {
         lines.push(format!(
-            "  pushes recovered within {RECOVERY_STRIDES} strides: {:.2} m/s forwards, {:.2} m/s backwards",
+            "  pushes from which the walker recovers within {RECOVERY_STRIDES} strides: {:.2} m/s forwards, {:.2} m/s backwards",
             pushes.forwards_m_s, pushes.backwards_m_s
         ));
     }

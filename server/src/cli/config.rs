@@ -1,13 +1,13 @@
 //! Settings of the service: flags override the environment, which overrides the settings file, which overrides
 //! defaults. Each value has its origin.
 
-use super::numbers::workers;
+use super::flag_numbers::workers;
 use super::output::data;
 use super::scheduled_backups::BackupPlan;
 use clap::{Args, Subcommand};
-use gaitwright_http::connections::Limits;
+use gaitwright_http::connections::ConnectionLimits;
 use gaitwright_http::{NETWORKS, Network, Proxies, ProxyHeaders};
-use gaitwright_service::access::sign_in::Limits as SessionLimits;
+use gaitwright_service::access::sign_in::SessionLimits;
 use gaitwright_service::error::Error;
 use gaitwright_store::{Store, StoreResult};
 use std::collections::BTreeMap;
@@ -116,13 +116,13 @@ pub(super) struct Flags {
     /// Name of this service on the broker (default: gaitwright).
     #[arg(long, value_name = "NAME")]
     nats_queue: Option<String>,
-    /// Do not require users to sign in. Only on a loopback address.
+    /// Do not require users to sign in. Allowed only on a loopback address.
     #[arg(long)]
     no_sign_in: bool,
     /// Minutes without a request after which a session ends (default: 60).
     #[arg(long, value_name = "MINUTES")]
     idle_minutes: Option<String>,
-    /// Hours after which a session ends in any case (default: 12).
+    /// Hours after which a session ends even if it is in use (default: 12).
     #[arg(long, value_name = "HOURS")]
     session_hours: Option<String>,
     /// Address or network of a reverse proxy whose headers are trusted; can be repeated.
@@ -310,13 +310,13 @@ impl Settings {
     }
 
     /// Limits of open connections.
-    pub(super) fn connections(&self) -> Result<Limits, Error> {
+    pub(super) fn connections(&self) -> Result<ConnectionLimits, Error> {
         let number = |name: &str| {
             let allowed = "1 to 60000";
             let number = self.parsed(name, allowed)?;
             if (1..=60_000).contains(&number) { Ok(number) } else { Err(self.refused(name, allowed)) }
         };
-        Ok(Limits { total: number("connections")?, per_address: number("connections_per_address")? })
+        Ok(ConnectionLimits { total: number("connections")?, per_address: number("connections_per_address")? })
     }
 
     /// Free space that is kept in reserve.

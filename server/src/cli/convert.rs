@@ -7,8 +7,8 @@ use super::output::data;
 use clap::{Args, ValueEnum};
 use gait_optimizer::export::motion_file;
 use gait_optimizer::walking::stick_figure::stick_figures;
-use gaitwright_charts::Figure;
 use gaitwright_charts::gait_table::gait_csv;
+use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
@@ -17,10 +17,12 @@ use std::path::PathBuf;
 enum Form {
     /// Table of the nodes (CSV) with angles, velocities, torques, forces and activations in SI units.
     Csv,
-    /// OpenSim motion file (.mot) in degrees, with OpenSim's signs.
+    /// OpenSim motion file (.mot) in degrees, with OpenSim's sign conventions.
     Mot,
-    /// The stride as a row of stick figures (SVG).
+    /// The stride as a row of pictures (SVG).
     Tiles,
+    /// The walker, who moves in a loop (SVG).
+    Animation,
 }
 
 #[derive(Debug, Args)]
@@ -47,6 +49,7 @@ impl Convert {
             Form::Csv => gait_csv(&gait),
             Form::Mot => motion_file(&gait, self.rate_hz)?,
             Form::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),
+            Form::Animation => gait_charts::animation(WalkerFigure::new(&gait)?).svg(),
         };
         match out {
             Some(out) => out.write(&text),

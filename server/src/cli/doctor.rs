@@ -6,7 +6,7 @@ use clap::Args;
 use gaitwright_service::error::Error;
 #[cfg(feature = "nats")]
 use gaitwright_service::workers::nats;
-use gaitwright_store::{SCHEMA_VERSION, clock, free_bytes, now, verify};
+use gaitwright_store::{SCHEMA_VERSION, access_clock, free_bytes, now, verify};
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
@@ -80,7 +80,7 @@ fn disk(database: &Path, reserve: u64) -> Found {
 async fn record(database: &Path, anchors: &[PathBuf]) -> Found {
     match verify::file(database, anchors).await {
         Ok(whole) => Good(format!(
-            "{} is whole: audit trail of {} rows, {} seals, anchors: {}",
+            "{} is intact: audit trail of {} rows, {} seals, anchors: {}",
             database.display(),
             whole.audit.0,
             whole.seals.map_or(0, |(seals, _)| seals),
@@ -93,7 +93,7 @@ async fn record(database: &Path, anchors: &[PathBuf]) -> Found {
 /// A clock that is behind the record was set back.
 async fn clock_after(database: &Path) -> Found {
     let present = now();
-    match clock::latest_of_file(database).await {
+    match access_clock::latest_of_file(database).await {
         Ok(Some(latest)) if latest > present.plus_seconds(CLOCKS_DIFFER_S) => {
             Trouble(format!("{present} is earlier than {latest} in the record: the clock was set back"))
         }

@@ -1,9 +1,9 @@
 //! `gaitwright emg`: processes EMG recordings to muscle activity over the gait cycle.
 
-use super::choices::{EMG_FORMATS, one_of};
+use super::flag_choices::{EMG_FORMATS, one_of};
 use super::out_file::OutFile;
 use super::output::data;
-use super::problem::read;
+use super::problem_flags::read;
 use clap::Args;
 use gait_optimizer::emg::{Activity, CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope};
 use gaitwright_charts::csv_table::{Cell, CsvTable};
@@ -23,7 +23,7 @@ pub(super) struct Emg {
     /// Format of both files.
     #[arg(long, value_parser = one_of::<MeasurementFormat>(EMG_FORMATS), default_value = "csv")]
     format: MeasurementFormat,
-    /// Sampling rate of a CSV file without a column time_s, 100 to 20000.
+    /// Sampling rate of a CSV file without a time_s column, 100 to 20000.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,
     /// Columns of the channels, as in TA_L=EMG2,BF_L=EMG3; other channels are ignored (default: columns with the
@@ -109,7 +109,7 @@ impl Emg {
             Some(path) => {
                 let (normal, strikes) = self.read(path, &self.normal_heel_strikes_s)?;
                 if normal == recording {
-                    let allowed = "a recording other than the one that is processed";
+                    let allowed = "a recording other than the one being processed";
                     return Err(Error::invalid("normal", path.display().to_string(), allowed));
                 }
                 Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?

@@ -1,9 +1,9 @@
 //! Reads a gait from a file of `solve --out`, or from a gait file of the service.
 
-use super::problem::read;
+use super::problem_flags::read;
 use gait_optimizer::{Gait, SolveOutcome, SolveReport};
-use gaitwright_service::document;
 use gaitwright_service::error::Error;
+use gaitwright_service::json_document;
 use serde_json::Value;
 use std::path::Path;
 
@@ -20,12 +20,12 @@ pub(super) struct GaitFile {
 pub(super) fn read_gait_file(path: &Path) -> Result<GaitFile, Error> {
     let text = read(path)?;
     let bytes = text.as_bytes();
-    let file = document::read::<Value>(bytes).and_then(|value| {
+    let file = json_document::read::<Value>(bytes).and_then(|value| {
         if value.get("gait").is_some() {
-            let SolveOutcome { gait, report, .. } = document::read(bytes)?;
+            let SolveOutcome { gait, report, .. } = json_document::read(bytes)?;
             Ok(GaitFile { gait, report: Some(report) })
         } else {
-            Ok(GaitFile { gait: document::read(bytes)?, report: None })
+            Ok(GaitFile { gait: json_document::read(bytes)?, report: None })
         }
     });
     file.map_err(|e| Error::Malformed(format!("{} is not a gait file: {e}", path.display())))

@@ -64,7 +64,7 @@ pub(super) struct Lineage {
 
 impl Lineage {
     /// The lineage of an outcome; `start` is the warm start that was given to the solve.
-    pub(super) fn of(outcome: &SolveOutcome, start: Option<&Start>) -> Self {
+    pub(super) fn of(outcome: &SolveOutcome, start: Option<&LineageStart>) -> Self {
         let ancestors = match outcome.report.started_from {
             StartedFrom::Warm => {
                 start.into_iter().flat_map(|s| [&s.gait].into_iter().chain(&s.before)).cloned().collect()
@@ -77,14 +77,14 @@ impl Lineage {
 
 /// A warm start and its gait.
 #[derive(Debug, Clone)]
-pub(super) struct Start {
+pub(super) struct LineageStart {
     pub(super) point: WarmStart,
     pub(super) gait: Ancestor,
     /// The ancestors of that gait, the nearest first.
     before: Vec<Ancestor>,
 }
 
-impl Start {
+impl LineageStart {
     /// A point without further information.
     pub(super) fn unknown(point: WarmStart) -> Self {
         let gait = Ancestor { id: identifier(&point), basin: None, objective: None, gait_rmse_rad: None };
@@ -137,9 +137,9 @@ mod tests {
 
     #[test]
     fn ancestor_text_has_all_known_values() {
-        let start = Start::cold(end(&[0.5]), (Some(2), 0.063_41, f64::NAN));
+        let start = LineageStart::cold(end(&[0.5]), (Some(2), 0.063_41, f64::NAN));
         let id = &start.gait.id;
         assert_eq!(start.gait.in_words(), format!("gait {id} (basin 2, objective 0.06341)"));
-        assert_eq!(Start::unknown(end(&[0.5])).gait.in_words(), format!("gait {id}"));
+        assert_eq!(LineageStart::unknown(end(&[0.5])).gait.in_words(), format!("gait {id}"));
     }
 }

@@ -1,30 +1,32 @@
 //! The command line: parses arguments, runs a command, sets the exit code. Data goes to stdout, messages and logs to
 //! stderr.
 
+pub mod archive_commands;
 mod audit;
 mod backup;
-mod body;
 mod certify;
-mod choices;
 mod config;
 mod convert;
 mod database_file;
 mod doctor;
 mod emg;
+mod flag_choices;
+mod flag_numbers;
 mod gait_file;
 mod lineage;
 mod logging;
-mod numbers;
+mod multi_start_flags;
 mod out_file;
 mod output;
-mod problem;
+mod problem_flags;
 mod reference;
 mod reference_comparison;
 mod reproduce;
 mod scheduled_backups;
 mod serve;
+mod simulate;
 mod solve;
-pub mod study;
+mod subject_flags;
 mod sweep;
 #[cfg(feature = "tls")]
 mod tls;
@@ -69,11 +71,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run the service: pages, REST interface and the studies of a database.
+    /// Run the service: web pages, REST interface and the studies in a database.
     Serve(serve::Serve),
     /// Run solves for a service on another machine, through a NATS broker.
     Worker(worker::Worker),
-    /// Run an unattended study, in which Gait RMSE answers the comparisons.
+    /// Run an unattended study in which Gait RMSE, not a person, decides the comparisons.
     ///
     /// Continues an unfinished study with the same settings.
     Tune(tune::Tune),
@@ -85,6 +87,8 @@ enum Command {
     Sweep(sweep::Sweep),
     /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
     Certify(certify::Certify),
+    /// Simulate walks with a gait on uneven ground, with the controllers of a laboratory.
+    Simulate(simulate::Simulate),
     /// Convert a gait to a table, an OpenSim motion or a picture.
     Convert(convert::Convert),
     /// Compute a reference gait from a recording of joint angles.
@@ -97,7 +101,7 @@ enum Command {
     Config(config::Config),
     /// Check the machine, the settings and the record. Exits with 1 if anything is wrong.
     ///
-    /// The output is meant for bug reports: it contains no data of subjects and no secrets.
+    /// The output is meant for bug reports: it contains no subject data and no secrets.
     Doctor(doctor::Doctor),
     /// Print the description of the REST interface (OpenAPI 3.1).
     Openapi,
@@ -108,17 +112,17 @@ enum Command {
     /// The replaced record is kept next to it.
     Restore(backup::Restore),
     /// Export a study to an archive, even while the service is running.
-    Export(study::Export),
+    Export(archive_commands::Export),
     /// Import a study from an archive, while the service is stopped.
-    Import(study::Import),
+    Import(archive_commands::Import),
     /// Create a key for signing archives, and print its public key.
-    SigningKey(study::NewKey),
+    SigningKey(archive_commands::NewKey),
     /// List users or create sign-in links for them, while the service is stopped.
     Users(users::Users),
     /// Delete old trajectories, while the service is stopped.
     ///
     /// Results, answers and recommended gaits are kept.
-    Prune(study::Prune),
+    Prune(archive_commands::Prune),
 }
 
 impl Command {
@@ -170,6 +174,7 @@ pub fn run() -> ExitCode {
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
         Command::Certify(certify) => runtime.block_on(certify.run()).map(|()| Ended::Done),
+        Command::Simulate(simulate) => runtime.block_on(simulate.run()).map(|()| Ended::Done),
         Command::Reference(reference) => reference.run().map(|()| Ended::Done),
         Command::Emg(emg) => emg.run().map(|()| Ended::Done),
         Command::Convert(convert) => convert.run().map(|()| Ended::Done),

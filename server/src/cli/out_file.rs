@@ -3,7 +3,7 @@
 
 use super::output::tell;
 use gaitwright_service::error::Error;
-use gaitwright_store::whole_file::sync_folder;
+use gaitwright_store::atomic_file::sync_folder;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};

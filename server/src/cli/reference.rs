@@ -1,9 +1,9 @@
 //! `gaitwright reference`: computes a reference gait from a recording.
 
-use super::choices::{ANGLE_UNITS, HEEL_STRIKES, JOINT_ANGLE_FORMATS, one_of};
+use super::flag_choices::{ANGLE_UNITS, HEEL_STRIKES, JOINT_ANGLE_FORMATS, one_of};
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem::read;
+use super::problem_flags::read;
 use clap::Args;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::reference_import::{JointAngleFormat, NewReferenceGait, Strikes, Unit};
@@ -14,7 +14,7 @@ pub(super) struct Reference {
     /// Recording of joint angles.
     #[arg(value_name = "FILE")]
     recording: PathBuf,
-    /// Name shown to people.
+    /// Name shown to users.
     #[arg(long, value_name = "TEXT")]
     name: String,
     /// Format of the recording.

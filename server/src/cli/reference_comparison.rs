@@ -10,7 +10,7 @@ pub(super) fn in_words(comparisons: &[ReferenceComparison]) -> Vec<String> {
 }
 
 fn distance(comparison: &ReferenceComparison) -> String {
-    let which = if comparison.of_the_problem { ", of the problem" } else { "" };
+    let which = if comparison.of_the_problem { "; the one used in the problem" } else { "" };
     format!(
         "  Gait RMSE          {:.4} rad ({}{which}); {:.4} rad if shifted by {:.2} % of the stride",
         comparison.gait_rmse_rad, comparison.reference_gait, comparison.aligned_gait_rmse_rad, comparison.shift_percent

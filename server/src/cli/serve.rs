@@ -9,11 +9,11 @@ use axum_server::{Handle, Server};
 use clap::Args;
 use gaitwright_http::access_log::keep_pruning;
 use gaitwright_http::connections::{LimitedListener, Peer};
-use gaitwright_http::{Access, AppState, Hosts, is_loopback_name, router};
-use gaitwright_service::access::people;
+use gaitwright_http::{AccessState, AppState, Hosts, is_loopback_name, router};
+use gaitwright_service::access::user_administration;
 use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::catalogue;
+use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::retention;
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::workers::{AfterSolves, Dispatch, GaitSolver, InProcess};
@@ -36,8 +36,8 @@ const SILENCE: Duration = Duration::from_secs(15);
 pub(super) struct Serve {
     #[command(flatten)]
     pub(super) flags: Flags,
-    /// Print a one-time sign-in link for an administrator, even if one has a password. Adds an administrator if all are
-    /// disabled.
+    /// Print a one-time sign-in link for an administrator, even if an administrator already has a password. Adds a new
+    /// administrator if all existing ones are disabled.
     #[arg(long)]
     sign_in_link: bool,
 }
@@ -82,9 +82,10 @@ impl Serve {
         let backups = backups.map(|plan| plan.claim(&store)).transpose()?;
         store.set_reserve(reserve);
         let mut writer = store.write().await?;
-        catalogue::ensure(&mut writer).await?;
+        built_in_entries::ensure(&mut writer).await?;
         commit(writer).await?;
-        let mut access = if sign_in { Access::by_sign_in(sessions.idle_seconds) } else { Access::without_sign_in() };
+        let mut access =
+            if sign_in { AccessState::by_sign_in(sessions.idle_seconds) } else { AccessState::without_sign_in() };
         access.limits = sessions;
         access.secure = secure;
 
@@ -123,7 +124,9 @@ impl Serve {
             } else {
                 address.to_string()
             };
-            tell(&format!("sign in (the link works once, within a day): {scheme}://{here}/sign-in/{secret}"));
+            tell(&format!(
+                "sign in (the link works only once and expires after a day): {scheme}://{here}/sign-in/{secret}"
+            ));
         }
 
         // Event streams end with the scheduler, so they do not delay the shutdown.
@@ -155,12 +158,12 @@ impl Serve {
 
     /// A sign-in link for the first administrator, unless a user can already sign in.
     async fn link(&self, store: &Store) -> Result<Option<String>, Error> {
-        if !self.sign_in_link && people::has_admin(&mut *store.read().await?).await? {
+        if !self.sign_in_link && user_administration::has_admin(&mut *store.read().await?).await? {
             return Ok(None);
         }
         let mut writer = store.write().await?;
-        let admin = people::way_in(&mut writer).await?;
-        let secret = people::link(&mut writer, &Actor::terminal(), admin.id).await?;
+        let admin = user_administration::way_in(&mut writer).await?;
+        let secret = user_administration::link(&mut writer, &Actor::terminal(), admin.id).await?;
         commit(writer).await?;
         Ok(Some(secret))
     }

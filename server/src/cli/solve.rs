@@ -1,11 +1,11 @@
 //! `gaitwright solve`: optimises one gait.
 
 use super::Ended;
-use super::lineage::{Lineage, Start, basin_of_answer};
-use super::numbers::whole;
+use super::lineage::{Lineage, LineageStart, basin_of_answer};
+use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
 use super::output::data;
-use super::problem::{ProblemFlags, cancelled_by_signal, read_document};
+use super::problem_flags::{ProblemFlags, cancelled_by_signal, read_document};
 use super::reference_comparison;
 use super::serve::cores_or;
 use clap::Args;
@@ -14,8 +14,7 @@ use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
 use gait_optimizer::sensitivity::{GaitSensitivities, GaitSensitivityError, sensitivities};
 use gait_optimizer::{
-    BasinChoice, GaitProblem, InitialGuess, ModelError, SolveError, SolveOptions, SolveOutcome, SolveReport,
-    SolveStatus, StartedFrom, TunedBounds, solve,
+    GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, TunedBounds, solve,
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
@@ -27,15 +26,11 @@ use std::path::{Path, PathBuf};
 /// Maximum number of threads of a solve.
 const MOST_THREADS: usize = 16;
 
-fn initial_guesses(text: &str) -> Result<usize, String> {
-    whole(text, 1, InitialGuess::MOST)
-}
-
 #[derive(Debug, Args)]
 pub(super) struct Solve {
     #[command(flatten)]
     flags: ProblemFlags,
-    /// Bounds that differ from the loosest values of Table I, as in a1=20,a5=0.013.
+    /// Bounds that differ from the loosest values in Table I of the paper, as in a1=20,a5=0.013.
     #[arg(
         long,
         value_name = "NAME=VALUE,...",
@@ -44,8 +39,8 @@ pub(super) struct Solve {
         allow_hyphen_values = true
     )]
     bounds: String,
-    /// Problem file (problem.json) of a trial, downloaded from the service. Replaces all flags of the problem and the
-    /// warm start.
+    /// Problem file (problem.json) of a trial, downloaded from the service. Replaces all flags that define the problem
+    /// or the warm start.
     #[arg(
         long,
         value_name = "FILE",
@@ -55,22 +50,17 @@ pub(super) struct Solve {
         ]
     )]
     problem: Option<PathBuf>,
-    /// Start from another local optimum (basin) in the file of --warm. Basins are numbered from 1, in the order in which
-    /// the initial guesses reached them; `solve` prints the list if there are several (default: that of the gait).
+    /// Start from another local optimum (basin) in the file given to --warm. Basins are numbered from 1, in the order
+    /// in which the initial guesses reached them; `solve` prints the list if there are several (default: the basin of
+    /// the gait in that file).
     #[arg(long, value_name = "NUMBER", requires = "warm")]
     warm_basin: Option<usize>,
-    /// Number of initial guesses that a cold start always tries; --out keeps a gait of every local optimum
-    /// (basin) that they reach.
-    #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
-    initial_guesses: Option<usize>,
-    /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest
-    /// (default: the lowest objective).
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
-    nearest_within: Option<f64>,
-    /// Output file (JSON) for figures, gait, multipliers, gaits of other local optima and lineage.
+    #[command(flatten)]
+    multi_start: MultiStartFlags,
+    /// Output file (JSON) for the results, the gait, its multipliers and lineage, and the gaits of other local optima.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Print the figures as one JSON object.
+    /// Print the results as one JSON object.
     #[arg(long)]
     json: bool,
     /// If no gait is found, explain which bounds conflict and which bound, relaxed alone, gives a gait. Takes up to eight
@@ -80,8 +70,9 @@ pub(super) struct Solve {
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
     #[arg(long)]
     certify: bool,
-    /// For a converged gait, print how figures change with each tuned bound, to first order, where the bound is active, and
-    /// how far it can move until the active constraints change. With --json, adds the member `sensitivities`.
+    /// For a converged gait, print for each tuned bound how the results change with it (to first order), where it is
+    /// active, and how far it can move before the set of active constraints changes. With --json, adds the member
+    /// `sensitivities`.
     #[arg(long)]
     sensitivities: bool,
 }
@@ -111,25 +102,15 @@ struct Kept<'a> {
 }
 
 impl Solve {
-    fn input(&self) -> Result<(GaitProblem, SolveOptions, Option<Start>), Error> {
+    fn input(&self) -> Result<(GaitProblem, SolveOptions, Option<LineageStart>), Error> {
         if let Some(path) = &self.problem {
             let SolveInput { problem, options, warm_start } =
                 read_document(path, "a problem file of a trial", SolveInput::check)?;
-            return Ok((problem, options, warm_start.map(Start::unknown)));
+            return Ok((problem, options, warm_start.map(LineageStart::unknown)));
         }
         let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
-        Ok((problem, self.options()?, self.flags.warm_start(self.warm_basin)?))
-    }
-
-    fn options(&self) -> Result<SolveOptions, Error> {
-        let mut options = self.flags.options()?;
-        options.initial_guesses = self.initial_guesses.unwrap_or(options.initial_guesses);
-        if let Some(within_percent) = self.nearest_within {
-            ModelError::check_range("--nearest-within", within_percent, 0.0, 100.0)?;
-            options.basin_choice = BasinChoice::NearestToReference { within_percent };
-        }
-        options.validate()?;
-        Ok(options)
+        let options = self.multi_start.applied_to(self.flags.options()?)?;
+        Ok((problem, options, self.flags.warm_start(self.warm_basin)?))
     }
 
     pub(super) async fn run(self) -> Result<Ended, Error> {
@@ -237,7 +218,7 @@ fn for_people(
     outcome: &SolveOutcome,
     comparisons: &[ReferenceComparison],
     lineage: &Lineage,
-    start: Option<&Start>,
+    start: Option<&LineageStart>,
     explanation: Option<&Explanation>,
 ) -> String {
     let r = &outcome.report;
@@ -289,7 +270,7 @@ fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
 }
 
 /// The gait and its ancestors.
-fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&Start>) -> Vec<String> {
+fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&LineageStart>) -> Vec<String> {
     let basin = lineage.basin.map_or_else(String::new, |basin| format!(" (basin {basin})"));
     let mut lines = vec![format!("  gait               {}{basin}", lineage.id)];
     let given = start.map(|start| &start.gait);

@@ -2,10 +2,10 @@
 //! rows.
 
 use super::Ended;
-use super::numbers::workers;
+use super::flag_numbers::workers;
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem::{ProblemFlags, cancelled_by_signal, read};
+use super::problem_flags::{ProblemFlags, cancelled_by_signal, read};
 use super::serve::cores_or;
 use super::solve::status_word;
 use clap::Args;

@@ -1,21 +1,22 @@
 //! `gaitwright tune`: runs an unattended study.
 
 use super::Ended;
-use super::body::{Body, Switch};
 use super::config::{AnchoredFlags, Settings};
-use super::numbers::{seed, trials, workers};
+use super::flag_numbers::{seed, trials, workers};
+use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
-use super::problem::ProblemFiles;
+use super::problem_flags::ProblemFiles;
 use super::serve::cores_or;
+use super::subject_flags::{Body, Switch};
 use super::unattended::{self, Lines, action_line};
 use clap::Args;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::choice::best_trial;
-use gaitwright_service::studies::plan::NewStudy;
-use gaitwright_service::studies::recommended::CertificateState;
+use gaitwright_service::studies::certified_best::CertificateState;
+use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::studies::summary::{self, Summary};
-use gaitwright_service::studies::{catalogue, device, reference_import};
+use gaitwright_service::studies::trial_choice::best_trial;
+use gaitwright_service::studies::{built_in_entries, device, reference_import};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::commit;
 use std::sync::Arc;
@@ -29,15 +30,20 @@ pub(super) struct Tune {
     muscles: Switch,
     #[command(flatten)]
     files: ProblemFiles,
+    #[command(flatten)]
+    multi_start: MultiStartFlags,
     /// Number of trials.
     #[arg(long, default_value = "15", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
-    /// Seed of every random draw.
+    /// Seed for all random draws.
     #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Number of trials that run in parallel (default: number of cores). Only 1 is reproducible bit for bit.
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
+    /// Also try actions whose gait is known from another trial, as the paper does.
+    #[arg(long)]
+    repeat_results: bool,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
     /// Print one JSON object at the end instead of a line for each trial.
@@ -50,12 +56,12 @@ impl Tune {
         let subject = self.body.subject()?;
         let (device, reference, gait_settings) =
             (self.files.device()?, self.files.reference()?, self.files.settings()?);
-        let solve_options = self.files.options()?;
+        let solve_options = self.multi_start.applied_to(self.files.options()?)?;
         let workers = cores_or(self.workers);
         let mut store = settings.open_record().await?;
         let mut writer = store.write().await?;
-        catalogue::ensure(&mut writer).await?;
-        let subject = catalogue::subject_with(&mut writer, subject).await?;
+        built_in_entries::ensure(&mut writer).await?;
+        let subject = built_in_entries::subject_with(&mut writer, subject).await?;
         let (device, _) = device::add(&mut writer, &Actor::terminal(), &device).await?;
         let (reference, _) = reference_import::add(&mut writer, &Actor::terminal(), &reference).await?;
         commit(writer).await?;
@@ -68,6 +74,7 @@ impl Tune {
             trial_budget: self.trials,
             parallel_trials: u32::try_from(workers).unwrap_or(1),
             seed: self.seed,
+            repeat_results: Some(self.repeat_results),
             ..NewStudy::of(subject.id)
         };
         let study = Box::pin(unattended::study(&store, new)).await?;
@@ -130,7 +137,7 @@ fn certificate_lines(summary: &Summary) -> Vec<String> {
     match &summary.passing {
         Some(trial) => {
             let rmse = trial.gait_rmse_rad.map_or_else(String::new, |rmse| format!(": Gait RMSE {rmse:.4} rad"));
-            lines.push(format!("best gait that passed its certificate: trial {}{rmse}", trial.number));
+            lines.push(format!("best gait that passed certification: trial {}{rmse}", trial.number));
             lines.push(format!("  action            {}", action_line(&trial.action)));
         }
         None => lines.push("none of the certified gaits passed".to_owned()),

@@ -5,10 +5,10 @@ use super::serve::interrupted;
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::plan::{self, NewStudy};
-use gaitwright_service::studies::recommended::{self, Judged};
+use gaitwright_service::studies::certified_best::{self, Judged};
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::summary;
 use gaitwright_service::workers::{GaitSolver, InProcess};
 use gaitwright_store::audit::Actor;
@@ -53,7 +53,7 @@ pub(super) fn failure(StudySnapshot { study, trials, .. }: &StudySnapshot) -> Op
 /// The unfinished study with the same settings, or a new one.
 pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> {
     let mut writer = store.write().await?;
-    let wanted = plan::checked(&mut writer, new.clone()).await?;
+    let wanted = study_plan::checked(&mut writer, new.clone()).await?;
     let unfinished =
         studies::active(&mut writer).await?.into_iter().find(|study| study.plan.tries_the_same_as(&wanted));
     let study = if let Some(study) = unfinished {
@@ -62,7 +62,7 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
         tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.trial_budget));
         study
     } else {
-        plan::create(&mut writer, &Actor::terminal(), new).await?
+        study_plan::create(&mut writer, &Actor::terminal(), new).await?
     };
     commit(writer).await?;
     Ok(study)
@@ -112,7 +112,7 @@ pub(super) async fn certified(
     beliefs: &Arc<Beliefs>,
 ) -> Result<Judged, Error> {
     tell("certifying the best gait");
-    recommended::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(beliefs)).await
+    certified_best::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(beliefs)).await
 }
 
 /// Shows progress until the study ends.

@@ -4,7 +4,7 @@ use super::config::{AnchoredFlags, Settings};
 use super::database_file::exists;
 use super::output::{data, tell};
 use clap::{Args, Subcommand};
-use gaitwright_service::access::people;
+use gaitwright_service::access::user_administration;
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, StoreError, commit, users};
@@ -17,12 +17,12 @@ pub(super) struct Users {
 
 #[derive(Debug, Subcommand)]
 enum UsersCommand {
-    /// List users: name, role, way to sign in, and whether they are disabled.
+    /// List users with their name, role, sign-in method and whether they are disabled.
     List {
         #[command(flatten)]
         record: AnchoredFlags,
     },
-    /// Create a one-time sign-in link for a user, such as an administrator who forgot the password.
+    /// Create a one-time sign-in link for a user, such as an administrator who has forgotten their password.
     Link {
         /// Name of the user.
         name: String,
@@ -43,7 +43,7 @@ impl Users {
         let store = match settings.open_record().await {
             Err(StoreError::InUse { .. }) => {
                 let instead = match self.what {
-                    UsersCommand::List { .. } => "Stop it first, or see the page Users and tokens.",
+                    UsersCommand::List { .. } => "Stop it first, or use the Users and tokens page.",
                     UsersCommand::Link { .. } => "Stop it first, or restart it with --sign-in-link.",
                 };
                 return Err(Error::conflict(format!("The service is using this database. {instead}")));
@@ -69,10 +69,10 @@ impl Users {
                 let mut writer = store.write().await?;
                 let missing = || Error::NotFound { what: "user".to_owned(), id: name.clone() };
                 let user = users::by_name(&mut writer, name.trim()).await?.ok_or_else(missing)?;
-                let secret = people::link(&mut writer, &Actor::terminal(), user.id).await?;
+                let secret = user_administration::link(&mut writer, &Actor::terminal(), user.id).await?;
                 commit(writer).await?;
                 tell(&format!(
-                    "sign-in link for {}; it works once, within a day; open it at the address of the service",
+                    "sign-in link for {}; it works only once and expires after a day; open it at the address of the service",
                     user.name
                 ));
                 data(&format!("/sign-in/{secret}"))

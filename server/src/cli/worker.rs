@@ -1,7 +1,7 @@
 //! `gaitwright worker`: runs solves for a service on another machine.
 
 use super::config::{Flags, Settings};
-use super::numbers::workers;
+use super::flag_numbers::workers;
 #[cfg(feature = "nats")]
 use super::serve::{cores_or, interrupted};
 use clap::Args;

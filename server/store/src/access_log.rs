@@ -1,7 +1,7 @@
 //! Rows of the access log: views and exports of subjects' data, and refusals.
 
 use super::audit::Actor;
-use super::{Connection, Instant, StoreResult, StudyId, SubjectId, json, now};
+use super::{Connection, Instant, StoreResult, StudyId, SubjectId, json_columns, now};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use sqlx::Row;
@@ -154,7 +154,7 @@ pub async fn append(db: &mut Connection, rows: &[(Access, Tally)]) -> StoreResul
          select value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4, value ->> 5, value ->> 6, value ->> 7, \
          value ->> 8, value ->> 9, value ->> 10, value ->> 11 from json_each(?) order by key",
     )
-    .bind(json::to_text("access log", &values)?)
+    .bind(json_columns::to_text("access log", &values)?)
     .execute(db)
     .await?;
     Ok(())

@@ -2,7 +2,7 @@
 //! them to the access log.
 
 use super::access_log::{Access, Tally};
-use super::companion::companion;
+use super::record_files::companion;
 use super::{Instant, StoreError, StoreResult};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -32,7 +32,7 @@ pub fn note(record: &Path, access: &Access) -> StoreResult<()> {
     let path = path_of(record);
     let failed = |source| StoreError::Open { path: path.clone(), source };
     let line = Line { at: super::now(), access: access.clone() };
-    let mut text = super::json::to_text("access", &line)?;
+    let mut text = super::json_columns::to_text("access", &line)?;
     text.push('\n');
     let mut options = OpenOptions::new();
     options.create(true).append(true);

@@ -4,14 +4,14 @@
 //! An anchor is written after a change is on the disk and before it is acknowledged, so it never runs ahead of the
 //! record. Two places are written in turn, so that one is intact after a power failure.
 
+use super::atomic_file::{WholeFile, folder_of};
 use super::audit::ORIGIN;
-use super::companion::companion;
 use super::connection::Connection;
 use super::error::{StoreError, StoreResult};
-use super::files::FileId;
-use super::json;
+use super::json_columns;
+use super::lost_files::FileId;
+use super::record_files::companion;
 use super::time::{Instant, now};
-use super::whole_file::{WholeFile, folder_of};
 use serde::{Deserialize, Serialize};
 use sqlx::{AssertSqlSafe, Row};
 use std::fs::{File, OpenOptions};
@@ -61,12 +61,12 @@ impl Place {
     fn digest(&self) -> StoreResult<String> {
         let Ends { audit, seals } = &self.ends;
         let parts = (self.turn, self.at.to_string(), audit.seq, &audit.hash, seals.seq, &seals.hash);
-        Ok(json::sha256(json::to_text("anchor", &parts)?.as_bytes()))
+        Ok(json_columns::sha256(json_columns::to_text("anchor", &parts)?.as_bytes()))
     }
 
     /// The bytes in the file: a line, padded with spaces.
     fn bytes(&self) -> StoreResult<Vec<u8>> {
-        let mut bytes = json::to_text("anchor", self)?.into_bytes();
+        let mut bytes = json_columns::to_text("anchor", self)?.into_bytes();
         bytes.resize(PLACE_BYTES - 1, b' ');
         bytes.push(b'\n');
         Ok(bytes)
@@ -162,7 +162,7 @@ pub(super) fn refuse_wrong(elsewhere: Option<&Path>, record: &Path, backup: Opti
         return wrong("a file of the backup");
     }
     match read(anchor) {
-        Err(StoreError::Damaged { .. }) => wrong("not an anchor, or a damaged one"),
+        Err(StoreError::Damaged { .. }) => wrong("damaged, or not an anchor file"),
         Err(error) => Err(error),
         Ok(_) => Ok(()),
     }

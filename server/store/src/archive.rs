@@ -1,6 +1,6 @@
 //! The rows of a study in an archive: reads them from a record, and writes them to another one.
 
-use super::row::{Cell, Row};
+use super::archived_row::{Cell, Row};
 use super::seals;
 use super::{Connection, StoreError, StoreResult, StudyId, archived_allocations, consents, studies, time};
 use futures_util::TryStreamExt;

@@ -1,6 +1,6 @@
 //! The allocations that an archive may contain: only unblinded ones.
 
-use super::row::{Cell, Row};
+use super::archived_row::{Cell, Row};
 
 /// Condition for allocations of unblinded sessions; `?` is the study.
 pub(super) const LAB: &str = "session_id in (select l.id from lab_sessions l join lab_acts t on t.session_id = l.id \

@@ -1,6 +1,6 @@
 //! The audit trail: who did what, when and why, as a chain of hashes that detects later changes.
 
-use super::{Connection, Instant, StoreResult, UserId, json, now, schema};
+use super::{Connection, Instant, StoreResult, UserId, json_columns, now, openapi_schemas};
 use serde::Serialize;
 use serde_json::{Value, json};
 use sqlx::Row;
@@ -78,7 +78,7 @@ pub struct AuditRow {
     /// Object of the action, such as `study 0190...`.
     pub object: String,
     /// Details of the change, with the reason if there is one.
-    #[schema(value_type = schema::AuditDetail)]
+    #[schema(value_type = openapi_schemas::AuditDetail)]
     pub detail: Value,
     /// Hash of the previous row.
     pub previous: String,
@@ -103,7 +103,7 @@ pub async fn append(db: &mut Connection, actor: &Actor, action: &str, object: &s
         .bind(actor.as_str())
         .bind(action)
         .bind(object)
-        .bind(json::to_text("audit detail", detail)?)
+        .bind(json_columns::to_text("audit detail", detail)?)
         .bind(previous)
         .bind(hash)
         .execute(db)
@@ -205,7 +205,7 @@ pub(super) async fn last_ever(db: &mut Connection, table: &str) -> StoreResult<i
 fn hash(previous: &str, at: &str, actor: &str, action: &str, object: &str, detail: &Value) -> String {
     let whole =
         json!({"action": action, "actor": actor, "at": at, "detail": detail, "object": object, "previous": previous});
-    json::sha256(whole.to_string().as_bytes())
+    json_columns::sha256(whole.to_string().as_bytes())
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<AuditRow> {
@@ -215,7 +215,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<AuditRow> {
         actor: row.try_get("actor")?,
         action: row.try_get("action")?,
         object: row.try_get("object")?,
-        detail: json::column(row, "detail")?,
+        detail: json_columns::column(row, "detail")?,
         previous: row.try_get("previous")?,
         hash: row.try_get("hash")?,
     })

@@ -1,6 +1,6 @@
 //! Backups of the record: consistent while the service is running, and verified.
 
-use super::whole_file::{WholeFile, folder_of};
+use super::atomic_file::{WholeFile, folder_of};
 use super::{Store, StoreError, StoreResult, free_name, read_only, verify};
 use sqlx::SqlitePool;
 use std::io::ErrorKind;

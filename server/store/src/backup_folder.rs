@@ -1,7 +1,7 @@
 //! The folder of scheduled backups. It belongs to one record, because the oldest backups in it are removed.
 
-use super::companion::companion;
-use super::whole_file::private;
+use super::atomic_file::private;
+use super::record_files::companion;
 use super::{Store, StoreError, StoreResult, backup, free_name};
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};

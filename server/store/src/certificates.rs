@@ -1,6 +1,6 @@
 //! Stored certificates of gaits.
 
-use super::{Connection, StoreResult, StudyId, TrialId, json, now};
+use super::{Connection, StoreResult, StudyId, TrialId, json_columns, now};
 use gait_optimizer::certificate::{self, Certificate};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
@@ -16,7 +16,7 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Cer
         .bind(certificate::FORMAT_VERSION)
         .fetch_optional(db)
         .await?
-        .map(|row| json::from_text("certificate", row.try_get("document")?))
+        .map(|row| json_columns::from_text("certificate", row.try_get("document")?))
         .transpose()
 }
 
@@ -45,7 +45,7 @@ pub async fn keep(db: &mut Connection, trial: TrialId, certificate: &Certificate
     .bind(trial)
     .bind(certificate.format_version)
     .bind(certificate.passed)
-    .bind(json::to_text("certificate", certificate)?)
+    .bind(json_columns::to_text("certificate", certificate)?)
     .bind(now())
     .execute(db)
     .await?;
@@ -99,7 +99,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<HashMa
 pub async fn of_trials(db: &mut Connection, trials: &[TrialId]) -> StoreResult<HashMap<TrialId, CertificateOnRecord>> {
     let sql =
         AssertSqlSafe(format!("{SELECT} where t.id in (select value from json_each(?2)) and t.state = 'converged'"));
-    let trials = json::to_text("trials", &trials)?;
+    let trials = json_columns::to_text("trials", &trials)?;
     let rows = sqlx::query(sql).bind(certificate::FORMAT_VERSION).bind(trials).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }

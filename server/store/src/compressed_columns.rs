@@ -1,6 +1,6 @@
 //! Compressed columns, which are decompressed on the thread pool and therefore never while a connection is held.
 
-use super::{StoreError, StoreResult, json};
+use super::{StoreError, StoreResult, json_columns};
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
 use std::marker::PhantomData;
@@ -25,8 +25,8 @@ impl PackedText {
     /// [`StoreError::Damaged`] if it cannot be decompressed or does not match its hash.
     pub fn text(&self, pool: &OnPool) -> StoreResult<String> {
         let what = self.what;
-        let bytes = json::decompress(pool, what, &self.bytes)?;
-        if self.sha256.as_ref().is_some_and(|sha256| json::sha256(&bytes) != *sha256) {
+        let bytes = json_columns::decompress(pool, what, &self.bytes)?;
+        if self.sha256.as_ref().is_some_and(|sha256| json_columns::sha256(&bytes) != *sha256) {
             return Err(StoreError::Damaged { what, reason: "it does not match its hash".to_owned() });
         }
         String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
@@ -58,6 +58,6 @@ impl<T: DeserializeOwned> Packed<T> {
     /// # Errors
     /// As [`PackedText::text`], and if the text is not the JSON of such a value.
     pub fn unpack(&self, pool: &OnPool) -> StoreResult<T> {
-        json::from_text(self.json.what, &self.json.text(pool)?)
+        json_columns::from_text(self.json.what, &self.json.text(pool)?)
     }
 }

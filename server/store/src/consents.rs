@@ -35,7 +35,7 @@ pub struct Consent {
     pub seq: i64,
     /// Consent or withdrawal.
     pub kind: ConsentKind,
-    /// For a consent, name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
+    /// For consent, the name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
     pub note: String,
     /// Who recorded it.
     pub actor: String,

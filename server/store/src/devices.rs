@@ -1,21 +1,21 @@
 //! Stored devices: models of powered prostheses.
 
-use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json, now, schema};
+use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json_columns, now, openapi_schemas};
 use gait_optimizer::Device as Definition;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// Device. A changed definition is a new device, so that studies keep theirs.
+/// Device. Changing a definition creates a new device, so that studies keep the one they use.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Device {
     /// Identifier.
     pub id: DeviceId,
-    /// Name shown to people.
+    /// Name shown to users.
     pub name: String,
     /// Definition of the device.
-    #[schema(value_type = schema::DeviceDefinition)]
+    #[schema(value_type = openapi_schemas::DeviceDefinition)]
     pub definition: Definition,
     /// Time of creation.
     pub created_at: Instant,
@@ -29,8 +29,8 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
     if let Some(found) = find(db, definition).await? {
         return Ok((found, false));
     }
-    let text = json::to_text("device", definition)?;
-    let hash = json::sha256(text.as_bytes());
+    let text = json_columns::to_text("device", definition)?;
+    let hash = json_columns::sha256(text.as_bytes());
     let added = Device {
         id: DeviceId::fresh(),
         name: definition.name.clone(),
@@ -71,7 +71,7 @@ pub async fn has_name(db: &mut Connection, name: &str) -> StoreResult<bool> {
 /// # Errors
 /// Errors of the database.
 pub async fn find(db: &mut Connection, definition: &Definition) -> StoreResult<Option<Device>> {
-    let hash = json::sha256(json::to_text("device", definition)?.as_bytes());
+    let hash = json_columns::sha256(json_columns::to_text("device", definition)?.as_bytes());
     let row = sqlx::query("select * from devices where sha256 = ?").bind(hash).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
 }
@@ -89,7 +89,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Device> {
     Ok(Device {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
-        definition: json::column(row, "definition")?,
+        definition: json_columns::column(row, "definition")?,
         created_at: row.try_get("created_at")?,
     })
 }

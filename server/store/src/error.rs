@@ -37,8 +37,8 @@ pub enum StoreError {
     },
     /// The file has hard links: another process may own it under another name.
     #[error(
-        "The database {} has hard links, which would mix up its write-ahead log. Remove the other links; to copy the database, \
-         use `gaitwright backup`.",
+        "The database {} has other hard links, which could lead to a mismatched write-ahead log. Remove the \
+         other links; to copy the database, use `gaitwright backup`.",
         path.display()
     )]
     SeveralNames {
@@ -86,7 +86,8 @@ pub enum StoreError {
     /// The newest rows are missing: the record was truncated, or is an older copy.
     #[error(
         "The record {} ends with row {found} of {table}, but its anchor {} lists row {seen}, so acknowledged changes are missing. \
-         Nothing was changed. Put the missing log or a newer copy in place. If this copy is the right one, remove the anchor.",
+         Nothing was changed. Put the missing log or a newer copy in place. If this copy \
+         is the right one, restore it (`gaitwright restore`); to verify it alone, give an empty second anchor (--anchor '').",
         record.display(), anchor.display()
     )]
     CutOff {
@@ -104,7 +105,8 @@ pub enum StoreError {
     /// A row differs from the one that the anchor lists.
     #[error(
         "Row {seq} of {table} in the record {} differs from the one that its anchor {} lists: its history was rewritten, or this \
-         is another record. Nothing was changed. If this record is the right one, remove the anchor.",
+         is another record. Nothing was changed. If this record is the right one, restore it (`gaitwright restore`); \
+         to verify it alone, give an empty second anchor (--anchor '').",
         record.display(), anchor.display()
     )]
     Rewritten {
@@ -183,7 +185,7 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// The disk of a copy is full.
-    #[error("The disk of {} is full, so the copy was not written. Free some space there or choose another folder.", path.display())]
+    #[error("There is no space left on the disk for {}, so the copy was not written. Free some space there or choose another folder.", path.display())]
     CopyFull {
         /// The copy.
         path: PathBuf,

@@ -1,6 +1,6 @@
 //! Events of studies, which event streams can replay from any point.
 
-use super::{Connection, Instant, StoreResult, StudyId, json, now};
+use super::{Connection, Instant, StoreResult, StudyId, json_columns, now};
 use serde::Serialize;
 use sqlx::Row;
 use utoipa::ToSchema;
@@ -35,7 +35,7 @@ pub async fn append<P: Serialize>(
     sqlx::query("insert into events (study_id, kind, payload, created_at) values (?, ?, ?, ?)")
         .bind(study)
         .bind(kind)
-        .bind(json::to_text("event", payload)?)
+        .bind(json_columns::to_text("event", payload)?)
         .bind(now())
         .execute(db)
         .await?;
@@ -59,7 +59,7 @@ pub async fn after(db: &mut Connection, study: StudyId, seq: i64, limit: u32) ->
                 seq: row.try_get("seq")?,
                 study_id: row.try_get("study_id")?,
                 kind: row.try_get("kind")?,
-                payload: json::column(row, "payload")?,
+                payload: json_columns::column(row, "payload")?,
                 created_at: row.try_get("created_at")?,
             })
         })

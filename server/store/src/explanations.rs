@@ -2,7 +2,7 @@
 
 use super::audit::Actor;
 use super::members::{binds, reached};
-use super::{Connection, Instant, StoreResult, StudyId, TrialId, json, now};
+use super::{Connection, Instant, StoreResult, StudyId, TrialId, json_columns, now};
 use crate::accessible_studies::Reach;
 use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
@@ -31,7 +31,7 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Exp
         Ok(Explained {
             program: row.try_get("program")?,
             problem_sha256: row.try_get("problem_sha256")?,
-            explanation: json::column(&row, "document")?,
+            explanation: json_columns::column(&row, "document")?,
             created_at: row.try_get("created_at")?,
         })
     })
@@ -49,9 +49,9 @@ pub async fn keep(db: &mut Connection, trial: TrialId, problem: &str, explanatio
     )
     .bind(trial)
     .bind(Actor::program().as_str())
-    .bind(json::sha256(problem.as_bytes()))
+    .bind(json_columns::sha256(problem.as_bytes()))
     .bind(explanation.relief().map(|relaxation| relaxation.bound.as_str()))
-    .bind(json::to_text("explanation", explanation)?)
+    .bind(json_columns::to_text("explanation", explanation)?)
     .bind(now())
     .execute(db)
     .await?;
@@ -113,7 +113,7 @@ pub async fn next_requested(db: &mut Connection, refused: &BTreeSet<TrialId>) ->
          and s.subject_id not in (select subject_id from withdrawn_subjects) \
          order by r.created_at, r.trial_id limit 1",
     )
-    .bind(json::to_text("trials", refused)?)
+    .bind(json_columns::to_text("trials", refused)?)
     .fetch_optional(db)
     .await?)
 }
@@ -138,7 +138,7 @@ pub async fn next_of_ended(
          order by t.number limit 1",
     )
     .bind(study)
-    .bind(json::to_text("trials", refused)?)
+    .bind(json_columns::to_text("trials", refused)?)
     .fetch_optional(db)
     .await?)
 }

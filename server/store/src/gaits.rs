@@ -1,6 +1,6 @@
 //! Stored gaits: trajectory, warm start and iterations of completed solves, compressed.
 
-use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, json, now};
+use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, json_columns, now};
 use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
@@ -25,8 +25,8 @@ impl PackedGait {
     /// # Errors
     /// If serialisation fails.
     pub fn new(pool: &OnPool, outcome: &SolveOutcome, iterations: &[IterationRecord]) -> StoreResult<Option<Self>> {
-        let gait = json::to_text("gait", &outcome.gait)?;
-        let warm_start = json::to_text("warm start", &outcome.warm_start)?;
+        let gait = json_columns::to_text("gait", &outcome.gait)?;
+        let warm_start = json_columns::to_text("warm start", &outcome.warm_start)?;
         // JSON writes such numbers as null, which cannot be read back.
         if serde_json::from_str::<Gait>(&gait).is_err() || serde_json::from_str::<WarmStart>(&warm_start).is_err() {
             return Ok(None);
@@ -37,10 +37,14 @@ impl PackedGait {
             speed_m_s: Some(outcome.gait.speed_m_s),
             stride_length_m: Some(outcome.gait.stride_length_m),
             stride_time_s: Some(outcome.gait.stride_time_s),
-            sha256: json::sha256(gait.as_bytes()),
-            gait: json::compress(pool, "gait", gait.as_bytes())?,
-            warm_start: json::compress(pool, "warm start", warm_start.as_bytes())?,
-            iterations: json::compress(pool, "iterations", json::to_text("iterations", &finite)?.as_bytes())?,
+            sha256: json_columns::sha256(gait.as_bytes()),
+            gait: json_columns::compress(pool, "gait", gait.as_bytes())?,
+            warm_start: json_columns::compress(pool, "warm start", warm_start.as_bytes())?,
+            iterations: json_columns::compress(
+                pool,
+                "iterations",
+                json_columns::to_text("iterations", &finite)?.as_bytes(),
+            )?,
         }))
     }
 }
@@ -156,7 +160,7 @@ pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: &[T
          and trial_id not in (select gait_one from lab_sessions union select gait_two from lab_sessions)",
     )
     .bind(study)
-    .bind(json::to_text("trials", &kept)?)
+    .bind(json_columns::to_text("trials", &kept)?)
     .execute(db)
     .await?;
     Ok(done.rows_affected())

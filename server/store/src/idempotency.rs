@@ -1,7 +1,7 @@
 //! Stored responses to requests with an Idempotency-Key, written in the transaction of their effect.
 
 use super::audit::Actor;
-use super::{Connection, Instant, StoreResult, json, now};
+use super::{Connection, Instant, StoreResult, json_columns, now};
 use sqlx::Row;
 
 /// A stored response.
@@ -21,7 +21,7 @@ pub struct Kept {
 pub fn fingerprint(method: &str, path: &str, body: &[u8]) -> String {
     let mut whole = format!("{method} {path}\n").into_bytes();
     whole.extend_from_slice(body);
-    json::sha256(&whole)
+    json_columns::sha256(&whole)
 }
 
 /// The stored response for a key of a caller.

@@ -180,16 +180,18 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<La
     all(db, &rows).await
 }
 
-/// Open sessions of accessible studies, newest first, without those of subjects who withdrew consent.
+/// Sessions of accessible studies that are open or were closed after `since`, newest first, without those of subjects
+/// who withdrew consent.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<LabSession>> {
+pub async fn open_since(db: &mut Connection, reach: Reach, limit: u32, since: Instant) -> StoreResult<Vec<LabSession>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(
         "select l.* from lab_sessions l join studies s on s.id = l.study_id \
          where s.subject_id not in (select subject_id from withdrawn_subjects) \
-         and not exists (select 1 from lab_acts a where a.session_id = l.id and a.act = 'closed') and ",
+         and not exists (select 1 from lab_acts a where a.session_id = l.id and a.act = 'closed' \
+         and a.created_at < ?5) and ",
         reached!("s.id"),
         " order by l.id desc limit ?4"
     ))
@@ -197,6 +199,7 @@ pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<
     .bind(open)
     .bind(principal)
     .bind(limit)
+    .bind(since)
     .fetch_all(&mut *db)
     .await?;
     all(db, &rows).await

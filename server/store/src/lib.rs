@@ -7,6 +7,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod access_clock;
 pub mod access_log;
 pub mod access_spool;
 pub mod accessible_studies;
@@ -14,15 +15,15 @@ pub mod allocations;
 pub mod anchor;
 pub mod archive;
 pub mod archived_allocations;
+pub mod archived_row;
 pub mod assessments;
+pub mod atomic_file;
 pub mod audit;
 pub mod authors;
 pub mod backup;
 pub mod backup_folder;
 mod borrowed_connection;
 pub mod certificates;
-pub mod clock;
-mod companion;
 mod compressed_columns;
 mod connection;
 pub mod consents;
@@ -31,77 +32,76 @@ mod error;
 pub mod events;
 pub mod explanations;
 pub mod feedback;
-mod file_kind;
-mod files;
+mod free_disk_space;
 pub mod gaits;
 mod id;
 pub mod idempotency;
 pub mod imports;
 pub mod jobs;
-mod json;
+mod json_columns;
 pub mod lab_answers;
 pub mod lab_sessions;
-pub mod listing;
+mod lost_files;
 mod many_rows;
 pub mod measurement_files;
 pub mod members;
 mod migrations;
+pub mod openapi_schemas;
 mod ownership;
 pub mod presentations;
 pub mod quarantine;
 pub mod read_only;
+mod record_files;
 pub mod reference_gaits;
 pub mod restore;
 mod restore_marker;
 pub mod results;
 pub mod rights;
-pub mod row;
 pub mod safety_reports;
 pub mod safety_reviews;
-pub mod schema;
 mod schema_versions;
 pub mod seals;
 pub mod sessions;
 pub mod sign_in_failures;
-mod space;
+mod sqlite_file;
 pub mod studies;
 pub mod subjects;
 mod time;
 pub mod tokens;
 pub mod totals;
 pub mod trials;
+pub mod trials_table;
 pub mod users;
 pub mod verify;
 mod wal_check;
-pub mod whole_file;
-mod writing;
+mod writer;
 
 pub use borrowed_connection::{Lent, LentWriter, Reader};
 pub use compressed_columns::{Packed, PackedText};
 pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
+pub use free_disk_space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use id::{
     AssessmentId, BackupId, DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabSessionId, MeasurementFileId,
     MemberId, PresentationId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId,
     TrialId, UserId,
 };
 pub use schema_versions::SCHEMA_VERSION;
-pub use space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use time::{Instant, now, set_machine_clock};
-pub use writing::Writer;
+pub use writer::Writer;
 
 use anchor::Anchors;
-use companion::companion;
-use files::Files;
 use gaitwright_compute::{ComputeError, OnPool, Pool};
+use lost_files::Files;
 use ownership::Ownership;
+use record_files::companion;
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::Mutex;
-use writing::{Outside, Writing};
+use writer::{Outside, Writing};
 
 /// Least time between two probes.
 const PROBED_AGAIN: Duration = Duration::from_secs(1);
@@ -167,7 +167,7 @@ impl Store {
     /// added, changed or deleted a row or changed the schema; errors of the database.
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {
         anchor::refuse_wrong(elsewhere, path, None)?;
-        file_kind::check(path)?;
+        sqlite_file::check(path)?;
         let anchors: Vec<PathBuf> =
             [Some(anchor::path_of(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
         let mut owner = Ownership::take(path)?;
@@ -178,13 +178,13 @@ impl Store {
             owner.make_database(path)
         };
         if let Err(error) = checked.await {
-            let error = file_kind::named(path, error);
+            let error = sqlite_file::named(path, error);
             if error.is_wrong_file() {
                 owner.withdraw();
             }
             return Err(error);
         }
-        let opened = Self::open_owned(path, anchors).await.map_err(|error| file_kind::named(path, error));
+        let opened = Self::open_owned(path, anchors).await.map_err(|error| sqlite_file::named(path, error));
         match &opened {
             Ok(store) => *store.owner.lock().await = Some(owner),
             Err(error) if error.is_wrong_file() => owner.withdraw(),
@@ -212,7 +212,7 @@ impl Store {
             only.close().await;
             return Err(refused);
         }
-        let version = writing::data_version(&mut *only.acquire().await?).await?;
+        let version = writer::data_version(&mut *only.acquire().await?).await?;
         migrations::apply(&only, path).await?;
         if let Some(newest) = audit::newest(&mut *only.acquire().await?).await? {
             time::never_before(newest);
@@ -223,7 +223,7 @@ impl Store {
         sqlx::query("pragma wal_autocheckpoint = 0").execute(&mut connection).await?;
         let files = Arc::new(Files::of(path)?);
         let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
-        let writing = Arc::new(Writing::new(connection, Some(version), space::Space::of(path), outside));
+        let writing = Arc::new(Writing::new(connection, Some(version), free_disk_space::Space::of(path), outside));
         let readers = SqlitePoolOptions::new()
             .max_connections(4)
             .idle_timeout(None)
@@ -318,7 +318,9 @@ impl Store {
             return found.clone();
         }
         let found = match tokio::time::timeout(SLOWEST_PROBE, self.write_nothing()).await {
-            Ok(Ok(())) if !self.writing.space().takes_a_change() => Err("the disk of the record is full".to_owned()),
+            Ok(Ok(())) if !self.writing.space().takes_a_change() => {
+                Err("the disk that holds the record is full".to_owned())
+            }
             Ok(written) => written.map_err(|error| error.to_string()),
             Err(_) => Err(format!("a test write took longer than {} s", SLOWEST_PROBE.as_secs())),
         };
@@ -359,7 +361,7 @@ pub async fn commit(mut writer: LentWriter<'_>) -> StoreResult<()> {
 
 /// SHA-256, hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
-    json::sha256(bytes)
+    json_columns::sha256(bytes)
 }
 
 /// Refuses a file of another program or a newer version, before a writing connection opens it.

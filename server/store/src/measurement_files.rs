@@ -2,7 +2,8 @@
 
 use super::audit::Actor;
 use super::{
-    Connection, EmgResultId, Instant, LabSessionId, MeasurementFileId, PackedText, StoreError, StoreResult, json, now,
+    Connection, EmgResultId, Instant, LabSessionId, MeasurementFileId, PackedText, StoreError, StoreResult,
+    json_columns, now,
 };
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
@@ -78,9 +79,9 @@ impl PackedFile {
     pub fn new<T: Serialize>(pool: &OnPool, kind: MeasurementKind, reading: &T, file: &str) -> StoreResult<Self> {
         Ok(Self {
             kind,
-            reading: json::to_text("reading instructions of a measurement file", reading)?,
-            raw: json::compress(pool, "recording", file.as_bytes())?,
-            raw_sha256: json::sha256(file.as_bytes()),
+            reading: json_columns::to_text("reading instructions of a measurement file", reading)?,
+            raw: json_columns::compress(pool, "recording", file.as_bytes())?,
+            raw_sha256: json_columns::sha256(file.as_bytes()),
         })
     }
 
@@ -165,7 +166,7 @@ pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: MeasurementFileI
         .await?
         .ok_or_else(|| missing(id))?;
     let file = PackedText::new("recording", row.try_get("raw")?, Some(row.try_get("raw_sha256")?));
-    Ok((json::column(&row, "reading")?, file))
+    Ok((json_columns::column(&row, "reading")?, file))
 }
 
 /// Adds a result of EMG processing.
@@ -182,7 +183,7 @@ pub async fn insert_result<T: Serialize>(
     sqlx::query("insert into emg_results (id, session_id, document, actor, created_at) values (?, ?, ?, ?, ?)")
         .bind(id)
         .bind(session)
-        .bind(json::to_text("EMG result", document)?)
+        .bind(json_columns::to_text("EMG result", document)?)
         .bind(actor.as_str())
         .bind(now())
         .execute(db)
@@ -199,7 +200,7 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
         .bind(session)
         .fetch_optional(db)
         .await?;
-    row.as_ref().map(|row| json::column(row, "document")).transpose()
+    row.as_ref().map(|row| json_columns::column(row, "document")).transpose()
 }
 
 /// Every result of EMG processing of a session, oldest first.
@@ -208,7 +209,7 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
 /// Errors of the database.
 pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<T>> {
     let rows = sqlx::query("select document from emg_results where session_id = ? order by id").bind(session);
-    rows.fetch_all(db).await?.iter().map(|row| json::column(row, "document")).collect()
+    rows.fetch_all(db).await?.iter().map(|row| json_columns::column(row, "document")).collect()
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<MeasurementFile> {

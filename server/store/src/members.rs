@@ -57,7 +57,7 @@ pub struct Member {
     pub role: Option<Role>,
     /// Who added the member.
     pub added_by: String,
-    /// Time of addition.
+    /// Time at which the member was added.
     pub created_at: Instant,
 }
 

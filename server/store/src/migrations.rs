@@ -1,6 +1,6 @@
 //! Migrates a record at start, in one transaction, after a backup.
 
-use super::companion::companion;
+use super::record_files::companion;
 use super::schema_versions::{SCHEMA_VERSION, check_version, up_to};
 use super::{StoreError, StoreResult, backup, seals, verify};
 use sqlx::SqlitePool;

@@ -1,10 +1,10 @@
 //! Exclusive ownership of the record by one process, through a lock file and a lock on the database file. The lock file
 //! stays while the database file is created or replaced; the second lock holds even if the lock file is deleted.
 
-use super::companion::companion;
+use super::atomic_file::private;
 use super::error::{StoreError, StoreResult};
-use super::files::FileId;
-use super::whole_file::private;
+use super::lost_files::FileId;
+use super::record_files::companion;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 

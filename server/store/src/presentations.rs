@@ -175,7 +175,7 @@ pub struct Presentation {
     pub repeats: Option<PresentationId>,
     /// Whether the rater could have known the allocation.
     pub unblinded: bool,
-    /// Time of the draw.
+    /// Time at which the pair was drawn.
     pub created_at: Instant,
     /// The answer about the pair, where `First` is `one`; `None` if there is none yet.
     pub answer: Option<Judgement>,

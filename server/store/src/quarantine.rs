@@ -2,7 +2,7 @@
 //! and foreign keys of the real schema, and contains no other study.
 
 use super::archive::Unpacking;
-use super::row::{Cell, Row};
+use super::archived_row::{Cell, Row};
 use super::{Connection, StoreResult, schema_versions};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, SqliteConnection};

@@ -1,7 +1,7 @@
 //! Opens and checks a record without changing it.
 
-use super::companion::companion;
-use super::{StoreError, StoreResult, file_kind, quarantine, restore_marker, schema_versions};
+use super::record_files::companion;
+use super::{StoreError, StoreResult, quarantine, restore_marker, schema_versions, sqlite_file};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub async fn check(file: &Path) -> StoreResult<()> {
 /// [`StoreError::Open`], [`StoreError::NotADatabase`], [`StoreError::NewerSchema`].
 pub async fn open(file: &Path) -> StoreResult<SqlitePool> {
     restore_marker::refuse_interrupted(file)?;
-    file_kind::check(file)?;
+    sqlite_file::check(file)?;
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
     // Small, because a row may contain a whole measurement file.
     let options = options.row_buffer_size(quarantine::ROWS_AHEAD);
@@ -52,13 +52,13 @@ pub async fn open(file: &Path) -> StoreResult<SqlitePool> {
 /// A pool of one connection that stays open.
 async fn connect(options: SqliteConnectOptions, file: &Path) -> StoreResult<SqlitePool> {
     let one = SqlitePoolOptions::new().max_connections(1).idle_timeout(None).max_lifetime(None);
-    let pool = one.connect_with(options).await.map_err(|error| file_kind::named(file, error.into()))?;
-    let refusal = match schema_versions::check_version(&pool, file).await.map_err(|error| file_kind::named(file, error))
-    {
-        Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it contains no record yet".to_owned() },
-        Ok(_) => return Ok(pool),
-        Err(error) => error,
-    };
+    let pool = one.connect_with(options).await.map_err(|error| sqlite_file::named(file, error.into()))?;
+    let refusal =
+        match schema_versions::check_version(&pool, file).await.map_err(|error| sqlite_file::named(file, error)) {
+            Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it contains no record yet".to_owned() },
+            Ok(_) => return Ok(pool),
+            Err(error) => error,
+        };
     pool.close().await;
     Err(refusal)
 }

@@ -1,21 +1,21 @@
 //! Stored reference gaits, which Gait RMSE is measured against.
 
-use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json, now, schema};
+use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json_columns, now, openapi_schemas};
 use gait_optimizer::ReferenceGait as Definition;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// Reference gait. A changed definition is a new reference gait, so that studies keep theirs.
+/// Reference gait. Changing a definition creates a new reference gait, so that studies keep the one they use.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ReferenceGait {
     /// Identifier.
     pub id: ReferenceGaitId,
-    /// Name shown to people.
+    /// Name shown to users.
     pub name: String,
     /// Definition of the reference gait.
-    #[schema(value_type = schema::ReferenceGaitDocument)]
+    #[schema(value_type = openapi_schemas::ReferenceGaitDocument)]
     pub definition: Definition,
     /// Time of creation.
     pub created_at: Instant,
@@ -26,8 +26,8 @@ pub struct ReferenceGait {
 /// # Errors
 /// Errors of the database.
 pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(ReferenceGait, bool)> {
-    let text = json::to_text("reference gait", definition)?;
-    let hash = json::sha256(text.as_bytes());
+    let text = json_columns::to_text("reference gait", definition)?;
+    let hash = json_columns::sha256(text.as_bytes());
     let found =
         sqlx::query("select * from reference_gaits where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
     if let Some(row) = found {
@@ -75,7 +75,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<ReferenceGait> {
     Ok(ReferenceGait {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
-        definition: json::column(row, "definition")?,
+        definition: json_columns::column(row, "definition")?,
         created_at: row.try_get("created_at")?,
     })
 }

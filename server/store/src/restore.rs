@@ -4,10 +4,10 @@
 //! marker beside the record notes this. If the process is killed, the next owner of the record finishes the restore if the
 //! backup has the name already, and otherwise leaves the old record with its log as it is.
 
-use super::companion::companion;
+use super::atomic_file::{WholeFile, sync_folder};
 use super::ownership::Ownership;
+use super::record_files::companion;
 use super::restore_marker::{self, Marker, mark, unmark};
-use super::whole_file::{WholeFile, sync_folder};
 use super::{StoreError, StoreResult, anchor, backup, free_name, read_only};
 use sha2::{Digest, Sha256};
 use std::fs::File;
@@ -102,7 +102,7 @@ pub(super) fn finish_interrupted(record: &Path) -> StoreResult<()> {
     };
     if is_renamed {
         finish(record, &marker, &|_| {})?;
-        tracing::warn!(record = %record.display(), "an interrupted restore was finished: the record is the backup");
+        tracing::warn!(record = %record.display(), "an interrupted restore was finished: the record now has the contents of the backup");
     } else {
         unmark(record)?;
         tracing::warn!(record = %record.display(), "an interrupted restore was undone: the record is as it was before");

@@ -1,9 +1,9 @@
 //! The marker beside a record that a restore has begun to replace.
 
 use super::anchor::Ends;
-use super::companion::companion;
-use super::whole_file::{WholeFile, sync_folder};
-use super::{StoreError, StoreResult, json};
+use super::atomic_file::{WholeFile, sync_folder};
+use super::record_files::companion;
+use super::{StoreError, StoreResult, json_columns};
 use serde::{Deserialize, Serialize};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ fn marker_of(record: &Path) -> PathBuf {
 
 /// Writes the marker durably.
 pub(super) fn mark(record: &Path, marker: &Marker) -> StoreResult<()> {
-    let (path, text) = (marker_of(record), json::to_text("restore", marker)?);
+    let (path, text) = (marker_of(record), json_columns::to_text("restore", marker)?);
     let family = record.file_name().unwrap_or_default().to_string_lossy();
     let written = WholeFile::begin(&path, &family).and_then(|mut whole| {
         whole.file().write_all(text.as_bytes())?;
@@ -47,7 +47,7 @@ pub(super) fn refuse_interrupted(record: &Path) -> StoreResult<()> {
 pub(super) fn read(record: &Path) -> StoreResult<Option<Marker>> {
     let path = marker_of(record);
     match std::fs::read_to_string(&path) {
-        Ok(text) => json::from_text("restore", &text).map(Some),
+        Ok(text) => json_columns::from_text("restore", &text).map(Some),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         Err(source) => Err(StoreError::Open { path, source }),
     }

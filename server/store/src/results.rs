@@ -1,6 +1,6 @@
 //! Stored results of attempts, including results that arrived too late.
 
-use super::{Connection, Instant, StoreResult, TrialId, json, now, schema};
+use super::{Connection, Instant, StoreResult, TrialId, json_columns, now, openapi_schemas};
 use gait_optimizer::{SolveReport, SolveStatus};
 use serde::Serialize;
 use sqlx::Row;
@@ -16,10 +16,10 @@ pub struct AttemptResult {
     /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
     pub taken: bool,
     /// How the solve ended.
-    #[schema(value_type = schema::SolveStatus)]
+    #[schema(value_type = openapi_schemas::SolveStatus)]
     pub status: SolveStatus,
-    /// All figures of the solve, where they are finite.
-    #[schema(value_type = Option<schema::SolveReport>)]
+    /// All figures of the solve that are finite.
+    #[schema(value_type = Option<openapi_schemas::SolveReport>)]
     pub report: Option<SolveReport>,
     /// Time of arrival.
     pub received_at: Instant,
@@ -44,8 +44,8 @@ pub async fn keep(
     .bind(attempt)
     .bind(worker)
     .bind(taken)
-    .bind(json::to_text("status", &report.status)?)
-    .bind(json::readable("report", report)?)
+    .bind(json_columns::to_text("status", &report.status)?)
+    .bind(json_columns::readable("report", report)?)
     .bind(now())
     .execute(db)
     .await?;
@@ -65,8 +65,8 @@ pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<At
                 attempt: row.try_get("attempt")?,
                 worker: row.try_get("worker")?,
                 taken: row.try_get("taken")?,
-                status: json::column(row, "status")?,
-                report: json::optional_column(row, "report")?,
+                status: json_columns::column(row, "status")?,
+                report: json_columns::optional_column(row, "report")?,
                 received_at: row.try_get("received_at")?,
             })
         })

@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 pub enum SafetyDecision {
     /// The gait may be walked again.
     Walkable,
-    /// The gait stays unsafe.
+    /// The gait remains marked as unsafe.
     Unsafe,
 }
 

@@ -20,6 +20,7 @@ const FILES: &[(i64, &str, &str)] = &[
     (10, "suggestions by action", include_str!("../migrations/0010_suggestions_by_action.sql")),
     (11, "reviewed safety reports", include_str!("../migrations/0011_reviewed_safety_reports.sql")),
     (12, "names", include_str!("../migrations/0012_names.sql")),
+    (13, "repeat results", include_str!("../migrations/0013_repeat_results.sql")),
 ];
 
 /// Newest schema version.

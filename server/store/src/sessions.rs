@@ -29,7 +29,7 @@ pub struct Session {
 
 /// The origin of a sign-in.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct From {
+pub struct SignInOrigin {
     /// Address of the client.
     pub address: Option<String>,
     /// User agent of the browser.
@@ -49,7 +49,7 @@ pub async fn begin(
     hash: &str,
     user: UserId,
     by_link: bool,
-    from: &From,
+    from: &SignInOrigin,
     at: Instant,
 ) -> StoreResult<()> {
     sqlx::query(

@@ -2,7 +2,8 @@
 
 use super::members::{binds, reached};
 use super::{
-    Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json, now, schema,
+    Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json_columns, now,
+    openapi_schemas,
 };
 use crate::accessible_studies::Reach;
 use gait_learner::{LearnerSettings, SearchSpace};
@@ -127,13 +128,13 @@ impl FromStr for Evaluation {
 /// Set-up of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct StudyPlan {
-    /// Name shown to people.
+    /// Name shown to users.
     pub name: String,
     /// Subject of the study.
     pub subject_id: SubjectId,
     /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
     /// entered first.
-    #[schema(value_type = Option<schema::Body>)]
+    #[schema(value_type = Option<openapi_schemas::Body>)]
     pub body: Option<Body>,
     /// Device.
     pub device_id: DeviceId,
@@ -142,19 +143,19 @@ pub struct StudyPlan {
     /// Whether to solve with muscles (C1-C12) or without (C1-C4).
     pub muscles: bool,
     /// Settings of the gait problem.
-    #[schema(value_type = schema::GaitSettings)]
+    #[schema(value_type = openapi_schemas::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.
-    #[schema(value_type = schema::SolveOptions)]
+    #[schema(value_type = openapi_schemas::SolveOptions)]
     pub solve_options: SolveOptions,
     /// Values of bounds that are not tuned.
-    #[schema(value_type = schema::Bounds)]
+    #[schema(value_type = openapi_schemas::Bounds)]
     pub base_bounds: TunedBounds,
-    /// Tuned bounds and their values, with dimensions named as the bounds.
-    #[schema(value_type = schema::SearchSpace)]
+    /// Tuned bounds and their values, with each dimension named after its bound.
+    #[schema(value_type = openapi_schemas::SearchSpace)]
     pub search_space: SearchSpace,
     /// Settings of the learner.
-    #[schema(value_type = schema::LearnerSettings)]
+    #[schema(value_type = openapi_schemas::LearnerSettings)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
     pub feedback_mode: FeedbackMode,
@@ -166,15 +167,23 @@ pub struct StudyPlan {
     pub solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.
     pub unchanged_limit: Option<u32>,
+    /// Whether a trial may have an action whose gait is known from another trial, as in the paper. In studies from
+    /// earlier versions, it may.
+    pub repeat_results: bool,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     pub parallel_trials: u32,
     /// Priority, -10 to 10. Higher values run first.
     pub priority: i32,
-    /// Seed of every random draw except allocations.
+    /// Seed for all random draws except allocations.
     pub seed: u64,
 }
 
 impl StudyPlan {
+    /// Whether no trial may have an action whose gait is known. Scripts measure, so equal actions can give other results.
+    pub fn tries_new_gaits_only(&self) -> bool {
+        self.evaluation == Evaluation::Optimizer && !self.repeat_results
+    }
+
     /// Whether a study with the other plan would try the same trials: same subject, problem, learner and seed. Name,
     /// priority and parallel trials do not matter.
     pub fn tries_the_same_as(&self, other: &Self) -> bool {
@@ -214,7 +223,7 @@ pub struct Study {
 /// Reads stored settings. Older settings without a weight on the curvature of activations mean 0, while new studies
 /// without it get the default.
 fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
-    let mut document: Value = json::from_text("gait_settings", text)?;
+    let mut document: Value = json_columns::from_text("gait_settings", text)?;
     if let Some(weights) = document.get_mut("regularisation").and_then(Value::as_object_mut) {
         weights.entry("activation_bend").or_insert_with(|| 0.0.into());
     }
@@ -237,7 +246,7 @@ pub async fn insert(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
          solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
          seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at, \
-         height_m, body_mass_kg) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         height_m, body_mass_kg, repeat_results) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(&plan.name)
@@ -245,11 +254,11 @@ pub async fn insert(
     .bind(plan.device_id)
     .bind(plan.reference_gait_id)
     .bind(plan.muscles)
-    .bind(json::to_text("gait settings", &plan.gait_settings)?)
-    .bind(json::to_text("solve options", &plan.solve_options)?)
-    .bind(json::to_text("base bounds", &plan.base_bounds)?)
-    .bind(json::to_text("search space", &plan.search_space)?)
-    .bind(json::to_text("learner settings", &plan.learner)?)
+    .bind(json_columns::to_text("gait settings", &plan.gait_settings)?)
+    .bind(json_columns::to_text("solve options", &plan.solve_options)?)
+    .bind(json_columns::to_text("base bounds", &plan.base_bounds)?)
+    .bind(json_columns::to_text("search space", &plan.search_space)?)
+    .bind(json_columns::to_text("learner settings", &plan.learner)?)
     .bind(plan.feedback_mode.as_str())
     .bind(plan.trial_budget)
     .bind(plan.parallel_trials)
@@ -264,6 +273,7 @@ pub async fn insert(
     .bind(at)
     .bind(plan.body.map(|body| body.height_m))
     .bind(plan.body.map(|body| body.body_mass_kg))
+    .bind(plan.repeat_results)
     .execute(db)
     .await?;
     Ok(Study {
@@ -456,8 +466,8 @@ pub async fn ended_before(db: &mut Connection, at: Instant) -> StoreResult<Vec<S
 
 /// The changeable fields of a study.
 #[derive(Debug, Clone)]
-pub struct Limits {
-    /// Name shown to people.
+pub struct StudyLimits {
+    /// Name shown to users.
     pub name: String,
     /// Priority. Higher values run first.
     pub priority: i32,
@@ -471,7 +481,7 @@ pub struct Limits {
 ///
 /// # Errors
 /// A violated constraint; errors of the database.
-pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &Limits) -> StoreResult<()> {
+pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &StudyLimits) -> StoreResult<()> {
     sqlx::query(
         "update studies set name = ?, priority = ?, parallel_trials = ?, trial_budget = ?, revision = revision + 1, \
          updated_at = ? where id = ?",
@@ -522,15 +532,16 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             reference_gait_id: row.try_get("reference_gait_id")?,
             muscles: row.try_get("muscles")?,
             gait_settings: Box::new(recorded_settings(row.try_get("gait_settings")?)?),
-            solve_options: json::column(row, "solve_options")?,
-            base_bounds: json::column(row, "base_bounds")?,
-            search_space: json::column(row, "search_space")?,
-            learner: json::column(row, "learner")?,
+            solve_options: json_columns::column(row, "solve_options")?,
+            base_bounds: json_columns::column(row, "base_bounds")?,
+            search_space: json_columns::column(row, "search_space")?,
+            learner: json_columns::column(row, "learner")?,
             feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
             evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
             trial_budget: row.try_get("trial_budget")?,
             solve_seconds_budget: row.try_get("solve_seconds_budget")?,
             unchanged_limit: row.try_get("unchanged_limit")?,
+            repeat_results: row.try_get::<Option<bool>, _>("repeat_results")?.unwrap_or(true),
             parallel_trials: row.try_get("parallel_trials")?,
             priority: row.try_get("priority")?,
             seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),

@@ -1,7 +1,7 @@
 //! Stored subjects, under pseudonyms only, with corrections and muscle measurements.
 
 use super::audit::Actor;
-use super::{Connection, Instant, StoreError, StoreResult, SubjectId, json, now};
+use super::{Connection, Instant, StoreError, StoreResult, SubjectId, json_columns, now};
 use gait_optimizer::Subject as Body;
 use gait_optimizer::muscle::MuscleParameters;
 use serde::Serialize;
@@ -206,7 +206,7 @@ pub async fn muscles(db: &mut Connection, id: SubjectId) -> StoreResult<MusclePa
         .bind(id)
         .fetch_optional(db)
         .await?;
-    Ok(row.as_ref().map(|row| json::column(row, "definition")).transpose()?.unwrap_or_default())
+    Ok(row.as_ref().map(|row| json_columns::column(row, "definition")).transpose()?.unwrap_or_default())
 }
 
 /// Records measured muscle values.
@@ -221,7 +221,7 @@ pub async fn set_muscles(
 ) -> StoreResult<()> {
     sqlx::query("insert into subject_muscles (subject_id, definition, actor, created_at) values (?, ?, ?, ?)")
         .bind(id)
-        .bind(json::to_text("muscle parameters", muscles)?)
+        .bind(json_columns::to_text("muscle parameters", muscles)?)
         .bind(actor.as_str())
         .bind(now())
         .execute(db)

@@ -1,7 +1,7 @@
 //! Stored tokens of programs. Only hashes of their secrets are stored.
 
 use super::audit::Actor;
-use super::{Connection, Instant, StoreError, StoreResult, TokenId, UserId, json, now};
+use super::{Connection, Instant, StoreError, StoreResult, TokenId, UserId, json_columns, now};
 use crate::rights::Right;
 use serde::Serialize;
 use sqlx::Row;
@@ -65,7 +65,7 @@ pub async fn insert(
     .bind(token.id)
     .bind(name)
     .bind(hash)
-    .bind(json::to_text("scopes", &scopes)?)
+    .bind(json_columns::to_text("scopes", &scopes)?)
     .bind(created_by.as_str())
     .bind(created_by.user_id())
     .bind(token.created_at)
@@ -136,7 +136,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Token> {
     Ok(Token {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
-        scopes: json::column(row, "scopes")?,
+        scopes: json_columns::column(row, "scopes")?,
         created_by: row.try_get("created_by")?,
         created_at: row.try_get("created_at")?,
         expires_at: row.try_get("expires_at")?,

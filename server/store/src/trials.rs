@@ -1,7 +1,7 @@
 //! Stored trials: actions of a study and their results.
 
 use super::many_rows::read_many;
-use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json, now, schema};
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now, openapi_schemas};
 use gait_learner::ActionIndex;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
 use serde::{Deserialize, Serialize};
@@ -82,7 +82,7 @@ pub struct Trial {
     #[schema(value_type = u64)]
     pub action_index: ActionIndex,
     /// Action as bounds.
-    #[schema(value_type = schema::Bounds)]
+    #[schema(value_type = openapi_schemas::Bounds)]
     pub action: TunedBounds,
     /// Reason for the trial.
     pub reason: String,
@@ -95,7 +95,7 @@ pub struct Trial {
     /// State.
     pub state: TrialState,
     /// How the solve ended.
-    #[schema(value_type = Option<schema::SolveStatus>)]
+    #[schema(value_type = Option<openapi_schemas::SolveStatus>)]
     pub status: Option<SolveStatus>,
     /// Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
     /// iterate.
@@ -111,18 +111,18 @@ pub struct Trial {
     /// Wall time of the solve, s.
     pub seconds_total: Option<f64>,
     /// All figures of the solve.
-    #[schema(value_type = Option<schema::SolveReport>)]
+    #[schema(value_type = Option<openapi_schemas::SolveReport>)]
     pub report: Option<SolveReport>,
     /// Most violated rows, worst first.
-    #[schema(value_type = Vec<schema::Violation>)]
+    #[schema(value_type = Vec<openapi_schemas::Violation>)]
     pub violations: Vec<Violation>,
-    /// Message for people about the end of the trial; may be empty.
+    /// Human-readable message about how the trial ended; may be empty.
     pub message: String,
     /// Time of proposal.
     pub created_at: Instant,
     /// Time at which a worker first started it.
     pub started_at: Option<Instant>,
-    /// Time of its end.
+    /// Time at which it ended.
     pub finished_at: Option<Instant>,
 }
 
@@ -183,7 +183,7 @@ pub async fn insert(db: &mut Connection, study: StudyId, new: &NewTrial) -> Stor
     .bind(study)
     .bind(new.number)
     .bind(i64::try_from(new.action_index.0).unwrap_or(i64::MAX))
-    .bind(json::to_text("action", &new.action)?)
+    .bind(json_columns::to_text("action", &new.action)?)
     .bind(&new.reason)
     .bind(new.best_before)
     .bind(new.warm_started_from)
@@ -300,8 +300,8 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     let figures = end.report.as_ref();
     // A figure that is not finite is stored as null.
     let finite = |f: fn(&SolveReport) -> f64| figures.map(f).filter(|x| x.is_finite());
-    let status = figures.map(|r| json::to_text("status", &r.status)).transpose()?;
-    let report = figures.map(|r| json::readable("report", r)).transpose()?.flatten();
+    let status = figures.map(|r| json_columns::to_text("status", &r.status)).transpose()?;
+    let report = figures.map(|r| json_columns::readable("report", r)).transpose()?.flatten();
     let violations: Vec<&Violation> = end.violations.iter().filter(|v| v.amount.is_finite()).collect();
     sqlx::query(
         "update trials set state = ?, status = ?, gait_rmse_rad = ?, cost_of_transport = ?, objective = ?, \
@@ -317,7 +317,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     .bind(figures.map(|r| i64::try_from(r.iterations).unwrap_or(i64::MAX)))
     .bind(finite(|r| r.seconds_total))
     .bind(report)
-    .bind(json::to_text("violations", &violations)?)
+    .bind(json_columns::to_text("violations", &violations)?)
     .bind(&end.message)
     .bind(now())
     .bind(id)
@@ -476,21 +476,21 @@ fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
         study_id: row.try_get("study_id")?,
         number: row.try_get("number")?,
         action_index: ActionIndex(u64::try_from(row.try_get::<i64, _>("action_index")?).unwrap_or(0)),
-        action: json::column(row, "action")?,
+        action: json_columns::column(row, "action")?,
         reason: row.try_get("reason")?,
         best_before: row.try_get("best_before")?,
         warm_started_from: row.try_get("warm_started_from")?,
         asked_by: row.try_get("asked_by")?,
         state,
-        status: json::optional_column(row, "status")?,
+        status: json_columns::optional_column(row, "status")?,
         gait_rmse_rad: of_a_gait(row, state, "gait_rmse_rad")?,
         cost_of_transport: of_a_gait(row, state, "cost_of_transport")?,
         objective: row.try_get("objective")?,
         max_violation: row.try_get("max_violation")?,
         iterations: row.try_get("iterations")?,
         seconds_total: row.try_get("seconds_total")?,
-        report: json::optional_column(row, "report")?,
-        violations: json::optional_column(row, "violations")?.unwrap_or_default(),
+        report: json_columns::optional_column(row, "report")?,
+        violations: json_columns::optional_column(row, "violations")?.unwrap_or_default(),
         message: row.try_get("message")?,
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,

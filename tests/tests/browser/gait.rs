@@ -31,11 +31,11 @@ async fn browser_animation_plays_pauses_and_is_scrubbed() {
     let paused = page.value(phase).await;
     tokio::time::sleep(Duration::from_millis(200)).await;
     assert_eq!(page.value(phase).await, paused, "it stands still");
-    let pixels = "document.querySelector('.walker canvas').toDataURL().length";
-    let before = page.value(pixels).await;
+    let pose = "document.querySelector('[data-body] [data-segment=\"left.thigh\"]').getAttribute('transform')";
+    let before = page.value(pose).await;
     page.run("const s = document.querySelector('[data-scrub]'); s.value = 50; s.dispatchEvent(new Event('input'))")
         .await;
-    assert_ne!(page.value(pixels).await, before, "another picture");
+    assert_ne!(page.value(pose).await, before, "another pose");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }
@@ -45,9 +45,16 @@ async fn browser_gait_is_shown_completely_with_coloured_muscles() {
     let Some(browser) = Chromium::launch().await else { return };
     let (site, trial) = with_a_gait().await;
     let page = browser.open_without_scripts(&site.at(&format!("/trials/{trial}"))).await;
-    // Angles, forces, torques, muscles, portraits; the stride as pictures.
-    for (group, charts) in [("angles", 6), ("forces", 2), ("torques", 6), ("muscles", 6), ("portraits", 7)] {
+    // Each leg over its own cycle; the stride as pictures.
+    for (group, charts) in
+        [("angles", 4), ("forces", 2), ("torques", 3), ("powers", 3), ("muscles", 7), ("fibres", 7), ("portraits", 4)]
+    {
         assert_eq!(page.count(&format!("#{group} svg.chart")).await, charts, "{group}");
+    }
+    assert_eq!(page.count("#powers tbody tr").await, 6);
+    // The walker is complete without scripts.
+    for (what, count) in [(".device", 3), (".muscle", 10), (".trunk", 1), (".left", 3)] {
+        assert_eq!(page.count(&format!(".walker [data-body] {what}")).await, count, "{what}");
     }
     assert_eq!(page.count("svg.tiles").await, 1);
     assert_eq!(page.count("#bounds tbody tr").await, 8);
@@ -55,18 +62,43 @@ async fn browser_gait_is_shown_completely_with_coloured_muscles() {
         "[...document.querySelectorAll('#bounds tbody tr')].every(row => /[0-9]/.test(row.cells[3].textContent))";
     assert_eq!(page.value(reached).await, "true", "of every bound it is said what the gait makes of it");
     assert_eq!(page.count("#solve .files a").await, 3);
-    // Muscles of a leg are drawn in a colour of their own.
+    let bytes = page.value("document.documentElement.outerHTML.length").await;
+    assert!(bytes.parse::<u32>().unwrap() < 400_000, "{bytes} bytes");
+    // Muscles are scaled to their own peak.
     let page = browser.open(&site.at(&format!("/trials/{trial}"))).await;
     page.wait_for("[data-play]").await;
-    let coloured = page
-        .value(
-            "(() => { const c = document.querySelector('.walker canvas'); \
-             const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0; \
-             for (let i = 0; i < d.length; i += 4) if (d[i + 3] > 40 && d[i] > 1.6 * d[i + 1] && d[i + 2] > d[i + 1]) n++; \
-             return n })()",
-        )
-        .await;
-    assert!(coloured.parse::<u32>().unwrap() > 50, "{coloured} points in the colour of muscles");
+    let widest = "(() => { let widest = 0; const s = document.querySelector('[data-scrub]'); for (let p = 0; p <= 100; p += 0.5) { \
+                  s.value = p; s.dispatchEvent(new Event('input')); \
+                  widest = Math.max(widest, ...[...document.querySelectorAll('.muscle')].map(m => Number(m.getAttribute('stroke-width')))); \
+                  } return widest })()";
+    page.wait_until(&format!("{widest} === 5")).await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_has_one_cursor_for_walker_and_charts() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let (site, trial) = with_a_gait().await;
+    let page = browser.open(&site.at(&format!("/trials/{trial}"))).await;
+    page.wait_for("[data-play]").await;
+    page.wait_for("#angles .cursor").await;
+    // Drags to the middle of the axis of the first chart, from the line of the right leg.
+    let drag = "(() => { const c = document.querySelector('#angles svg.chart'); const m = c.getScreenCTM(); \
+                const s = document.querySelector('[data-scrub]'); s.value = 40; s.dispatchEvent(new Event('input')); \
+                const send = (kind, x) => c.dispatchEvent(new PointerEvent(kind, { bubbles: true, button: 0, \
+                  clientX: m.e + m.a * x, clientY: m.f + m.d * 150 })); \
+                send('pointerdown', 74 + 542 * 0.4); send('pointermove', 74 + 542 * 0.25); send('pointerup', 0); \
+                const at = [...c.parentElement.querySelectorAll('.cursor')].map(l => Number(l.getAttribute('transform').match(/[\\d.]+/)[0])); \
+                const percent = at.map(x => Math.round((x - 74) / 5.42)); return [s.value, ...percent].join(' ') })()";
+    // The cycle of the left leg begins in the middle of the stride.
+    assert_eq!(page.value(drag).await, "25 75 25");
+    assert_eq!(page.text("[data-play]").await, "Play", "what is dragged does not play on");
+    // The reference gait appears behind the walker.
+    let ghost = "document.querySelector('[data-ghost]').getAttribute('visibility')";
+    assert_eq!(page.value(ghost).await, "hidden");
+    page.click("[data-overlay]").await;
+    assert_eq!(page.value(ghost).await, "visible");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

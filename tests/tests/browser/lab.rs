@@ -57,7 +57,7 @@ async fn browser_lab_session_records_walks_and_asks_which_was_better() {
     page.wait_until("document.querySelector('input:checked')?.value === 'first'").await;
     page.touch("main form button").await;
     page.wait_for(".notice.good button").await;
-    assert!(page.text(".notice.good").await.contains("walk 2 was better"));
+    assert!(page.text(".notice.good").await.contains("walk 2, the first with the device, was better"));
     page.click(".notice.good button").await;
     page.wait_for(".answer-options input[value=no_difference]").await;
     page.run("document.querySelector('input[name=answer]').focus()").await;
@@ -65,14 +65,14 @@ async fn browser_lab_session_records_walks_and_asks_which_was_better() {
     page.press("ArrowRight").await;
     assert_eq!(page.value("document.querySelector('input:checked')?.value ?? ''").await, "second");
     page.press("Enter").await;
-    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('walk 3 was better') ?? false").await;
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('walk 3, the second with the device, was better') ?? false").await;
     page.reload().await;
-    assert!(page.text(".notice.good").await.contains("walk 3 was better"));
+    assert!(page.text(".notice.good").await.contains("walk 3, the second with the device, was better"));
     assert!(heard(&site, study).await.is_empty(), "the session is still blind");
     page.is_clean(&site.origin).await;
 
     let page = browser.open(&site.at(&format!("/lab-sessions/{session}"))).await;
-    assert!(page.text("main").await.contains("walk 3 was better"));
+    assert!(page.text("main").await.contains("walk 3, the second with the device, was better"));
     page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
     page.fill("#reason", "every walk was recorded").await;
     page.click("form[action$='/unblind'] button").await;
@@ -199,7 +199,7 @@ async fn browser_staff_report_a_gait_as_unsafe_and_cannot_retract_the_report() {
     assert_eq!(page.count(".trials .tag.bad").await, 1);
 
     assert_eq!(compare.count(".notice.good details").await, 0, "a safety report is reviewed, and not retracted");
-    assert!(compare.text(".notice.good").await.contains("Staff review it"));
+    assert!(compare.text(".notice.good").await.contains("Staff will review it"));
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

@@ -53,7 +53,7 @@ async fn browser_completes_a_lab_session_from_plan_to_unblinding() {
     page.click("input[value=second]").await;
     page.fill("#note", "softer at the heel").await;
     page.click("main form button").await;
-    page.wait_until("document.querySelector('.notice.good')?.innerText.includes('walk 3 was better') ?? false").await;
+    page.wait_until("document.querySelector('.notice.good')?.innerText.includes('walk 3, the second with the device, was better') ?? false").await;
     is_for_everybody(axe, &page, "answered").await;
     page.is_clean(&site.origin).await;
 

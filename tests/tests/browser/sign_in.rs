@@ -2,8 +2,8 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright_http::Access;
-use gaitwright_service::access::people::{self, NewUser};
+use gaitwright_http::AccessState;
+use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Role, secret};
 use gaitwright_service::studies::membership::{self, NewMember};
 use gaitwright_store::audit::Actor;
@@ -16,13 +16,13 @@ use std::sync::Arc;
 /// A service that requires sign-in, and the link of its first administrator.
 async fn guarded() -> (Site, String) {
     let site = Site::start_with(Analytic::default(), |service| {
-        service.access = Arc::new(Access::by_sign_in(3600.0));
+        service.access = Arc::new(AccessState::by_sign_in(3600.0));
     })
     .await;
     let mut writer = site.service.store.write().await.unwrap();
     let new = NewUser { name: "Ada".to_owned(), role: Role::Admin };
-    let user = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
-    let link = people::link(&mut writer, &Actor::program(), user.id).await.unwrap();
+    let user = user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    let link = user_administration::link(&mut writer, &Actor::program(), user.id).await.unwrap();
     commit(writer).await.unwrap();
     (site, link)
 }
@@ -110,9 +110,9 @@ async fn browser_sends_an_answer_after_the_session_ended() {
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let mut writer = site.service.store.write().await.unwrap();
     let new = NewUser { name: "R1".to_owned(), role: Role::Rater };
-    let rater = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    let rater = user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
     let hashed = secret::hash_password("correct horse battery").unwrap();
-    people::set_password(&mut writer, &Actor::program(), rater.id, &hashed).await.unwrap();
+    user_administration::set_password(&mut writer, &Actor::program(), rater.id, &hashed).await.unwrap();
     let member = NewMember { kind: MemberKind::User, name: "R1".to_owned() };
     membership::add(&mut writer, &Actor::program(), study, &member).await.unwrap();
     commit(writer).await.unwrap();

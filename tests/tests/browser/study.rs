@@ -29,7 +29,7 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     let told = site.service.fetch(&bounds).await.json();
     assert!(told["bounds"]["a1"].is_number() && told["gait_rmse_rad"].is_number(), "{told}");
     page.click("[data-part=best] a.button").await;
-    page.wait_for(".walker canvas").await;
+    page.wait_for(".walker svg.gait-figure").await;
     page.wait_for("[data-phase]").await;
     assert!(page.count("svg.chart").await >= 12);
     page.is_clean(&site.origin).await;
@@ -197,8 +197,9 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     page.click("[aria-labelledby=waits] a").await;
     // Both gaits walk, on one clock.
     page.wait_for(".walker [data-play]").await;
-    assert_eq!(page.count(".walker canvas").await, 2);
-    let drawn = "[...document.querySelectorAll('.walker canvas')].map(c => c.toDataURL().length).join()";
+    assert_eq!(page.count(".walker svg.gait-figure").await, 2);
+    let drawn =
+        "[...document.querySelectorAll('.walker [data-segment]')].map(part => part.getAttribute('transform')).join()";
     let before = page.value(drawn).await;
     page.wait_until(&format!("{drawn} !== {before:?}")).await;
     page.wait_for("input[name=answer]").await;
@@ -358,7 +359,7 @@ async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
     let plain = browser.open_without_scripts(&at).await;
     assert_eq!(plain.count("svg.tiles").await, 2);
     assert!(!plain.text("main").await.contains("key 1"));
-    let seen = "[...document.querySelectorAll('canvas')].filter(c => c.getClientRects().length).length";
+    let seen = "[...document.querySelectorAll('svg.gait-figure')].filter(c => c.getClientRects().length).length";
     assert_eq!(plain.value(seen).await, "0", "no empty frames");
     browser.close().await;
 }

@@ -184,8 +184,8 @@ class AccessRow(_AccessRowRequired, total=False):
 
 
 class Answered(TypedDict):
-    """Confirmation of a rater's answer. It has neither gaits nor the answer: the copy that is kept for repeated
-    requests would otherwise reveal the sides to readers of the study.
+    """Confirmation of a rater's answer. It contains neither the gaits nor the answer, because the copy kept for
+    repeated requests would otherwise reveal to readers of the study which gait was shown on which side.
     """
 
     # Number of the pair for this rater.
@@ -221,7 +221,7 @@ class _AssessmentRequired(TypedDict):
 
 
 class Assessment(_AssessmentRequired, total=False):
-    """An assessment of the record."""
+    """A recorded assessment."""
 
     # Preference that was derived from it, if any.
     feedback_id: Optional[FeedbackId]
@@ -245,7 +245,7 @@ class _AttemptResultRequired(TypedDict):
 class AttemptResult(_AttemptResultRequired, total=False):
     """Result of an attempt."""
 
-    # All figures of the solve, where they are finite.
+    # All figures of the solve that are finite.
     report: Optional[SolveReport]
 
 
@@ -284,7 +284,7 @@ class Backup(TypedDict):
 
 
 class BaseBounds(TypedDict, total=False):
-    """Values of bounds. Absent bounds have their defaults."""
+    """Values of bounds. Absent bounds take their default values."""
 
     # Maximum coordinate velocity, rad/s.
     a1: float
@@ -386,7 +386,7 @@ class _CertificateCheckRequired(TypedDict):
     name: str
     # Domain and time of the worst value.
     place: str
-    # Unit of value and limit; empty: dimensionless.
+    # Unit of the value and the limit; empty if dimensionless.
     unit: str
 
 
@@ -413,7 +413,7 @@ class CertifiedDifference(TypedDict):
 class CertifiedGait(TypedDict):
     """What a certificate is about, computed from the gait."""
 
-    # Name of the device. `differences` tells whether its values are those of the built-in device.
+    # Name of the device. `differences` shows whether its values are those of the built-in device.
     device: str
     # Values of the device and of the settings that differ from AMPRO3 and the default settings.
     differences: list[CertifiedDifference]
@@ -425,8 +425,8 @@ class CertifiedGait(TypedDict):
     optimizer_version: str
     # The subject.
     subject: CertifiedSubject
-    # Mechanical cost of transport with the magnitudes of the joint powers. The objective, and with it
-    # `cost_of_transport` of a trial, has a smoothed magnitude, which is smaller.
+    # Mechanical cost of transport, computed with the unsmoothed magnitudes of the joint powers. The objective, and
+    # therefore the `cost_of_transport` of a trial, uses smoothed magnitudes, which are smaller.
     unsmoothed_cost_of_transport: float
 
 
@@ -440,9 +440,9 @@ class CertifiedSubject(TypedDict):
 
 
 class Change(TypedDict, total=False):
-    """Changes of a study. Absent fields keep their values."""
+    """Changes to a study. Absent fields keep their values."""
 
-    # Name shown to people.
+    # Name shown to users.
     name: Optional[str]
     # Number of trials that run in parallel.
     parallel_trials: Optional[int]
@@ -464,7 +464,8 @@ class _ConflictRequired(TypedDict):
     starts: int
     # Whether a solve gave up, so that infeasibility is not certain.
     undecided: bool
-    # Violations of the nearest motion that the search found, with all other tuned bounds at their loosest, worst first.
+    # Violations in the motion closest to feasibility that the search found, with all other tuned bounds at their
+    # loosest, worst first.
     violations: list[Violation]
 
 
@@ -473,7 +474,7 @@ class Conflict(_ConflictRequired, total=False):
     but relaxing any one of them gave a gait.
     """
 
-    # Naturalness terms that take part, if fixed constraints conflict; absent: none.
+    # Naturalness terms involved in a conflict between fixed constraints; absent if there are none.
     naturalness_terms: Optional[list[str]]
     # Bounds of other conflicts that were relaxed when this one was found.
     without: Optional[list[str]]
@@ -488,7 +489,7 @@ class Consent(TypedDict):
     created_at: Instant
     # Consent or withdrawal.
     kind: ConsentKind
-    # For a consent, name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
+    # For consent, the name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
     note: str
     # Sequence number.
     seq: int
@@ -553,7 +554,7 @@ class FeedbackRow(_FeedbackRowRequired, total=False):
 class CreatedPreference(FeedbackRow):
     """Recorded preference."""
 
-    # Answers of other people to the same comparison, at most the newest twenty.
+    # Other people's answers to the same comparison; at most the newest twenty.
     other_answers: list[FeedbackId]
 
 
@@ -600,7 +601,7 @@ class CycleActivity(TypedDict):
 
 
 class Device(TypedDict):
-    """Device. A changed definition is a new device, so that studies keep theirs."""
+    """Device. Changing a definition creates a new device, so that studies keep the one they use."""
 
     # Time of creation.
     created_at: Instant
@@ -608,7 +609,7 @@ class Device(TypedDict):
     definition: DeviceDefinition
     # Identifier.
     id: DeviceId
-    # Name shown to people.
+    # Name shown to users.
     name: str
 
 
@@ -626,26 +627,26 @@ class _DeviceDefinitionRequired(TypedDict):
     # largest ankle torque
     ankle_torque_limit_n_m: float
     carried_limb: bool
-    # centre of mass of the foot below the ankle
+    # distance of the foot's centre of mass below the ankle
     foot_com_down_m: float
-    # centre of mass of the foot ahead of the ankle
+    # distance of the foot's centre of mass ahead of the ankle
     foot_com_forward_m: float
     # moment of inertia of the foot about its centre of mass
     foot_inertia_kg_m2: float
     # mass of the prosthetic foot with shoe
     foot_mass_kg: float
-    # heel contact behind the ankle
+    # distance of the heel contact behind the ankle
     heel_behind_m: float
     # largest knee and ankle speed
     joint_speed_limit_rad_s: float
-    # moment of inertia of this mass about its own centre
+    # moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh
     knee_housing_inertia_kg_m2: float
     # mass at the prosthetic knee that moves with the thigh
     knee_housing_mass_kg: float
     # largest knee torque
     knee_torque_limit_n_m: float
     name: str
-    # centre of mass of the shank below the knee, in shank lengths
+    # distance of the shank's centre of mass below the knee, in shank lengths
     shank_com_fraction: float
     # radius of gyration of the shank about its centre of mass, in shank lengths
     shank_gyration_fraction: float
@@ -653,7 +654,7 @@ class _DeviceDefinitionRequired(TypedDict):
     shank_length_m: float
     # mass of the prosthetic shank
     shank_mass_kg: float
-    # toe contact ahead of the ankle
+    # distance of the toe contact ahead of the ankle
     toe_ahead_m: float
 
 
@@ -664,13 +665,13 @@ class DeviceDefinition(_DeviceDefinitionRequired, total=False):
 
 
 class DeviceFile(TypedDict):
-    """Release of the controller file of a walk."""
+    """Download of the controller file of a walk."""
 
     # Who fetched it.
     actor: str
     # Time.
     at: Instant
-    # Whether the device itself fetched the file. Otherwise the caller could know which gait the walk uses.
+    # Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
     to_device: bool
     # Number of the walk, 2 or 3.
     walk: int
@@ -679,7 +680,7 @@ class DeviceFile(TypedDict):
 class Dimension(TypedDict):
     """One tuned bound of a search space."""
 
-    # Difference between values up to which gaits of similar utility are expected.
+    # Difference between values within which gaits are expected to have similar utility.
     lengthscale: float
     # Name of the bound.
     name: Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]
@@ -699,9 +700,9 @@ class EmgReading(TypedDict, total=False):
     heel_strike_column: Optional[str]
     # Value of that column above which the foot is on the ground.
     heel_strike_threshold: float
-    # Times of right heel strikes, s, on the time axis of the file. Empty: detect them in `heel_strike_column`.
+    # Times of right heel strikes, s, on the time axis of the file. If empty, they are detected in `heel_strike_column`.
     heel_strikes_s: list[float]
-    # Sampling rate of a CSV file without a column `time_s`, Hz.
+    # Sampling rate of a CSV file without a `time_s` column, Hz.
     rate_hz: Optional[float]
 
 
@@ -722,14 +723,14 @@ class _EmgRmseRequired(TypedDict):
 
 
 class EmgRmse(_EmgRmseRequired, total=False):
-    """EMG RMSE of a walk and its parts, relative to the peak of the walk without the device."""
+    """EMG RMSE of a walk, in total and for each channel, relative to the peak of the walk without the device."""
 
     # Reasons to doubt the comparison. Absent if there are none.
     warnings: Optional[list[str]]
 
 
 class EmgSettings(TypedDict, total=False):
-    """Filters for EMG recordings. Absent settings have their defaults."""
+    """Filters for EMG recordings. Absent settings take their default values."""
 
     # Upper cut-off frequency of the band-pass filter, Hz; below half the sampling rate.
     band_high_hz: float
@@ -804,9 +805,9 @@ class Fork(TypedDict, total=False):
     feedback_mode: Optional[FeedbackMode]
     # Whether to solve with muscles.
     muscles: Optional[bool]
-    # Name shown to people.
+    # Name shown to users.
     name: Optional[str]
-    # Seed of every random draw except allocations.
+    # Seed for all random draws except allocations.
     seed: Optional[int]
     # Whether to start the study immediately.
     start: bool
@@ -925,7 +926,7 @@ class GivenBound(TypedDict):
 class Health(TypedDict):
     """Health of the service."""
 
-    # `ready`, or `short_of_space` if less disk space is free than the reserve.
+    # `healthy`, or `short_of_space` if free disk space is below the reserve.
     status: str
     # Version of the program.
     version: str
@@ -1012,14 +1013,14 @@ class JointRelaxation(TypedDict):
     bounds: list[RelaxedBound]
     # Number of solves.
     solves: int
-    # Number of starting points of the search with `not_with`.
+    # Number of starting points of the search at the `not_with` values.
     starts: int
-    # Whether a solve with `not_with` gave up, so that infeasibility is not certain.
+    # Whether a solve at the `not_with` values gave up, so that infeasibility is not certain.
     undecided: bool
 
 
 class LabAnswer(TypedDict):
-    """Answer of the subject, in terms of walks."""
+    """The subject's answer, in terms of walks."""
 
     # Who recorded it.
     actor: str
@@ -1036,7 +1037,7 @@ class LabAnswer(TypedDict):
 
 
 class _LabSessionProgressRequired(TypedDict):
-    # Whether that answer can be retracted here.
+    # Whether the current answer can be retracted in the lab view.
     can_be_retracted: bool
     # Whether the session is closed.
     closed: bool
@@ -1229,7 +1230,7 @@ class MeasurementFile(TypedDict):
 class _MemberRequired(TypedDict):
     # Who added the member.
     added_by: str
-    # Time of addition.
+    # Time at which the member was added.
     created_at: Instant
     # Identifier of the membership.
     id: MemberId
@@ -1251,18 +1252,18 @@ class Member(_MemberRequired, total=False):
 class _MilestoneRequired(TypedDict):
     # Number of results so far, from 1.
     iteration: int
-    # Number of that trial.
+    # Number of the best trial.
     number: int
-    # Best trial at that time.
+    # Best trial after this iteration.
     trial_id: TrialId
 
 
 class Milestone(_MilestoneRequired, total=False):
     """The recommendation after an iteration."""
 
-    # Cost of transport of that trial.
+    # Cost of transport of the best trial.
     cost_of_transport: Optional[float]
-    # Gait RMSE of that trial, rad. Absent if it did not converge.
+    # Gait RMSE of the best trial, rad. Absent if it did not converge.
     gait_rmse_rad: Optional[float]
 
 
@@ -1273,14 +1274,14 @@ class _ModelActivityRequired(TypedDict):
     channel: str
     # Name of the muscle.
     muscle: str
-    # RMS difference of activation and measured activity.
+    # RMS difference between activation and measured activity.
     rms_difference: float
 
 
 class ModelActivity(_ModelActivityRequired, total=False):
     """The activation of the muscle of a channel over the gait cycle."""
 
-    # Correlation of both activities over the cycle; null if one of them is constant.
+    # Correlation between activation and measured activity over the cycle; null if one of them is constant.
     correlation: Optional[float]
 
 
@@ -1412,7 +1413,7 @@ class MuscleParametersVas(TypedDict, total=False):
 
 
 class MuscleParameters(TypedDict, total=False):
-    """How muscles differ from the published table."""
+    """Muscle values that differ from the published table."""
 
     gas: MuscleParametersGas
     glu: MuscleParametersGlu
@@ -1425,7 +1426,8 @@ class MuscleParameters(TypedDict, total=False):
 
 
 class _NewAssessmentRequired(TypedDict):
-    # `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. Which gait is better is a preference.
+    # `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. To state which gait is better, record a
+    # preference instead.
     answer: Literal["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
     # Trial of one gait.
     first: TrialId
@@ -1440,7 +1442,7 @@ class NewAssessment(_NewAssessmentRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    # Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     source: Optional[PersonSource]
 
 
@@ -1485,7 +1487,7 @@ class _NewLabAnswerRequired(TypedDict):
 
 
 class NewLabAnswer(_NewLabAnswerRequired, total=False):
-    """Answer of the subject."""
+    """The subject's answer."""
 
     # Free text, at most 2000 characters.
     note: str
@@ -1538,18 +1540,18 @@ class _NewPreferenceRequired(TypedDict):
 
 
 class NewPreference(_NewPreferenceRequired, total=False):
-    """A preference to give."""
+    """A preference to record."""
 
     # Name or pseudonym of the author. Defaults to the caller's name.
     author: Optional[str]
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    # Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     source: Optional[PersonSource]
 
 
 class _NewReferenceGaitRequired(TypedDict):
-    # Name shown to people.
+    # Name shown to users.
     name: str
     # Content of the file.
     recording: str
@@ -1568,7 +1570,7 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
     forces: Optional[str]
     # File format of the recording.
     format: JointAngleFormat
-    # Times of right heel strikes, s. Empty: detect them.
+    # Times of right heel strikes, s. If empty, they are detected.
     heel_strikes_s: list[float]
     # Height of the recorded person, m.
     height_m: Optional[float]
@@ -1592,12 +1594,12 @@ class NewSafetyReport(TypedDict, total=False):
     author: Optional[str]
     # What happened, at most 2000 characters.
     note: str
-    # Who reports: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    # Who reports: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     source: Optional[PersonSource]
 
 
 class _NewSafetyReviewRequired(TypedDict):
-    # `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
+    # `walkable`: the gait may be walked again. `unsafe`: the gait remains marked as unsafe, and the review is complete.
     decision: SafetyDecision
     # Reason, 1 to 2000 characters.
     reason: str
@@ -1631,11 +1633,11 @@ class NewStudy(_NewStudyRequired, total=False):
     feedback_mode: FeedbackMode
     # Settings of the gait problem. Unless they set muscles, the measured muscle values of the subject apply.
     gait_settings: GaitSettings
-    # Settings of the learner. Absent settings have the recommended values of the method.
+    # Settings of the learner. Absent settings take the values that the method recommends.
     learner: LearnerSettings
     # Whether to solve with muscles (C1-C12) or without (C1-C4).
     muscles: bool
-    # Name shown to people. Made from subject and variant by default.
+    # Name shown to users. Made from subject and variant by default.
     name: Optional[str]
     # Number of trials that run in parallel.
     parallel_trials: int
@@ -1644,11 +1646,14 @@ class NewStudy(_NewStudyRequired, total=False):
     # Reference gait for Gait RMSE. By default the one nearest to the subject in height and body mass, or the built-in
     # one if no reference gait states height and mass.
     reference_gait_id: Optional[ReferenceGaitId]
+    # Whether a trial may have an action whose gait is known from another trial, as in the paper. By default, only if
+    # the learner may repeat actions. Has no effect if scripts evaluate the trials.
+    repeat_results: Optional[bool]
     # Whether only members and administrators can access the study. The creator becomes a member.
     restricted: bool
     # Tuned bounds and their values. Table I of the paper by default.
     search_space: Optional[SearchSpace]
-    # Seed of every random draw except allocations.
+    # Seed for all random draws except allocations.
     seed: int
     # Limits of one solve.
     solve_options: SolveOptions
@@ -1702,7 +1707,7 @@ class NewUser(TypedDict):
 
 
 class NextPair(TypedDict, total=False):
-    """Next pair of a rater."""
+    """Next pair for a rater."""
 
     # The pair. Null if no comparison is pending.
     pair: Optional[Pair]
@@ -1753,7 +1758,7 @@ class Pair(TypedDict):
 
 
 class PhasePortrait(TypedDict):
-    """Angle and velocity of a joint, sample after sample."""
+    """Angle and velocity of a joint, sample by sample."""
 
     # Angle, rad.
     angle_rad: list[float]
@@ -1764,7 +1769,7 @@ class PhasePortrait(TypedDict):
 
 
 class _PresentationRequired(TypedDict):
-    # Time of the draw.
+    # Time at which the pair was drawn.
     created_at: Instant
     # Identifier.
     id: PresentationId
@@ -1785,7 +1790,7 @@ class _PresentationRequired(TypedDict):
 
 
 class Presentation(_PresentationRequired, total=False):
-    """Pair of an unblinded rater, with its sides."""
+    """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
 
     # Answer in terms of what was shown. Absent if there is none yet.
     answer: Optional[Judgement]
@@ -1800,9 +1805,10 @@ class _ProblemRequired(TypedDict):
     detail: str
     # The HTTP status.
     status: int
-    # Name of the kind.
+    # Name of this kind of problem.
     title: str
-    # Kind of problem, stable across versions. The address serves a page that explains the kind.
+    # Address that identifies the kind of problem. It is stable across versions and serves a page that explains the
+    # kind.
     type: str
 
 
@@ -1822,7 +1828,7 @@ class Problem(_ProblemRequired, total=False):
 class Processing(TypedDict, total=False):
     """Settings of EMG processing."""
 
-    # band_low_hz, band_high_hz, envelope_hz and order. Absent settings have their defaults.
+    # band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
     settings: EmgSettings
 
 
@@ -1845,7 +1851,7 @@ class Proportion(_ProportionRequired, total=False):
 
 
 class Pushes(TypedDict):
-    """Largest changes of the hip's forward velocity that are recovered, m/s."""
+    """Largest changes in the hip's forward velocity from which the walker recovers, m/s."""
 
     # Backwards.
     backwards_m_s: float
@@ -1915,7 +1921,7 @@ class _RecommendationRequired(Recommended):
     certificate: CertificateState
     # Whether gaits of the study are being certified, so that the recommendation may change.
     certifying: bool
-    # Reasons if it failed.
+    # Reasons if the certificate failed.
     failures: list[str]
     study: str
     study_id: StudyId
@@ -1924,7 +1930,7 @@ class _RecommendationRequired(Recommended):
 class Recommendation(_RecommendationRequired, total=False):
     """Best action of a study."""
 
-    # If it failed, the best action whose gait passed.
+    # If the certificate failed, the best action whose gait passed.
     passing: Optional[Recommended]
 
 
@@ -1941,7 +1947,7 @@ class RecordedWalk(_RecordedWalkRequired, total=False):
 
 
 class ReferenceGait(TypedDict):
-    """Reference gait. A changed definition is a new reference gait, so that studies keep theirs."""
+    """Reference gait. Changing a definition creates a new reference gait, so that studies keep the one they use."""
 
     # Time of creation.
     created_at: Instant
@@ -1949,7 +1955,7 @@ class ReferenceGait(TypedDict):
     definition: ReferenceGaitDocument
     # Identifier.
     id: ReferenceGaitId
-    # Name shown to people.
+    # Name shown to users.
     name: str
 
 
@@ -1961,7 +1967,7 @@ class _ReferenceGaitMatchRequired(TypedDict):
 class ReferenceGaitMatch(_ReferenceGaitMatchRequired, total=False):
     """A reference gait and the distance between the recorded person and a subject."""
 
-    # `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
+    # `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait does not state height and mass.
     distance: Optional[float]
 
 
@@ -1974,11 +1980,11 @@ _RelaxationRequired = TypedDict(
         "from": "float",
         # What it limits, with its unit.
         "meaning": "str",
-        # The loosest tried value that does not give a gait.
+        # The loosest value tried that does not give a gait.
         "not_with": "float",
         # Number of solves.
         "solves": "int",
-        # Number of starting points of the search with `not_with`. 0 if unknown.
+        # Number of starting points of the search at the `not_with` values. 0 if unknown.
         "starts": "int",
         # Whether a solve with that value gave up, so that infeasibility is not certain.
         "undecided": "bool",
@@ -2057,7 +2063,8 @@ class ReturnMap(TypedDict):
     multipliers: list[Multiplier]
     # Fraction of a proportional change of all velocities that remains after one stride.
     speed_kept: float
-    # Change in other coordinates that such a change causes within one stride, relative to its size.
+    # Change in other coordinates that a proportional change of all velocities causes within one stride, relative to its
+    # size.
     speed_leak: float
 
 
@@ -2216,6 +2223,9 @@ class _SolveReportRequired(TypedDict):
     stride_length_m: float
     # Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes as well.
     tightened_bounds: int
+    # For each tuned bound, the range of values for which the gait remains a solution, even if several bounds change at
+    # once. Empty if the solve did not converge, or if unknown.
+    unchanged_bounds: list[UnchangedBound]
     # Number of variables.
     variables: int
     # Hip velocity in the four intervals between impacts, m/s.
@@ -2225,7 +2235,7 @@ class _SolveReportRequired(TypedDict):
 class SolveReport(_SolveReportRequired, total=False):
     """The figures of one solve."""
 
-    # Parts of the linear algebra. Null if unknown.
+    # Breakdown of the linear algebra. Null if unknown.
     linear_algebra: Optional[LinearAlgebra]
     # How well the conditions of a local optimum are met. Null if unknown.
     optimality: Optional[Optimality]
@@ -2246,7 +2256,7 @@ class _StudyPlanRequired(TypedDict):
     learner: LearnerSettings
     # Whether to solve with muscles (C1-C12) or without (C1-C4).
     muscles: bool
-    # Name shown to people.
+    # Name shown to users.
     name: str
     # Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     parallel_trials: int
@@ -2254,9 +2264,12 @@ class _StudyPlanRequired(TypedDict):
     priority: int
     # Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
-    # Tuned bounds and their values, with dimensions named as the bounds.
+    # Whether a trial may have an action whose gait is known from another trial, as in the paper. In studies from
+    # earlier versions, it may.
+    repeat_results: bool
+    # Tuned bounds and their values, with each dimension named after its bound.
     search_space: SearchSpace
-    # Seed of every random draw except allocations.
+    # Seed for all random draws except allocations.
     seed: int
     # Limits of one solve.
     solve_options: SolveOptions
@@ -2318,7 +2331,7 @@ class _StudyComparisonRequired(TypedDict):
     id: StudyId
     muscles: bool
     name: str
-    # The reference gait of Gait RMSE.
+    # Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
     seed: int
     # Total time of all solves, s.
@@ -2381,7 +2394,7 @@ class Suggestion(_SuggestionRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    # Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     source: Optional[PersonSource]
 
 
@@ -2410,7 +2423,7 @@ class _TrialRequired(TypedDict):
     created_at: Instant
     # Identifier.
     id: TrialId
-    # Message for people about the end of the trial; may be empty.
+    # Human-readable message about how the trial ended; may be empty.
     message: str
     # Number within the study, from 1, in the order of proposal.
     number: int
@@ -2433,7 +2446,7 @@ class Trial(_TrialRequired, total=False):
     best_before: Optional[TrialId]
     # Cost of transport of a converged gait, dimensionless.
     cost_of_transport: Optional[float]
-    # Time of its end.
+    # Time at which it ended.
     finished_at: Optional[Instant]
     # Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Optional[float]
@@ -2521,6 +2534,20 @@ class UnblindedRater(TypedDict):
     pairs: list[Presentation]
 
 
+class _UnchangedBoundRequired(TypedDict):
+    # Name of the bound.
+    bound: str
+
+
+class UnchangedBound(_UnchangedBoundRequired, total=False):
+    """A tuned bound and the range of its values for which a gait remains a solution."""
+
+    # Smallest value. Null if every smaller one leaves the gait as it is.
+    least: Optional[float]
+    # Largest value. Null if every larger one leaves the gait as it is.
+    most: Optional[float]
+
+
 class _UserRequired(TypedDict):
     # Time of creation.
     created_at: Instant
@@ -2574,7 +2601,7 @@ class WalkActivity(_WalkActivityRequired, total=False):
 class WalkModel(TypedDict):
     """Muscle activity of the model for a walk."""
 
-    # Each channel whose muscle the model has.
+    # Each channel whose muscle is in the model.
     muscles: list[ModelActivity]
     # Number of the walk, 2 or 3.
     walk: int

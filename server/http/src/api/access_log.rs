@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::paging::{Page, Paging, SearchText};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
@@ -29,7 +29,7 @@ pub(super) struct Filter {
     operation_id = "list_access_log",
     tag = "operation",
     params(
-        ("contains" = Option<String>, Query, max_length = 200, description = "Text in kind, actor, address, object, study or pseudonym"),
+        ("contains" = Option<String>, Query, max_length = 200, description = "Text to find in the kind, actor, address, object, study or pseudonym"),
         ("subject_id" = Option<SubjectId>, Query, description = "Rows of this subject")
     ),
     responses((status = 200, description = "A page", body = Page<AccessRow>)),

@@ -3,9 +3,9 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::binary::Binary;
+use crate::openapi_binary::Binary;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::body::{Body, Bytes};
@@ -109,7 +109,7 @@ impl Write for Chunks {
     operation_id = "list_study_imports",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Imports, the one into this record last", body = Page<Import>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Imports, ending with the one into this record", body = Page<Import>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn imports_of_study(

@@ -6,7 +6,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -41,8 +41,8 @@ pub(super) async fn of_study(
 
 /// Record an assessment of two gaits
 ///
-/// States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is no longer recommended,
-/// compared or planned for lab sessions, until staff have reviewed the report.
+/// States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
+/// recommended, compared or planned for lab sessions until staff have reviewed the report.
 #[utoipa::path(
     post,
     path = "/studies/{id}/assessments",

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::paging::{Page, Paging, SearchText};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
@@ -26,7 +26,7 @@ pub(super) struct Filter {
     path = "/audit",
     operation_id = "list_audit_trail",
     tag = "operation",
-    params(("contains" = Option<String>, Query, max_length = 200, description = "Text in actor, action or object")),
+    params(("contains" = Option<String>, Query, max_length = 200, description = "Text to find in the actor, action or object")),
     responses((status = 200, description = "A page", body = Page<AuditRow>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]

@@ -4,7 +4,7 @@ use super::jobs::Job;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::idempotent::Idempotent;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;

@@ -3,10 +3,10 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::blind_motion::{Figure, blind_motion, phase};
+use crate::blind_motion::{BlindFigure, blind_motion, phase};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::{Path, State};
@@ -31,7 +31,7 @@ pub(super) struct Pair {
     second: String,
 }
 
-/// Next pair of a rater.
+/// Next pair for a rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct NextPair {
     /// The pair. Null if no comparison is pending.
@@ -75,7 +75,7 @@ pub(super) struct BlindMotion {
     /// 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
     /// and of the right leg) as forward and upward coordinates, m.
     #[schema(value_type = Vec<Vec<Vec<f64>>>)]
-    figures: Vec<Figure>,
+    figures: Vec<BlindFigure>,
 }
 
 /// Motion of a pair.
@@ -197,8 +197,8 @@ pub(super) struct UnblindedRater {
 
 /// Unblind a rater
 ///
-/// Reveals which gait the rater saw on which side. The audit trail records it, and later answers of the rater do not
-/// count as blind.
+/// Reveals which gait the rater saw on which side. The audit trail records the unblinding, and later answers of the
+/// rater do not count as blind.
 #[utoipa::path(
     post,
     path = "/studies/{id}/unblind",

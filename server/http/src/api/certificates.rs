@@ -5,7 +5,7 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::Idempotent;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -15,7 +15,7 @@ use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certification;
 use gaitwright_service::studies::job::JobId;
-use gaitwright_store::{TrialId, certificates, schema};
+use gaitwright_store::{TrialId, certificates, openapi_schemas};
 
 /// Get the certificate of a trial
 ///
@@ -26,7 +26,7 @@ use gaitwright_store::{TrialId, certificates, schema};
     operation_id = "get_certificate",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Certificate", body = schema::Certificate), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Certificate", body = openapi_schemas::Certificate), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -48,7 +48,7 @@ pub(super) async fn get(
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
-        (status = 200, description = "Finished job of the existing certificate", body = Job),
+        (status = 200, description = "Finished job for the existing certificate", body = Job),
         (status = 202, description = "Job that makes the certificate, which takes a few seconds", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),

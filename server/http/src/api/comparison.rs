@@ -4,18 +4,18 @@ use crate::AppState;
 use crate::accessible::Named;
 use crate::authorization::Authorized;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::choice::ranking_to_show;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::studies::{self, StudyState};
 use gaitwright_store::trials::{self, TrialCounts};
-use gaitwright_store::{ReferenceGaitId, StudyId, consents, schema};
+use gaitwright_store::{ReferenceGaitId, StudyId, consents, openapi_schemas};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use utoipa::ToSchema;
@@ -37,14 +37,14 @@ pub(super) struct StudyComparison {
     name: String,
     muscles: bool,
     seed: u64,
-    /// The reference gait of Gait RMSE.
+    /// Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId,
     state: StudyState,
     trials: TrialCounts,
     /// Number of the recommended trial.
     best_trial: Option<u32>,
     /// Action of the recommended trial.
-    #[schema(value_type = Option<schema::Bounds>)]
+    #[schema(value_type = Option<openapi_schemas::Bounds>)]
     best_action: Option<TunedBounds>,
     /// Gait RMSE of the recommended trial, rad. Null in every row if the compared studies have different reference gaits,
     /// because values against different reference gaits cannot be compared.

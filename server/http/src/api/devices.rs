@@ -5,7 +5,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -13,7 +13,7 @@ use gait_optimizer::Device as Definition;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::device;
 use gaitwright_store::devices::{self, Device};
-use gaitwright_store::{DeviceId, schema};
+use gaitwright_store::{DeviceId, openapi_schemas};
 use std::cmp::Reverse;
 
 /// List devices
@@ -44,7 +44,7 @@ pub(super) async fn list(
     path = "/devices",
     operation_id = "create_device",
     tag = "devices",
-    request_body(content = schema::DeviceDefinition, description = "A device file, as `/help/data-files` describes it"),
+    request_body(content = openapi_schemas::DeviceDefinition, description = "A device file, as `/help/data-files` describes it"),
     responses(
         (status = 200, description = "Existing device with the same definition", body = Device),
         (status = 201, description = "Device", body = Device)

@@ -6,8 +6,8 @@
 
 use crate::AppState;
 use crate::event_stream::{Gone, Listening, Sender};
-use crate::extract::Params;
-use crate::problem::Refusal;
+use crate::extractors::Params;
+use crate::problem_details::Refusal;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;

@@ -5,7 +5,7 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::Idempotent;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -17,7 +17,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::job::JobId;
 use gaitwright_store::explanations::Explained;
-use gaitwright_store::{Instant, TrialId, schema, trials};
+use gaitwright_store::{Instant, TrialId, openapi_schemas, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -28,25 +28,25 @@ pub(super) struct TrialExplanation {
     /// The explanation in sentences.
     sentences: Vec<String>,
     /// Status of the solve.
-    #[schema(value_type = schema::SolveStatus)]
+    #[schema(value_type = openapi_schemas::SolveStatus)]
     status: SolveStatus,
     /// Violations of the last iterate, worst first.
-    #[schema(value_type = Vec<schema::Violation>)]
+    #[schema(value_type = Vec<openapi_schemas::Violation>)]
     violations: Vec<Violation>,
     /// Tuned bounds that conflict, and further conflicts if no single bound resolves the first one. Empty in older
     /// explanations.
-    #[schema(value_type = Vec<schema::Conflict>)]
+    #[schema(value_type = Vec<openapi_schemas::Conflict>)]
     conflicts: Vec<Conflict>,
     /// Whether the search for a conflict found a gait with the given bounds, which the solve had missed.
     gait_found: bool,
     /// Tuned bounds that are active at the last iterate.
-    #[schema(value_type = Vec<schema::BoundAtLimit>)]
+    #[schema(value_type = Vec<openapi_schemas::BoundAtLimit>)]
     at_limit: Vec<BoundAtLimit>,
     /// Effect of relaxing each bound of the first conflict alone: the smallest relaxation first, ineffective ones last.
-    #[schema(value_type = Vec<schema::Relaxation>)]
+    #[schema(value_type = Vec<openapi_schemas::Relaxation>)]
     relaxations: Vec<Relaxation>,
     /// Effect of relaxing several bounds together, if no single one helps.
-    #[schema(value_type = Vec<schema::JointRelaxation>)]
+    #[schema(value_type = Vec<openapi_schemas::JointRelaxation>)]
     together: Vec<JointRelaxation>,
     /// Version of the program that made it.
     program: String,
@@ -116,7 +116,7 @@ pub(super) async fn get(
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
-        (status = 200, description = "Finished job of the existing explanation", body = Job),
+        (status = 200, description = "Finished job for the existing explanation", body = Job),
         (status = 202, description = "Job that makes the explanation, which takes a few minutes and has lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),

@@ -3,10 +3,10 @@
 use crate::AppState;
 use crate::accessible::{Id, Named, accessible};
 use crate::authorization::Authorized;
-use crate::binary::Binary;
-use crate::extract::Params;
+use crate::extractors::Params;
 use crate::figures::{belief, lab_session, reference, study, trial};
-use crate::problem::Refusal;
+use crate::openapi_binary::Binary;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::extract::{Path, State};
 use axum::http::header;

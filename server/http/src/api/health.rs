@@ -1,10 +1,10 @@
 //! Health and readiness of the service.
 
 use crate::AppState;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
+use crate::readiness;
 use axum::Json;
 use axum::extract::State;
-use gaitwright_service::error::Error;
 use serde::Serialize;
 use std::fmt::Write;
 use utoipa::ToSchema;
@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 /// Health of the service.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Health {
-    /// `ready`, or `short_of_space` if less disk space is free than the reserve.
+    /// `healthy`, or `short_of_space` if free disk space is below the reserve.
     pub status: &'static str,
     /// Version of the program.
     pub version: &'static str,
@@ -27,29 +27,21 @@ pub struct Health {
     path = "/health",
     operation_id = "get_health",
     tag = "health",
-    responses((status = 200, description = "The service is ready", body = Health)),
+    responses((status = 200, description = "The database responds", body = Health)),
 )]
 pub(crate) async fn get(State(app): State<AppState>) -> Result<Json<Health>, Refusal> {
     // The pool returns a connection only after the database has responded.
     drop(app.read().await?);
-    let status = if app.store().room().is_ok() { "ready" } else { "short_of_space" };
+    let status = if app.store().room().is_ok() { "healthy" } else { "short_of_space" };
     Ok(Json(Health { status, version: env!("CARGO_PKG_VERSION") }))
 }
 
 /// `GET /ready`: 200 if all tasks run and the record can be written, otherwise 503 with the reason.
 ///
 /// # Errors
-/// [`Error::NotReady`] with the reason, [`Error::StorageFull`] if the disk is full.
+/// The reason, as a problem document.
 pub(crate) async fn ready(State(app): State<AppState>) -> Result<String, Refusal> {
-    if app.scheduler.stopping().is_cancelled() {
-        return Err(Error::NotReady("The service is stopping.".to_owned()).into());
-    }
-    let not_writable =
-        |reason: String| Error::NotReady(format!("The record cannot be written: {}.", reason.trim_end_matches('.')));
-    app.store().probe().await.map_err(not_writable)?;
-    if let Some(trouble) = app.scheduler.trouble() {
-        return Err(Error::NotReady(trouble).into());
-    }
+    readiness::check(&app).await?;
     let mut text = "ready".to_owned();
     // Below the reserve, answers still fit and only large work is refused.
     if let Err(shortage) = app.store().room() {
@@ -57,7 +49,7 @@ pub(crate) async fn ready(State(app): State<AppState>) -> Result<String, Refusal
         let _ = write!(text, "; {shortage}");
     }
     if app.backups.scheduled().is_some_and(|backups| backups.failure().is_some()) {
-        text.push_str("; the last scheduled backup failed, see the page System");
+        text.push_str("; the last scheduled backup failed: see the System page");
     }
     Ok(text)
 }

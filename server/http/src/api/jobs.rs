@@ -4,7 +4,7 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use crate::workers::Workers;
 use axum::Json;
@@ -133,8 +133,7 @@ pub(super) async fn get(
 
 /// Cancel a job
 ///
-/// A solve stops within one iteration, and its trial is cancelled. The cancellation of a backup needs the right
-/// `administer`.
+/// A solve stops within one iteration, and its trial is cancelled. Cancelling a backup requires the `administer` right.
 #[utoipa::path(
     post,
     path = "/jobs/{id}/cancel",

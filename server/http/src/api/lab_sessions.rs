@@ -4,10 +4,10 @@ use super::exports;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::Params;
+use crate::extractors::Params;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -18,7 +18,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
     self, GaitOfWalk, LabSessionProgress, LabSessionView, NewAnswer, NewLabSession, RecordedWalk,
 };
-use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, schema, studies};
+use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, openapi_schemas, studies};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -48,7 +48,7 @@ pub(super) async fn of_study(
 
 /// Plan a lab session
 ///
-/// A walk without the device, then one with each gait, in an order that is drawn now and concealed.
+/// The session consists of a walk without the device, then one with each gait, in an order that is drawn at random on planning and concealed.
 #[utoipa::path(
     post,
     path = "/studies/{id}/lab-sessions",
@@ -104,8 +104,8 @@ pub(super) struct OfWalk {
 /// Download the controller file of a lab walk
 ///
 /// The file does not name the trial, but comparing it with the controller files of both gaits reveals the allocation.
-/// It is meant for the device, which uses a token with the scope `device` only. If anybody else fetches it, the session
-/// and the audit trail record it, and later answers of that caller do not count as blind.
+/// It is meant for the device, which uses a token with only the `device` scope. If anybody else fetches the file, the
+/// session and the audit trail record this, and later answers of that caller do not count as blind.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/controller.json",
@@ -116,7 +116,7 @@ pub(super) struct OfWalk {
         ("walk" = u8, Query, description = "2 or 3. Walk 1 is without the device"),
         ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")
     ),
-    responses((status = 200, description = "Controller file", body = schema::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Controller file", body = openapi_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["device"]), ("session" = ["device"])),
 )]
 pub(super) async fn controller(
@@ -196,8 +196,8 @@ pub(super) struct UnblindSession {
 
 /// Unblind a lab session
 ///
-/// Reveals which gait each walk used, to all readers. The audit trail records it, later walks are marked, and the
-/// answer of the subject becomes a preference of the study.
+/// Reveals to all readers which gait each walk used. The audit trail records the unblinding, later walks are marked as
+/// recorded after it, and the answer of the subject becomes a preference of the study.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/unblind",

@@ -6,7 +6,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -16,10 +16,10 @@ use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
-    self, Brought, Checked, EmgView, LimitCycles, MeasurementFormat, NewEmg, NewMotion,
+    self, Checked, EmgView, LimitCycles, MeasurementFormat, NewEmg, NewMotion, UploadedFile,
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile};
-use gaitwright_store::{LabSessionId, MeasurementFileId, schema};
+use gaitwright_store::{LabSessionId, MeasurementFileId, openapi_schemas};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -80,7 +80,7 @@ pub(super) async fn content(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<MeasurementFileId, Read>,
 ) -> Result<Response, Refusal> {
-    let Brought { recording, format, file } = lab::brought(&mut *app.read().await?, id).await?;
+    let UploadedFile { recording, format, file } = lab::brought(&mut *app.read().await?, id).await?;
     let text = app.compute(move |pool| file.text(pool)).await??;
     let (kind, ending) = match format {
         MeasurementFormat::Csv => ("text/csv; charset=utf-8", "csv"),
@@ -161,8 +161,8 @@ async fn keep(
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Processing {
-    /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings have their defaults.
-    #[schema(value_type = schema::EmgSettings)]
+    /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
+    #[schema(value_type = openapi_schemas::EmgSettings)]
     settings: EmgSettings,
 }
 

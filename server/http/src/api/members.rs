@@ -5,7 +5,7 @@ use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -18,15 +18,16 @@ use utoipa::ToSchema;
 
 /// List members of a study
 ///
-/// Raters can access studies of which they are members. Clinicians, and tokens with more scopes than `rate`, can access
-/// every unrestricted study, and restricted studies as members. A request for any other study is answered with 404.
+/// Raters can access studies of which they are members. Clinicians, and tokens with any scope besides `rate`, can
+/// access every unrestricted study, and the restricted studies of which they are members. A request for any other study
+/// is answered with 404.
 #[utoipa::path(
     get,
     path = "/studies/{id}/members",
     operation_id = "list_study_members",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "A page, in the order in which they were added", body = Page<Member>)),
+    responses((status = 200, description = "A page of members, in the order in which they were added", body = Page<Member>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(

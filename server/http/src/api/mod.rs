@@ -3,6 +3,7 @@
 
 mod access_log;
 mod archive;
+mod ask_tell;
 mod assessments;
 mod audit;
 mod backups;
@@ -26,7 +27,6 @@ mod preferences;
 mod recommendation;
 mod reference_gaits;
 mod safety_reports;
-mod scripts;
 mod sessions;
 mod studies;
 mod subjects;
@@ -102,8 +102,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(figures::of_belief))
         .routes(routes!(figures::of_reference))
         // scripts of the lab
-        .routes(routes!(scripts::ask))
-        .routes(routes!(scripts::tell))
+        .routes(routes!(ask_tell::ask))
+        .routes(routes!(ask_tell::tell))
         // blind comparisons
         .routes(routes!(blind::next))
         .routes(routes!(blind::motion))

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -11,7 +11,7 @@ use gait_optimizer::walking::stick_figure::{StickFigure, stick_figures};
 use gaitwright_charts::gait_series::points;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_store::{TrialId, gaits, schema};
+use gaitwright_store::{TrialId, gaits, openapi_schemas};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -30,7 +30,7 @@ pub(crate) struct Motion {
 #[derive(Debug, Serialize, ToSchema)]
 struct Frame {
     #[serde(flatten)]
-    #[schema(value_type = schema::StickFigure)]
+    #[schema(value_type = openapi_schemas::StickFigure)]
     figure: StickFigure,
     /// Name of the domain.
     domain: String,

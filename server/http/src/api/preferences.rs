@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::csv_response::csv_response;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -21,7 +21,7 @@ use utoipa::ToSchema;
 
 /// List preferences of a study
 ///
-/// Retracted ones included, oldest first.
+/// Includes retracted preferences. Oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/preferences",
@@ -128,7 +128,7 @@ pub(super) async fn get(
 pub(super) struct CreatedPreference {
     #[serde(flatten)]
     row: FeedbackRow,
-    /// Answers of other people to the same comparison, at most the newest twenty.
+    /// Other people's answers to the same comparison; at most the newest twenty.
     other_answers: Vec<FeedbackId>,
 }
 

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::csv_response::csv_response;
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -13,13 +13,13 @@ use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::choice::ranking_to_show;
-use gaitwright_service::studies::recommended::{self, CertificateState};
+use gaitwright_service::studies::certified_best::{self, CertificateState};
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_service::studies::walkable::Grounds;
 use gaitwright_service::studies::walkable::WalkableGait;
 use gaitwright_store::trials::Trial;
-use gaitwright_store::{StudyId, TrialId, schema, studies};
+use gaitwright_store::{StudyId, TrialId, openapi_schemas, studies};
 use serde::Serialize;
 use std::sync::Arc;
 use utoipa::ToSchema;
@@ -33,9 +33,9 @@ pub(super) struct Recommendation {
     best: Recommended,
     /// State of the certificate of its gait.
     certificate: CertificateState,
-    /// Reasons if it failed.
+    /// Reasons if the certificate failed.
     failures: Vec<String>,
-    /// If it failed, the best action whose gait passed.
+    /// If the certificate failed, the best action whose gait passed.
     passing: Option<Recommended>,
     /// Whether gaits of the study are being certified, so that the recommendation may change.
     certifying: bool,
@@ -49,7 +49,7 @@ struct Recommended {
     /// Number of the trial.
     number: u32,
     /// Action as bounds.
-    #[schema(value_type = schema::Bounds)]
+    #[schema(value_type = openapi_schemas::Bounds)]
     bounds: TunedBounds,
     /// Gait RMSE of the trial, rad.
     gait_rmse_rad: Option<f64>,
@@ -71,7 +71,7 @@ impl Recommended {
 
 /// Get the recommendation of a study
 ///
-/// The tried action that the learner believes to be the best.
+/// Of the actions tried, the one that the learner believes to be the best.
 #[utoipa::path(
     get,
     path = "/studies/{id}/recommendation",
@@ -144,7 +144,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         Error::conflict("The study has no recommendation yet, because it has no gait or no preference.")
     })?;
     let mut reader = app.read().await?;
-    let without_certificate = recommended::judged(&mut reader, &ranking).await?.without_certificate;
+    let without_certificate = certified_best::judged(&mut reader, &ranking).await?.without_certificate;
     let certifying = without_certificate.is_some_and(|next| app.scheduler.certify_best_of(id, next));
     // Read last, so that it includes every certificate if none is being made.
     let grounds = Grounds::read(&mut reader, id).await?;
@@ -162,7 +162,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         };
         return Err(Error::conflict(why).into());
     };
-    let judged = recommended::judged(&mut reader, &ranking[place..]).await?;
+    let judged = certified_best::judged(&mut reader, &ranking[place..]).await?;
     drop(reader);
     Ok(Recommendation {
         study_id: id,

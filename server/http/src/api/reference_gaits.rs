@@ -5,7 +5,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;

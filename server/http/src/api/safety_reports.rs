@@ -5,7 +5,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -110,7 +110,8 @@ pub(super) async fn report(
 /// Review the safety reports of a gait
 ///
 /// If the gait may be walked again, it can be recommended, compared and planned again, and the preferences derived from
-/// the reports are retracted. When a lab session is unblinded later, its report makes the gait unsafe again.
+/// the reports are retracted. If a lab session with a report about the gait is unblinded later, that report makes the
+/// gait unsafe again.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reviews",

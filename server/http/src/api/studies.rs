@@ -3,18 +3,18 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::entity_tag::{IfMatch, tagged};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
-use crate::revision::{IfMatch, tagged};
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Read, Run};
-use gaitwright_service::studies::change::{self, Change, Extend, Fork};
 use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
-use gaitwright_service::studies::plan::{self, NewStudy};
+use gaitwright_service::studies::study_change::{self, Change, Extend, Fork};
+use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::studies::{self, Chosen, Study, StudyState};
 use gaitwright_store::trials::{self, TrialCounts};
 use gaitwright_store::{Connection, LentWriter, StudyId, SubjectId};
@@ -127,7 +127,7 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = plan::create_by(&mut writer, &request.caller, new).await?;
+    let study = study_plan::create_by(&mut writer, &request.caller, new).await?;
     made(&app, &request, writer, study).await
 }
 
@@ -272,7 +272,7 @@ pub(super) async fn patch(
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let study = change::change(&mut writer, &request.actor, id, &new).await?;
+    let study = study_change::change(&mut writer, &request.actor, id, &new).await?;
     let revision = study.revision;
     let view = StudyView::of(&mut writer, study).await?;
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
@@ -302,7 +302,7 @@ pub(super) async fn extend(
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let study = change::extend(&mut writer, &request.actor, id, &more).await?;
+    let study = study_change::extend(&mut writer, &request.actor, id, &more).await?;
     let revision = study.revision;
     let view = StudyView::of(&mut writer, study).await?;
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
@@ -330,7 +330,7 @@ pub(super) async fn fork(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = change::fork(&mut writer, &request.actor, id, &differs).await?;
+    let study = study_change::fork(&mut writer, &request.actor, id, &differs).await?;
     made(&app, &request, writer, study).await
 }
 

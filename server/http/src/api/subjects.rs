@@ -5,7 +5,7 @@ use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -16,7 +16,7 @@ use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
 use gaitwright_service::studies::subject::{self, NewCorrection, NewSubject};
 use gaitwright_store::consents::{self, Consent};
 use gaitwright_store::subjects::{self, Correction, Subject};
-use gaitwright_store::{SubjectId, schema};
+use gaitwright_store::{SubjectId, openapi_schemas};
 
 /// List subjects
 ///
@@ -179,7 +179,7 @@ pub(super) async fn corrections(
     Ok(Json(paging.cut(subjects::corrections(&mut reader, id).await?, |correction| correction.seq)?))
 }
 
-/// Correct height and mass of a subject
+/// Correct the height and mass of a subject
 ///
 /// New studies use the corrected values. Existing studies keep theirs.
 #[utoipa::path(
@@ -214,7 +214,7 @@ pub(super) async fn correct(
     operation_id = "get_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = schema::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = openapi_schemas::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn muscles(
@@ -236,8 +236,8 @@ pub(super) async fn muscles(
     operation_id = "set_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    request_body(content = schema::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the published table"),
-    responses((status = 200, description = "Muscle values", body = schema::MuscleParameters)),
+    request_body(content = openapi_schemas::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the published table"),
+    responses((status = 200, description = "Muscle values", body = openapi_schemas::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn set_muscles(

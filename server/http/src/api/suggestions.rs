@@ -5,7 +5,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -17,7 +17,7 @@ use gaitwright_store::{StudyId, studies};
 
 /// List suggestions of a study
 ///
-/// Retracted ones included, oldest first.
+/// Includes retracted preferences. Oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/suggestions",

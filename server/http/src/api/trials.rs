@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::csv_response::csv_response;
 use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -16,10 +16,10 @@ use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::command;
-use gaitwright_store::listing::{self, Listing, SORTS};
 use gaitwright_store::results::{self, AttemptResult};
 use gaitwright_store::trials::{self, Trial, TrialState};
-use gaitwright_store::{StudyId, TrialId, gaits, schema, studies};
+use gaitwright_store::trials_table::{self, Listing, SORTS};
+use gaitwright_store::{StudyId, TrialId, gaits, openapi_schemas, studies};
 use serde::Deserialize;
 use std::collections::HashMap;
 
@@ -75,7 +75,7 @@ pub(super) async fn of_study(
         limit: paging.to_read(),
         offset,
     };
-    let places: Vec<(u32, TrialId)> = listing::of_study(&mut reader, id, &listing)
+    let places: Vec<(u32, TrialId)> = trials_table::of_study(&mut reader, id, &listing)
         .await?
         .iter()
         .map(|row| row.id)
@@ -187,7 +187,7 @@ pub(super) async fn retry(
     operation_id = "list_iterations",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Iterations", body = Page<schema::Iteration>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Iterations", body = Page<openapi_schemas::Iteration>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn iterations(

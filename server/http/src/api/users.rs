@@ -6,11 +6,11 @@ use crate::authorization::Authorized;
 use crate::authorization::SignedIn;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gaitwright_service::access::people::{self, NewUser};
+use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Administer, Right, Role};
 use gaitwright_service::error::Error;
 use gaitwright_store::UserId;
@@ -102,7 +102,7 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let user = people::add(&mut writer, &request.actor, &new).await?;
+    let user = user_administration::add(&mut writer, &request.actor, &new).await?;
     request.created(&app, writer, format!("/api/v1/users/{}", user.id), &user).await
 }
 
@@ -115,7 +115,7 @@ pub(super) struct Link {
 
 /// Create a sign-in link for a user
 ///
-/// The link works once, within a day. Does not accept an Idempotency-Key.
+/// The link works once, within a day. The request does not accept an Idempotency-Key.
 #[utoipa::path(
     post,
     path = "/users/{id}/link",
@@ -132,7 +132,7 @@ pub(super) async fn link(
     request: Idempotent<Administer>,
 ) -> Result<Response, Refusal> {
     let mut writer = request.begin_secret(&app).await?;
-    let secret = people::link(&mut writer, &request.actor, id).await?;
+    let secret = user_administration::link(&mut writer, &request.actor, id).await?;
     request.done(&app, writer, &Link { path: format!("/sign-in/{secret}") }).await
 }
 
@@ -184,7 +184,7 @@ pub(super) struct NewRole {
 
 /// Change the role of a user
 ///
-/// Tokens that a former administrator created are revoked.
+/// If the user is no longer an administrator, the tokens that the user created are revoked.
 #[utoipa::path(
     put,
     path = "/users/{id}/role",
@@ -204,7 +204,7 @@ pub(super) async fn set_role(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let user = people::set_role(&mut writer, &request.actor, id, new.role).await?;
+    let user = user_administration::set_role(&mut writer, &request.actor, id, new.role).await?;
     request.done(&app, writer, &user).await
 }
 
@@ -218,6 +218,6 @@ async fn set_disabled(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let user = people::set_disabled(&mut writer, &request.actor, id, disabled).await?;
+    let user = user_administration::set_disabled(&mut writer, &request.actor, id, disabled).await?;
     request.done(app, writer, &user).await
 }

@@ -1,14 +1,14 @@
 //! The figures of what the learner believes about the search space of a study.
 
 use crate::format::{meaning, percent, signed};
-use crate::state::AppState;
+use crate::shared_state::AppState;
 use gait_learner::{Dimension, LearnerError, Marginal, SearchSpace};
 use gaitwright_charts::{Cell, Chart, Figure, HeatMap, Stroke};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::{Belief, MOST_ANSWERS};
-use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId, studies, trials};
 use serde::Deserialize;
@@ -188,7 +188,7 @@ pub(crate) fn maps(
 /// The text below each map.
 pub(crate) const MAP_NOTES: [&str; 2] = [
     "Mean ± standard deviation. The frame marks the best action.",
-    "The small numbers count the trials with these two values: yes, converged; no, not converged.",
+    "The small numbers count the trials with these two values: yes means converged, no means not converged.",
 ];
 
 /// How many trials with these levels converged and how many did not.

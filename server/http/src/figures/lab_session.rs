@@ -1,7 +1,7 @@
 //! The figures of a lab session.
 
 use super::lab_charts;
-use crate::state::AppState;
+use crate::shared_state::AppState;
 use gait_optimizer::Gait;
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;

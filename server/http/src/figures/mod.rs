@@ -1,15 +1,15 @@
 //! Figures of studies, trials, lab sessions, beliefs and reference gaits, for pages and for downloads.
 
 pub(crate) mod belief;
-mod course;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
 mod outcome;
 pub(crate) mod reference;
 pub(crate) mod study;
+mod study_progress;
 mod study_results;
 pub(crate) mod trial;
 
-pub(crate) use course::{COURSE, course, warm_starts};
 pub(crate) use outcome::Outcome;
+pub(crate) use study_progress::{COURSE, course, warm_starts};
 pub(crate) use study_results::{StudyResults, have_one_reference_gait};

@@ -3,10 +3,10 @@
 use gait_learner::LearnerError;
 use gaitwright_compute::OnPool;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::choice::{last_believed, ranking_to_show};
 use gaitwright_service::studies::comparison::open_question;
 use gaitwright_service::studies::history::{self, Milestone};
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::trial_choice::{last_believed, ranking_to_show};
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 

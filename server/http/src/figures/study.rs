@@ -1,9 +1,9 @@
 //! The figures of a study, or of two.
 
-use super::course::{COURSE, course, warm_starts};
 use super::outcome::Outcome;
+use super::study_progress::{COURSE, course, warm_starts};
 use super::study_results::{StudyResults, have_one_reference_gait};
-use crate::state::AppState;
+use crate::shared_state::AppState;
 use gait_optimizer::walking::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::{Chart, Figure, band_in_words, gait_charts};
@@ -108,7 +108,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
     let mut course_hint = "Figure 3b of the paper, which compares a study with muscles and one without.";
     if !have_one_reference_gait(&snapshots.iter().map(|(snapshot, _)| *snapshot).collect::<Vec<_>>()) {
         snapshots.truncate(1);
-        course_hint = "The studies have different reference gaits, so their Gait RMSE cannot be compared.";
+        course_hint = "The studies have different reference gaits, so their Gait RMSE values cannot be compared.";
     }
     let gaits: Vec<(&str, &Gait)> = shown.iter().filter_map(|best| Some((best.name(), best.gait.as_ref()?))).collect();
     let mut tiles = Vec::new();

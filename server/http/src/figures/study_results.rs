@@ -4,8 +4,8 @@ use super::outcome::Outcome;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
 

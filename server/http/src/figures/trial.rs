@@ -1,9 +1,9 @@
 //! The figures of a trial: its gait, its solve, and its gait beside that of another trial.
 
-use crate::state::AppState;
+use crate::shared_state::AppState;
 use gait_optimizer::walking::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
-use gaitwright_charts::{Figure, gait_charts};
+use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::answer;
@@ -26,7 +26,8 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
     drop(reader);
     let draw = move |pool: &OnPool| {
         let (gait, iterations) = (gait.unpack(pool)?, iterations.unpack(pool)?);
-        let mut figures = vec![gait_charts::tiles(stick_figures(&gait)?)];
+        let mut figures =
+            vec![gait_charts::tiles(stick_figures(&gait)?), gait_charts::animation(WalkerFigure::new(&gait)?)];
         for group in gait_charts::of_gait(&gait, &reference)? {
             figures.extend(group.figures);
         }

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::extract::Params;
+use crate::extractors::Params;
 use crate::format::words;
 use crate::page_error::{Page, page};
 use askama::Template;

@@ -4,7 +4,7 @@ use super::page_chart::Drawn;
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::extract::Params;
+use crate::extractors::Params;
 use crate::figures::belief::{
     AxisChoice, Believed, DimensionChoice, MAP_NOTES, Maps, believed, chosen, maps, marginals,
 };
@@ -18,8 +18,8 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::{Belief, Comparison};
-use gaitwright_service::studies::choice::ranking_to_show;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::studies::Study;
 use gaitwright_store::{StudyId, TrialId, studies};
 use std::sync::Arc;

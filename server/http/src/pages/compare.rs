@@ -1,36 +1,35 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::page_chart::Drawn;
+use super::page_chart::{Drawn, shared_legend};
 use super::study::{answer_in_words, assessment_in_words};
+use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::{Form, Params};
+use crate::extractors::{Form, Params};
 use crate::figures::trial;
+use crate::form_errors;
 use crate::page_error::{Page, PageError, page};
-use crate::problem::Problem;
-use crate::refusal;
+use crate::problem_details::Problem;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
-use gait_optimizer::Gait;
-use gait_optimizer::walking::stick_figure::stick_figures;
-use gaitwright_charts::{Figure, gait_tiles};
+use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
 use gaitwright_service::studies::answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::assessment::{self, NewAssessment};
-use gaitwright_service::studies::choice::MANY;
 use gaitwright_service::studies::comparison::{Question, open_question};
 use gaitwright_service::studies::preference::{self, CurrentAnswer};
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::walkable;
-use gaitwright_store::feedback::{FeedbackRow, Source};
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::idempotency::{self, Kept, fingerprint};
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
@@ -88,8 +87,10 @@ struct ComparePage {
     a: Option<(TrialId, u32)>,
     b: Option<(TrialId, u32)>,
     charts: Vec<Drawn>,
-    /// Both strides as pictures, for readers without scripts or with reduced motion; empty if they cannot be drawn.
-    strides: Vec<String>,
+    /// The legend of all charts.
+    legend: Vec<(String, String)>,
+    /// Both gaits; empty if they cannot be drawn.
+    walking: Vec<WalkingGait>,
     key: FeedbackId,
     saved: Option<Saved>,
     /// Whether the study waits for an answer.
@@ -128,6 +129,8 @@ struct Saved {
     at: String,
     retracted: bool,
     is_safety_report: bool,
+    /// The gaits of the comparison.
+    pair: Option<(TrialId, TrialId)>,
     /// Answers of others to the same comparison: author and text.
     other_answers: Vec<(String, String)>,
 }
@@ -224,17 +227,18 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
         let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
         let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
         let charts = trial::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
-        let stride = |gait: &Gait| stick_figures(gait).ok().map(|figures| gait_tiles(&figures));
-        Ok::<_, Error>((charts, [&gait_a, &gait_b].into_iter().filter_map(stride).collect()))
+        let walking = walking_pair([(a, of_a, "Gait A".to_owned(), &gait_a), (b, of_b, "Gait B".to_owned(), &gait_b)]);
+        Ok::<_, Error>((charts, walking.into_iter().flatten().collect()))
     };
-    let (charts, strides) = app.compute(draw).await.map_err(Error::from)??;
+    let (mut charts, walking): (Vec<Drawn>, _) = app.compute(draw).await.map_err(Error::from)??;
     page(&ComparePage {
         study: snapshot.study,
         trials,
         a,
         b,
+        legend: shared_legend(&mut charts),
         charts,
-        strides,
+        walking,
         key: FeedbackId::fresh(),
         saved,
         waits,
@@ -262,6 +266,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 at: row.created_at.minute(),
                 retracted: row.retraction.is_some(),
                 is_safety_report: false,
+                pair: compared(&row.content),
                 other_answers,
             })
         }
@@ -276,6 +281,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 at: assessment.created_at.minute(),
                 retracted: assessment.retraction.is_some(),
                 is_safety_report: assessment.answer.is_about_safety(),
+                pair: Some((assessment.first, assessment.second)),
                 other_answers: Vec::new(),
             })
         }
@@ -343,7 +349,7 @@ impl Submitted {
             "unsafe_b" => assessment(presentations::Judgement::UnsafeSecond),
             "unsafe_both" => assessment(presentations::Judgement::UnsafeBoth),
             other => {
-                return Err(Error::invalid("answer", other, "one of the answers of the form"));
+                return Err(Error::invalid("answer", other, "one of the answers on the form"));
             }
         };
         Ok((judgement, identifier("key", &self.key)?))
@@ -404,7 +410,7 @@ pub(super) async fn post(
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            (None, Problem::from(&error).status(), refusal::of_form(&error, &LABELS))
+            (None, Problem::from(&error).status(), form_errors::of_form(&error, &LABELS))
         }
         Err(other) => return Err(other.into()),
     };
@@ -456,6 +462,16 @@ async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitte
         // The page shows no blinded answer, and no suggestion as an answer: the refusal says that there is one.
         CurrentAnswer::Blind(_) | CurrentAnswer::Suggestion(_) => None,
     }))
+}
+
+/// The two trials of an answer, the earlier one first, so that the order does not repeat the answer.
+fn compared(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
+    match *content {
+        FeedbackContent::Preference { winner: one, loser: other } | FeedbackContent::Tie { a: one, b: other } => {
+            Some((one.min(other), one.max(other)))
+        }
+        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
+    }
 }
 
 /// The form to retract an answer.

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::Form;
+use crate::extractors::Form;
 use crate::format;
 use crate::page_error::{Page, PageError, page};
 use askama::Template;

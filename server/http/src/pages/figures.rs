@@ -4,7 +4,7 @@ use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
-use crate::extract::Params;
+use crate::extractors::Params;
 use crate::figures::study::{Section, StudyFigures, of_study};
 use crate::page_error::{Page, page};
 use crate::visible::Visible;

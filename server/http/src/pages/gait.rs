@@ -1,10 +1,11 @@
 //! The page of a trial and its gait.
 
-use super::bound_use::{self, BoundUse};
 use super::certificate;
 use super::explanation::NoGait;
 use super::gait_summary::GaitSummary;
-use super::page_chart::Drawn;
+use super::joint_peaks::JointPeaks;
+use super::page_chart::{Drawn, shared_legend};
+use super::reached_bounds::{self, BoundUse};
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::format::{self, words};
@@ -13,9 +14,8 @@ use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
-use gait_optimizer::{Gait, IterationRecord, ReferenceGait, TunedBounds};
-use gaitwright_charts::Figure;
-use gaitwright_charts::gait_charts;
+use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
+use gaitwright_charts::{Figure, Ghost, WalkerFigure, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Answer, Permission, Read, Run};
 use gaitwright_service::error::Error;
@@ -47,6 +47,10 @@ struct GaitPage {
     solve: Option<Drawn>,
     /// The stride as a row of pictures.
     tiles: Option<Drawn>,
+    /// The walker, which a script moves.
+    walker: Option<Drawn>,
+    /// Largest torques and powers of each joint.
+    peaks: Vec<JointPeaks>,
     /// Each bound with the value that the gait reaches.
     bounds: Vec<BoundUse>,
     /// Why the trial has no gait.
@@ -107,14 +111,15 @@ pub(super) async fn get(
     drop(reader);
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
-    let (action, converged) = (trial.action, trial.state == TrialState::Converged);
+    let converged = trial.state == TrialState::Converged;
+    let tried = trial.clone();
     let drawn = move |pool: &OnPool| {
         let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
         let (gait, iterations) = gait.transpose()?.unzip();
         // Charts show what they can of a malformed gait; figures of it would be false.
         let well_formed = gait.as_ref().filter(|gait| converged && gait.validate().is_ok());
         let summary = well_formed.map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
-        Ok::<_, Error>((draw(id, gait.as_ref(), &reference, &iterations.unwrap_or_default(), &action)?, summary))
+        Ok::<_, Error>((draw(&tried, gait.as_ref(), &reference, &iterations.unwrap_or_default())?, summary))
     };
     let (drawn, summary) = app.compute(drawn).await.map_err(Error::from)??;
     page(&GaitPage {
@@ -135,6 +140,8 @@ pub(super) async fn get(
         groups: drawn.groups,
         solve: drawn.solve,
         tiles: drawn.tiles,
+        walker: drawn.walker,
+        peaks: drawn.peaks,
         phases: gait_charts::PHASES,
         unsafe_by,
         unsafe_elsewhere,
@@ -150,6 +157,10 @@ struct Group {
     id: &'static str,
     heading: &'static str,
     hint: String,
+    /// The legend of all charts; empty if each has its own.
+    legend: Vec<(String, String)>,
+    /// Whether the charts mark stance and swing.
+    has_stances: bool,
     charts: Vec<Drawn>,
 }
 
@@ -158,31 +169,45 @@ struct Everything {
     groups: Vec<Group>,
     solve: Option<Drawn>,
     tiles: Option<Drawn>,
+    walker: Option<Drawn>,
+    peaks: Vec<JointPeaks>,
     bounds: Vec<BoundUse>,
 }
 
 fn draw(
-    id: TrialId,
+    trial: &Trial,
     gait: Option<&Gait>,
     reference: &ReferenceGait,
     iterations: &[IterationRecord],
-    action: &TunedBounds,
 ) -> Result<Everything, Error> {
-    let files = format!("/api/v1/trials/{id}/figures");
+    let files = format!("/api/v1/trials/{}/figures", trial.id);
     let drawn = |figure: &Figure| Drawn::of(figure, &files, "");
     let groups = gait.map(|gait| gait_charts::of_gait(gait, reference)).transpose()?.unwrap_or_default();
-    let group = |group: gait_charts::Group| Group {
-        id: group.id,
-        heading: group.heading,
-        hint: group.hint,
-        charts: group.figures.iter().map(drawn).collect(),
+    let group = |group: gait_charts::Group| {
+        let mut charts: Vec<Drawn> = group.figures.iter().map(drawn).collect();
+        Group {
+            id: group.id,
+            heading: group.heading,
+            has_stances: group.marks_stances(),
+            hint: group.hint,
+            legend: shared_legend(&mut charts),
+            charts,
+        }
     };
+    let walker = |gait: &Gait| {
+        let figure = WalkerFigure::new(gait)?.with_ghost(Ghost::of_reference(gait, reference)?);
+        let svg = figure.svg("The walker");
+        Ok::<_, Error>(Drawn { svg, ..drawn(&gait_charts::animation(figure)) })
+    };
+    let unchanged = trial.report.as_ref().map_or(&[][..], |report| &report.unchanged_bounds);
     let tiles = gait.map(stick_figures).transpose()?.map(gait_charts::tiles);
     Ok(Everything {
         groups: groups.into_iter().map(group).collect(),
         solve: gait_charts::solve(iterations).as_ref().map(drawn),
         tiles: tiles.as_ref().map(drawn),
-        bounds: bound_use::of(action, gait)?,
+        walker: gait.map(walker).transpose()?,
+        peaks: gait.map(JointPeaks::of).unwrap_or_default(),
+        bounds: reached_bounds::of(&trial.action, gait, unchanged)?,
     })
 }
 

@@ -1,7 +1,7 @@
 //! The guides of the repository, embedded into the binary, so that a lab without internet has them.
 
 use crate::page_error::{Page, page};
-use crate::problem::Refusal;
+use crate::problem_details::Refusal;
 use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::Extension;

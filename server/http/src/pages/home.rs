@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::authorization::SignedIn;
 use crate::authorization::{Authorized, Refused};
-use crate::extract::Params;
+use crate::extractors::Params;
 use crate::format::{variant, words};
 use crate::page_error::{Page, page};
 use askama::Template;
@@ -37,7 +37,7 @@ struct Home {
 
 /// Which studies to show.
 #[derive(Debug, Deserialize)]
-pub(super) struct Before {
+pub(super) struct StudyFilter {
     before: Option<StudyId>,
 }
 
@@ -65,7 +65,7 @@ pub(super) async fn get(
     SignedIn(caller): SignedIn,
     authorized: Result<Authorized<Read>, Refused>,
     State(app): State<AppState>,
-    Params(Before { before }): Params<Before>,
+    Params(StudyFilter { before }): Params<StudyFilter>,
 ) -> Result<Response, Refused> {
     match authorized {
         Ok(authorized) => Ok(show(&app, &authorized, before).await.into_response()),

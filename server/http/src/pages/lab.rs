@@ -5,13 +5,13 @@ use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::Form;
+use crate::extractors::Form;
 use crate::figures::lab_charts;
 use crate::figures::lab_session::measured_cycles;
+use crate::form_errors;
 use crate::format::{self, words};
 use crate::page_error::{Page, PageError, page};
-use crate::problem::Problem;
-use crate::refusal;
+use crate::problem_details::Problem;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -24,9 +24,9 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
     self, Condition, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkView,
 };
-use gaitwright_store::listing::Listed;
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
+use gaitwright_store::trials_table::Listed;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 
@@ -123,7 +123,7 @@ pub(super) async fn plan(
     match planned.await {
         Ok(session) => Ok(Redirect::to(&format!("/lab-sessions/{session}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let form = show_list(&app, id, true, fields, Some(refusal::of_form(&error, &LABELS))).await?;
+            let form = show_list(&app, id, true, fields, Some(form_errors::of_form(&error, &LABELS))).await?;
             Ok((Problem::from(&error).status(), form).into_response())
         }
         Err(other) => Err(other.into()),
@@ -360,7 +360,7 @@ pub(super) async fn answer(
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/lab-sessions/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, forms, Some(refusal::in_words(&error))).await?;
+            let shown = show(app, id, caller, forms, Some(form_errors::in_words(&error))).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

@@ -3,22 +3,24 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::Form;
+use crate::extractors::Form;
+use crate::form_errors;
 use crate::format::walks_in_words;
 use crate::page_error::{Page, PageError, page};
-use crate::problem::Problem;
-use crate::refusal;
+use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::Rate;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, LabSessionProgress, NewAnswer, RecordedWalk};
-use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members};
+use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members, now};
 use serde::Deserialize;
 
 /// How many of the newest open sessions are listed.
 const LISTED: u32 = 100;
+/// How long a closed session stays in the list, s: a fall may be reported late.
+const LISTED_SECONDS: i64 = 7 * 86_400;
 
 #[derive(Template)]
 #[template(path = "lab.html")]
@@ -63,13 +65,15 @@ pub(super) struct Walked {
 pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppState>) -> Page {
     let mut reader = app.read().await?;
     let mut sessions = Vec::new();
-    for session in lab_sessions::open(&mut reader, authorized.caller.reach(), LISTED).await? {
+    let since = now().plus_seconds(-LISTED_SECONDS);
+    for session in lab_sessions::open_since(&mut reader, authorized.caller.reach(), LISTED, since).await? {
         let seen = lab::session_progress(&mut reader, session.id).await?;
         let next = match (seen.walk, seen.answer_number) {
+            _ if seen.closed => "closed; a walk can still be reported as unsafe".to_owned(),
             _ if seen.was_unsafe() => "a walk was reported as unsafe".to_owned(),
             (Some(walk), _) => format!("walk {walk} is next"),
             (None, Some(_)) => "all walks recorded, answer pending".to_owned(),
-            (None, None) => "all walks recorded and answered".to_owned(),
+            (None, None) => "all walks recorded, question answered".to_owned(),
         };
         sessions.push((session.id, session.created_at, next));
     }
@@ -101,8 +105,8 @@ pub(super) async fn record(
         if !lab::was_recorded(&mut writer, id, &walked).await? {
             if complete.as_deref() != Some("yes") {
                 return Err(Error::conflict(format!(
-                    "Walk {walk} was not recorded. First tick that it is complete and measured: a recorded walk cannot be \
-                     undone."
+                    "Walk {walk} was not recorded. First tick the box to confirm that it is complete and \
+                     measured: a recorded walk cannot be undone."
                 )));
             }
             lab::record_walk(&mut writer, &authorized.caller.actor, id, &walked).await?;
@@ -154,7 +158,7 @@ async fn read_back(
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/lab/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, Some(refusal::in_words(&error)), typed).await?;
+            let shown = show(app, id, Some(form_errors::in_words(&error)), typed).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

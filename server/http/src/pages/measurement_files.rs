@@ -5,7 +5,7 @@ use super::measurement_forms::{EmgFields, Forms, MotionFields, Settings};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::Form;
+use crate::extractors::Form;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Response;

@@ -5,11 +5,11 @@ use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id, Named};
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
-use crate::extract::Form;
+use crate::extractors::Form;
+use crate::form_errors;
 use crate::format;
 use crate::page_error::{Page, PageError, page};
-use crate::problem::Problem;
-use crate::refusal;
+use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -127,7 +127,7 @@ pub(super) async fn post(
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
             drop(writer);
-            let shown = Visible { refused: Some(refusal::in_words(&error)), typed: asked.name, link: None };
+            let shown = Visible { refused: Some(form_errors::in_words(&error)), typed: asked.name, link: None };
             Ok((Problem::from(&error).status(), show(&app, &authorized.caller, id, shown).await?).into_response())
         }
         Err(error) => Err(error.into()),

@@ -1,18 +1,20 @@
 //! HTML pages, rendered on the server and usable without scripts.
 
 mod access_log;
+mod api_reference;
 mod audit;
 mod belief;
-mod bound_use;
 mod certificate;
 mod compare;
 mod devices;
+mod disk_space_notice;
 mod explanation;
 mod figures;
 mod gait;
 mod gait_summary;
 mod help;
 mod home;
+mod joint_peaks;
 mod lab;
 mod lab_walk;
 mod measurement_files;
@@ -20,11 +22,10 @@ mod measurement_forms;
 mod members;
 mod muscles;
 mod new_study;
-mod notice;
 mod page_chart;
-mod problems;
+mod problem_types;
 mod rate;
-mod reference;
+mod reached_bounds;
 mod reference_gaits;
 mod safety_review;
 mod side_by_side;
@@ -34,6 +35,7 @@ mod subject;
 mod system;
 mod unsent_form;
 mod users;
+mod walking_pair;
 
 use super::AppState;
 use axum::Router;
@@ -94,14 +96,14 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/help", get(help::contents))
         .route("/help/{name}", get(help::guide))
         .route("/help/images/{name}", get(help::image))
-        .route("/problems", get(problems::list))
-        .route("/problems/{name}", get(problems::get))
-        .route("/api", get(reference::get))
+        .route("/problems", get(problem_types::list))
+        .route("/problems/{name}", get(problem_types::get))
+        .route("/api", get(api_reference::get))
         .route("/sign-in", get(sign_in::get).post(sign_in::post))
         .route("/sign-in/{link}", get(sign_in::link).post(sign_in::use_link))
         .route("/sign-out", post(sign_in::out))
         .route("/account/sessions", post(sign_in::end_session))
         .route("/account", get(sign_in::account).post(sign_in::set_password))
         .route_layer(from_fn_with_state(state.clone(), unsent_form::keep))
-        .route_layer(from_fn_with_state(state.clone(), notice::show))
+        .route_layer(from_fn_with_state(state.clone(), disk_space_notice::show))
 }

@@ -3,11 +3,11 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::Form;
+use crate::extractors::Form;
+use crate::form_errors;
 use crate::format;
 use crate::page_error::{Page, PageError, page};
-use crate::problem::Problem;
-use crate::refusal;
+use crate::problem_details::Problem;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -91,7 +91,7 @@ fn shown(
     };
     let rows: Vec<Row> = KINDS.iter().map(row).collect();
     let cell = rows.iter().flat_map(|row| &row.cells).find(|cell| cell.refused);
-    let message = refused.as_ref().zip(cell).map(|(refused, cell)| refusal::of_field(&cell.label, refused));
+    let message = refused.as_ref().zip(cell).map(|(refused, cell)| form_errors::of_field(&cell.label, refused));
     let refused = refused.map(|refused| FieldError { message: message.unwrap_or(refused.message), ..refused });
     MusclesPage { subject, columns: MuscleOverride::FIELDS, rows, scaled_to_body, may_run, refused }
 }

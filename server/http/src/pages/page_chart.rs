@@ -39,10 +39,51 @@ impl Drawn {
         let (svg, legend) = match &figure.drawing {
             Drawing::Chart(chart) => return Self { files, ..Self::new(chart) },
             Drawing::Tiles(_, stick_figures) => (gait_tiles(stick_figures), Vec::new()),
+            // Pages show the walker itself, which a script moves.
+            Drawing::Animation(..) => (String::new(), Vec::new()),
             Drawing::Map(map) => (map.svg(), Vec::new()),
             Drawing::Tree(tree) => (tree.svg(), Vec::new()),
         };
         let is_wide = matches!(figure.drawing, Drawing::Tiles(..) | Drawing::Map(_));
         Self { title: figure.title().to_owned(), note: "", svg, is_wide, legend, files }
+    }
+}
+
+/// Moves the legends of charts into one legend for all of them; empty if a key means different things in them.
+pub(super) fn shared_legend(charts: &mut [Drawn]) -> Vec<(String, String)> {
+    let mut shared: Vec<(String, String)> = Vec::new();
+    for (class, label) in charts.iter().flat_map(|chart| &chart.legend) {
+        match shared.iter().find(|(known, _)| known == class) {
+            None => shared.push((class.clone(), label.clone())),
+            Some((_, known)) if known != label => return Vec::new(),
+            Some(_) => {}
+        }
+    }
+    if charts.len() < 2 {
+        return Vec::new();
+    }
+    for chart in charts {
+        chart.legend.clear();
+    }
+    shared
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_legend(entries: &[(&str, &str)]) -> Drawn {
+        let legend = entries.iter().map(|(class, label)| ((*class).to_owned(), (*label).to_owned())).collect();
+        Drawn { legend, ..Drawn::new(&Chart::new("", "", "")) }
+    }
+
+    #[test]
+    fn charts_share_a_legend_if_their_keys_agree() {
+        let mut charts = [with_legend(&[("c0", "left")]), with_legend(&[("c0", "left"), ("c3", "right")])];
+        let shared = shared_legend(&mut charts);
+        assert_eq!(shared.iter().map(|(_, label)| label.as_str()).collect::<Vec<_>>(), ["left", "right"]);
+        assert!(charts.iter().all(|chart| chart.legend.is_empty()));
+        let mut charts = [with_legend(&[("c0", "hip")]), with_legend(&[("c0", "knee")])];
+        assert!(shared_legend(&mut charts).is_empty() && !charts[0].legend.is_empty());
     }
 }

@@ -4,10 +4,10 @@ use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::{Form as Submitted, Params};
+use crate::extractors::{Form as Submitted, Params};
 use crate::figures::reference;
+use crate::form_errors;
 use crate::page_error::{Page, PageError, page};
-use crate::refusal;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -133,7 +133,7 @@ pub(super) async fn import(
         Ok(definition) => definition,
         Err(Error::Invalid(refused)) => {
             let empty = ReferenceGaitsPage::read(&mut *app.read().await?, None, true).await?;
-            let form = page(&ReferenceGaitsPage { fields, refused: Some(refusal::with_label(*refused)), ..empty })?;
+            let form = page(&ReferenceGaitsPage { fields, refused: Some(form_errors::with_label(*refused)), ..empty })?;
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response());
         }
         Err(other) => return Err(other.into()),

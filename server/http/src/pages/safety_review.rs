@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::Form;
+use crate::extractors::Form;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;

@@ -1,10 +1,11 @@
 //! The page that compares two studies in one chart and one table.
 
 use super::page_chart::Drawn;
+use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
-use crate::extract::Params;
+use crate::extractors::Params;
 use crate::figures::{COURSE, Outcome, StudyResults, course, have_one_reference_gait};
 use crate::format::{self, words};
 use crate::page_error::{Page, page};
@@ -17,7 +18,7 @@ use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_store::studies::{Chosen, Study};
-use gaitwright_store::{StudyId, studies};
+use gaitwright_store::{StudyId, TrialId, gaits, studies, trials};
 use serde::Deserialize;
 use std::sync::Arc;
 
@@ -54,6 +55,8 @@ struct Compared {
     chart: Option<Drawn>,
     /// Names of studies without a best action to draw.
     without_course: Vec<String>,
+    /// The best gaits of both studies; empty if one has none.
+    walking: Vec<WalkingGait>,
     /// Property, value of each study, and whether the values differ.
     rows: Vec<(String, String, String, bool)>,
 }
@@ -76,7 +79,8 @@ pub(super) async fn get(
             let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
             drop(reader);
             let beliefs = Arc::clone(&app.beliefs);
-            Some(app.compute(move |pool| compare(pool, a, b, &beliefs)).await.map_err(Error::from)??)
+            let compared = app.compute(move |pool| compare(pool, a, b, &beliefs)).await.map_err(Error::from)??;
+            Some(with_best_gaits(&mut app, compared).await?)
         }
         _ => {
             drop(reader);
@@ -86,7 +90,29 @@ pub(super) async fn get(
     page(&SideBySide { offered, a, b, compared })
 }
 
-/// The properties and results of the study.
+/// Adds the best gaits.
+async fn with_best_gaits(
+    app: &mut AppState,
+    (mut compared, best): (Compared, [Option<TrialId>; 2]),
+) -> Result<Compared, Error> {
+    let [Some(a), Some(b)] = best else { return Ok(compared) };
+    let mut reader = app.read().await?;
+    let numbers = [trials::get(&mut reader, a).await?.number, trials::get(&mut reader, b).await?.number];
+    let gaits = gaits::find(&mut reader, a).await?.zip(gaits::find(&mut reader, b).await?);
+    drop(reader);
+    let Some((gait_a, gait_b)) = gaits else { return Ok(compared) };
+    let names = [&compared.a, &compared.b].map(|study| study.plan.name.clone());
+    let draw = move |pool: &OnPool| {
+        let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
+        let [name_a, name_b] = names;
+        Ok::<_, Error>(
+            walking_pair([(a, numbers[0], name_a, &gait_a), (b, numbers[1], name_b, &gait_b)]).into_iter().flatten(),
+        )
+    };
+    compared.walking = app.compute(draw).await??.collect();
+    Ok(compared)
+}
+
 /// The properties and results of a study.
 fn rows(study: &StudyResults, outcome: &Outcome, comparable: bool) -> Vec<(String, String)> {
     let plan = &study.snapshot.study.plan;
@@ -119,7 +145,12 @@ fn rows(study: &StudyResults, outcome: &Outcome, comparable: bool) -> Vec<(Strin
     rows
 }
 
-fn compare(pool: &OnPool, a: StudyResults, b: StudyResults, beliefs: &Beliefs) -> Result<Compared, Error> {
+fn compare(
+    pool: &OnPool,
+    a: StudyResults,
+    b: StudyResults,
+    beliefs: &Beliefs,
+) -> Result<(Compared, [Option<TrialId>; 2]), Error> {
     let (of_a, of_b) = (a.outcome(pool, beliefs)?, b.outcome(pool, beliefs)?);
     let comparable = have_one_reference_gait(&[&a.snapshot, &b.snapshot]);
     let both = [(&a.snapshot, &of_a), (&b.snapshot, &of_b)];
@@ -130,12 +161,15 @@ fn compare(pool: &OnPool, a: StudyResults, b: StudyResults, beliefs: &Beliefs) -
     });
     let properties = rows(&a, &of_a, comparable).into_iter().zip(rows(&b, &of_b, comparable));
     let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, outcome)| outcome.course().is_empty());
-    Ok(Compared {
+    let best = [of_a.best, of_b.best];
+    let compared = Compared {
+        walking: Vec::new(),
         rows: properties.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
         without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
         comparable,
         chart,
         a: a.snapshot.study,
         b: b.snapshot.study,
-    })
+    };
+    Ok((compared, best))
 }

@@ -1,22 +1,22 @@
 //! Signing in and out, and the user's own account.
 
 use super::unsent_form::{SignInPage, Unsent, send_now};
+use crate::authentication::{browser_cookie, browser_of, cookie, session_of};
 use crate::authorization::SignedIn;
-use crate::extract::Form;
+use crate::extractors::Form;
+use crate::form_errors;
 use crate::format;
-use crate::identify::{browser_cookie, browser_of, cookie, session_of};
 use crate::page_error::{Page, PageError, page};
-use crate::refusal;
 use crate::{AppState, ClientAddress};
 use askama::Template;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse, Redirect, Response};
-use gaitwright_service::access::back_off::{self, Attempt, Origin};
-use gaitwright_service::access::{Caller, Role, password, people, secret, sign_in};
+use gaitwright_service::access::back_off::{self, Origin, PasswordAttempt};
+use gaitwright_service::access::{Caller, Role, password, secret, sign_in, user_administration};
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::sessions::{From, Session};
+use gaitwright_store::sessions::{Session, SignInOrigin};
 use gaitwright_store::users::User;
 use gaitwright_store::{Connection, Instant, LentWriter, UserId, Writer, commit, sessions, users};
 use serde::Deserialize;
@@ -87,11 +87,11 @@ impl Visit {
     }
 
     /// The secret of the browser's cookie, and the origin that a new session records.
-    fn begins(&self) -> Result<(String, From), Error> {
+    fn begins(&self) -> Result<(String, SignInOrigin), Error> {
         let kept = self.kept.clone().map_or_else(secret::fresh, Ok)?;
         let browser_hash = Some(secret::hash(&kept));
         let address = Some(self.address.to_string());
-        Ok((kept, From { address, browser: self.browser.clone(), browser_hash }))
+        Ok((kept, SignInOrigin { address, browser: self.browser.clone(), browser_hash }))
     }
 }
 
@@ -103,7 +103,7 @@ async fn compare<'a>(
     name: &str,
     user: Option<&User>,
     password: String,
-) -> Result<Result<Option<(LentWriter<'a>, Attempt)>, Duration>, Error> {
+) -> Result<Result<Option<(LentWriter<'a>, PasswordAttempt)>, Duration>, Error> {
     let (mut writer, now) = app.write_access().await?;
     let origin = visit.origin(&mut writer, user).await?;
     let network = origin.network.clone();
@@ -275,14 +275,14 @@ pub(super) async fn set_password(
     let name = user.name.clone();
     let hashed = match secret::aside(move || secret::hash_password_of(&name, &form.password)).await? {
         Err(Error::Invalid(field)) => {
-            shown.refused = Some(refusal::with_label(*field).message);
+            shown.refused = Some(form_errors::with_label(*field).message);
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
         }
         hashed => hashed?,
     };
     let (kept, from) = visit.begins()?;
     let (mut writer, now) = app.write_access().await?;
-    let user = people::set_password(&mut writer, &actor, user.id, &hashed).await?;
+    let user = user_administration::set_password(&mut writer, &actor, user.id, &hashed).await?;
     let session = sign_in::renewed(&mut writer, &user, &from).await?;
     shown.sessions = own_sessions(&mut writer, &app, user.id, Some(&session), now).await?;
     commit(writer).await?;

@@ -3,11 +3,11 @@
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
-use crate::extract::{Form, Params};
+use crate::extractors::{Form, Params};
+use crate::form_errors;
 use crate::format::{variant, words};
 use crate::page_error::{Page, PageError, page};
-use crate::problem::Problem;
-use crate::refusal;
+use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -63,8 +63,8 @@ impl Described {
 /// Height and mass as typed.
 fn body_of(height: &str, mass: &str) -> Result<(f64, f64), Error> {
     let number = |field, text: &str, allowed| text.trim().parse().map_err(|_| Error::invalid(field, text, allowed));
-    let height = number("height_m", height, "a number in metres, as in 1.75")?;
-    Ok((height, number("body_mass_kg", mass, "a number in kilograms, as in 65.7")?))
+    let height = number("height_m", height, "a number in metres, such as 1.75")?;
+    Ok((height, number("body_mass_kg", mass, "a number in kilograms, such as 65.7")?))
 }
 
 struct Row {
@@ -142,7 +142,7 @@ pub(super) async fn add(
     };
     let status = Problem::from(&error).status();
     let refused = match error {
-        Error::Invalid(refused) => refusal::with_label(*refused),
+        Error::Invalid(refused) => form_errors::with_label(*refused),
         // The only possible conflict is a pseudonym that is taken.
         other => {
             FieldError { message: other.to_string(), ..FieldError::new("pseudonym", fields.pseudonym.clone(), "") }
@@ -323,7 +323,7 @@ async fn answer(
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, Some(refusal::in_words(&error))).await?;
+            let shown = show(app, id, caller, Some(form_errors::in_words(&error))).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

@@ -4,7 +4,7 @@
 
 use crate::AppState;
 use crate::authorization::SignedIn;
-use crate::extract::unreadable;
+use crate::extractors::unreadable;
 use crate::page_error::{PageError, is_for_programs, page};
 use askama::Template;
 use axum::body::Bytes;

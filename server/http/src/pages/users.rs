@@ -3,17 +3,17 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
-use crate::extract::Form;
+use crate::extractors::Form;
+use crate::form_errors;
 use crate::format;
 use crate::page_error::{Page, PageError, page};
-use crate::problem::Problem;
-use crate::refusal;
+use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::people::{self, NewUser};
 use gaitwright_service::access::tokens::{self as making, NewToken};
+use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Administer, Caller, Right, Role, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_store::sessions::Session;
@@ -30,7 +30,10 @@ const SCOPES: [(Right, &str); 5] = [
     (Right::Run, "create, start and stop studies; ask for trials and report their outcomes"),
     (Right::Answer, "answer comparisons and review safety reports"),
     (Right::Rate, "compare gaits blind"),
-    (Right::Device, "fetch the controller files of walks; for the device in the lab, with no other scope"),
+    (
+        Right::Device,
+        "fetch the controller files of walks; for the device in the lab, without any other scope: otherwise its downloads count as not blind",
+    ),
 ];
 
 /// How many networks with failed sign-ins are shown.
@@ -75,7 +78,7 @@ impl Refused {
         let find = |name: &str| FIELDS.iter().find(|(field, form, _)| *field == name && *form == act);
         let (field, message) = match error {
             Error::Invalid(fault) => match find(&fault.field) {
-                Some((field, _, label)) => (Some(*field), refusal::of_field(label, fault)),
+                Some((field, _, label)) => (Some(*field), form_errors::of_field(label, fault)),
                 None => (None, error.to_string()),
             },
             // The only conflict that these forms can have is a name that is taken.
@@ -221,22 +224,24 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
     let done = |text: String| Outcome { done: Some(text), secret: None };
     match asked.act.as_str() {
         "add_user" => {
-            let user = people::add(writer, actor, &NewUser { name: asked.name.clone(), role: asked.role()? }).await?;
-            let secret = people::link(writer, actor, user.id).await?;
+            let user =
+                user_administration::add(writer, actor, &NewUser { name: asked.name.clone(), role: asked.role()? })
+                    .await?;
+            let secret = user_administration::link(writer, actor, user.id).await?;
             Ok(link(&user, origin, &secret))
         }
         "link" => {
             let id: UserId = asked.id()?;
-            let secret = people::link(writer, actor, id).await?;
+            let secret = user_administration::link(writer, actor, id).await?;
             Ok(link(&users::get(writer, id).await?, origin, &secret))
         }
         "disable" | "enable" => {
             let disabled = asked.act == "disable";
-            let user = people::set_disabled(writer, actor, asked.id()?, disabled).await?;
+            let user = user_administration::set_disabled(writer, actor, asked.id()?, disabled).await?;
             Ok(done(format!("{} is {}.", user.name, if disabled { "disabled" } else { "enabled again" })))
         }
         "role" => {
-            let user = people::set_role(writer, actor, asked.id()?, asked.role()?).await?;
+            let user = user_administration::set_role(writer, actor, asked.id()?, asked.role()?).await?;
             Ok(done(format!("{} now has the role {}.", user.name, format::role(&user.role))))
         }
         "end_session" => {
@@ -269,7 +274,7 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
 
 fn link(user: &User, origin: &str, secret: &str) -> Outcome {
     Outcome {
-        done: Some(format!("Created a sign-in link for {}. It works once, within a day.", user.name)),
+        done: Some(format!("Created a sign-in link for {}. It works only once and expires after a day.", user.name)),
         secret: Some(("Sign-in link", format!("{origin}/sign-in/{secret}"))),
     }
 }

@@ -55,7 +55,7 @@ struct Count {
 /// An attempt whose password may be checked.
 #[derive(Debug)]
 #[must_use]
-pub struct Attempt {
+pub struct PasswordAttempt {
     name: String,
     counts: Vec<Count>,
     origin: Origin,
@@ -72,7 +72,7 @@ pub async fn begin(
     now: Instant,
     name: &str,
     origin: Origin,
-) -> Result<Result<Attempt, Duration>, Error> {
+) -> Result<Result<PasswordAttempt, Duration>, Error> {
     prune(writer, now).await?;
     let name = normal(name);
     let mut own = Count::of_origin(&name, &origin);
@@ -106,10 +106,10 @@ pub async fn begin(
         let before = count.failures(writer).await?.map_or(0, |found| found.count);
         count.set(writer, now, before.saturating_add(1)).await?;
     }
-    Ok(Ok(Attempt { name, counts, origin, attempts }))
+    Ok(Ok(PasswordAttempt { name, counts, origin, attempts }))
 }
 
-impl Attempt {
+impl PasswordAttempt {
     /// Records a wrong password and starts the wait.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use gaitwright_store::{TokenId, UserId};
 pub struct Caller {
     /// The actor in the audit trail.
     pub actor: Actor,
-    /// Name shown to people.
+    /// Name shown to users.
     pub name: String,
     /// The user, unless the caller is a token or not signed in.
     pub user: Option<UserId>,

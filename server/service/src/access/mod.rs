@@ -5,17 +5,17 @@
 
 pub mod back_off;
 mod caller;
-pub mod clock;
 mod likely_words;
+pub mod monotonic_clock;
 pub mod password;
-pub mod people;
 mod permission;
 pub mod secret;
 pub mod sign_in;
 pub mod tokens;
+pub mod user_administration;
 
 pub use caller::Caller;
-pub use clock::Clock;
 pub use gaitwright_store::accessible_studies::{Principal, Reach};
 pub use gaitwright_store::rights::{Right, Rights, Role};
+pub use monotonic_clock::Clock;
 pub use permission::{Administer, Answer, Anything, Device, Permission, Rate, Read, Run};

@@ -1,10 +1,10 @@
 //! Sessions: sign-in, sign-out, expiry, and the caller of a session or token.
 
 use super::caller::Caller;
-use super::{clock, secret};
+use super::{monotonic_clock, secret};
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::sessions::{From, Session};
+use gaitwright_store::sessions::{Session, SignInOrigin};
 use gaitwright_store::users::{self, User};
 use gaitwright_store::{Connection, Instant, SessionId, UserId, Writer, sessions, tokens};
 use serde::Serialize;
@@ -19,14 +19,14 @@ const LINK_IS_FRESH_SECONDS: f64 = 3600.0;
 
 /// When sessions expire.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct SessionLimits {
     /// Time without a request after which a session expires.
     pub idle_seconds: f64,
     /// Time after which a session expires in any case.
     pub lifetime_seconds: f64,
 }
 
-impl Limits {
+impl SessionLimits {
     fn has_ended(&self, session: &Session, now: Instant) -> bool {
         now.seconds_since(session.seen_at) > self.idle_seconds
             || now.seconds_since(session.created_at) > self.lifetime_seconds
@@ -38,14 +38,14 @@ impl Limits {
 /// # Errors
 /// [`Error::NotSignedIn`] if the link is unknown, used or expired, or its user is disabled.
 pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String), Error> {
-    with_link_from(writer, link, &From::default()).await
+    with_link_from(writer, link, &SignInOrigin::default()).await
 }
 
 /// [`with_link`], and records the origin.
 ///
 /// # Errors
 /// As [`with_link`]. The caller must commit even then, to record the expiry.
-pub async fn with_link_from(writer: &mut Writer, link: &str, from: &From) -> Result<(User, String), Error> {
+pub async fn with_link_from(writer: &mut Writer, link: &str, from: &SignInOrigin) -> Result<(User, String), Error> {
     let refused = || {
         Error::NotSignedIn(
             "This link was already used or has expired. Ask an administrator for another one.".to_owned(),
@@ -53,7 +53,7 @@ pub async fn with_link_from(writer: &mut Writer, link: &str, from: &From) -> Res
     };
     let hash = secret::hash(link);
     let (id, expires_at) = sessions::link(writer, &hash).await?.ok_or_else(refused)?;
-    let now = clock::recorded(writer).await?;
+    let now = monotonic_clock::recorded(writer).await?;
     let user = users::get(writer, id).await?;
     if expires_at <= now {
         sessions::use_link(writer, &hash, now).await?;
@@ -71,7 +71,7 @@ pub async fn with_link_from(writer: &mut Writer, link: &str, from: &From) -> Res
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn with_password(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
+pub async fn with_password(writer: &mut Writer, user: &User, from: &SignInOrigin) -> Result<String, Error> {
     begin(writer, user, By::Password, from).await
 }
 
@@ -83,7 +83,7 @@ enum By {
     Password,
 }
 
-async fn begin(writer: &mut Writer, user: &User, by: By, from: &From) -> Result<String, Error> {
+async fn begin(writer: &mut Writer, user: &User, by: By, from: &SignInOrigin) -> Result<String, Error> {
     let secret = renew(writer, user, by == By::Link, from).await?;
     let actor = Caller::person(user.id, &user.name, user.role).actor;
     let detail = json!({ "by": by, "address": from.address });
@@ -95,13 +95,13 @@ async fn begin(writer: &mut Writer, user: &User, by: By, from: &From) -> Result<
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn renewed(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
+pub async fn renewed(writer: &mut Writer, user: &User, from: &SignInOrigin) -> Result<String, Error> {
     renew(writer, user, false, from).await
 }
 
-async fn renew(writer: &mut Writer, user: &User, by_link: bool, from: &From) -> Result<String, Error> {
+async fn renew(writer: &mut Writer, user: &User, by_link: bool, from: &SignInOrigin) -> Result<String, Error> {
     let secret = secret::fresh()?;
-    let now = clock::recorded(writer).await?;
+    let now = monotonic_clock::recorded(writer).await?;
     sessions::begin(writer, &secret::hash(&secret), user.id, by_link, from, now).await?;
     Ok(secret)
 }
@@ -117,7 +117,7 @@ pub async fn must_say_password(db: &mut Connection, user: &User, session: Option
     }
     let Some(session) = session else { return Ok(true) };
     let found = sessions::find(db, &secret::hash(session)).await?;
-    let now = clock::recorded(db).await?;
+    let now = monotonic_clock::recorded(db).await?;
     let by_fresh_link = found.filter(|session| {
         session.by_link && session.user_id == user.id && now.seconds_since(session.created_at) <= LINK_IS_FRESH_SECONDS
     });
@@ -149,7 +149,7 @@ pub async fn out(writer: &mut Writer, actor: &Actor, session: &str) -> Result<()
 /// # Errors
 /// Errors of the database.
 pub async fn end(writer: &mut Writer, actor: &Actor, session: &Session) -> Result<(), Error> {
-    let now = clock::recorded(writer).await?;
+    let now = monotonic_clock::recorded(writer).await?;
     if sessions::end(writer, session.id, now).await? {
         let detail = json!({ "session": session.id });
         audit::append(writer, actor, "session.end", &format!("user {}", session.user_id), &detail).await?;
@@ -164,7 +164,7 @@ pub async fn end(writer: &mut Writer, actor: &Actor, session: &Session) -> Resul
 pub async fn live(
     db: &mut Connection,
     user: Option<UserId>,
-    limits: Limits,
+    limits: SessionLimits,
     now: Instant,
 ) -> Result<Vec<Session>, Error> {
     let mut found = sessions::live(db, user).await?;
@@ -192,7 +192,12 @@ pub enum Recognised {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_session(db: &mut Connection, session: &str, limits: Limits, now: Instant) -> Result<Recognised, Error> {
+pub async fn of_session(
+    db: &mut Connection,
+    session: &str,
+    limits: SessionLimits,
+    now: Instant,
+) -> Result<Recognised, Error> {
     let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(Recognised::Nobody) };
     if limits.has_ended(&found, now) {
         return Ok(Recognised::Ended(Some(found.id)));
@@ -212,7 +217,7 @@ pub async fn of_session(db: &mut Connection, session: &str, limits: Limits, now:
 pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<Recognised, Error> {
     let Some(found) = tokens::by_hash(db, &secret::hash(token)).await? else { return Ok(Recognised::Nobody) };
     if let Some(expires_at) = found.expires_at.filter(|expires_at| *expires_at <= now) {
-        let noted = gaitwright_store::clock::latest(db).await?.is_some_and(|latest| latest >= expires_at);
+        let noted = gaitwright_store::access_clock::latest(db).await?.is_some_and(|latest| latest >= expires_at);
         return Ok(if noted { Recognised::Nobody } else { Recognised::Ended(None) });
     }
     Ok(Recognised::Known { caller: Caller::token(found.id, &found.name, &found.scopes), seen: None })
@@ -223,7 +228,7 @@ pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<
 /// # Errors
 /// Errors of the database.
 pub async fn seen(writer: &mut Writer, session: SessionId, now: Instant) -> Result<(), Error> {
-    gaitwright_store::clock::reach(writer, now).await?;
+    gaitwright_store::access_clock::reach(writer, now).await?;
     Ok(sessions::seen(writer, session, now).await?)
 }
 
@@ -232,7 +237,7 @@ pub async fn seen(writer: &mut Writer, session: SessionId, now: Instant) -> Resu
 /// # Errors
 /// Errors of the database.
 pub async fn note_ended(writer: &mut Writer, session: Option<SessionId>, now: Instant) -> Result<(), Error> {
-    gaitwright_store::clock::reach(writer, now).await?;
+    gaitwright_store::access_clock::reach(writer, now).await?;
     if let Some(session) = session {
         sessions::end(writer, session, now).await?;
     }

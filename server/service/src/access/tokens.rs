@@ -1,6 +1,6 @@
 //! Tokens of programs: creation and revocation.
 
-use super::clock;
+use super::monotonic_clock;
 use super::secret;
 use crate::error::Error;
 use crate::printable;
@@ -45,7 +45,7 @@ pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<
         return Err(Error::invalid("days", json!(new.days), &format!("1 to {LONGEST_DAYS}, or absent")));
     }
     let secret = format!("gait_{}", secret::fresh()?);
-    let now = clock::recorded(writer).await?;
+    let now = monotonic_clock::recorded(writer).await?;
     let ends = new.days.map(|days| now.plus_seconds(i64::from(days) * 86_400));
     let token = tokens::insert(writer, name, &secret::hash(&secret), &new.scopes, actor, ends)
         .await

@@ -26,7 +26,7 @@ pub enum PairAnswer {
     NoDifference,
 }
 
-/// A preference to give.
+/// A preference to record.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(as = NewPreference)]
@@ -37,7 +37,7 @@ pub struct Answer {
     pub trial_b: TrialId,
     /// Which gait is better.
     pub answer: PairAnswer,
-    /// Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    /// Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     #[serde(default)]
     pub source: Option<Source>,
     /// Name or pseudonym of the author. Defaults to the caller's name.

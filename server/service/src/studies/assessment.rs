@@ -23,9 +23,9 @@ pub struct NewAssessment {
     pub first: TrialId,
     /// Trial of the other gait.
     pub second: TrialId,
-    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. Which gait is better is a preference.
+    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. To state which gait is better, record a preference instead.
     pub answer: Judgement,
-    /// Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    /// Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     #[serde(default)]
     pub source: Option<Source>,
     /// Name or pseudonym of the author. Defaults to the caller's name.
@@ -106,7 +106,9 @@ pub async fn retract(
     }
     consents::may_be_shown(writer, assessment.study_id).await?;
     if assessment.answer.is_about_safety() {
-        return Err(Error::conflict("A safety report cannot be retracted. Staff review it, and can clear the gait."));
+        return Err(Error::conflict(
+            "A safety report cannot be retracted. Staff will review it and can clear the gait.",
+        ));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", reason, " that say why the assessment is retracted")?;

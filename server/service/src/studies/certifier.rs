@@ -4,10 +4,10 @@
 //! The next gait derives from the record alone, so the task continues after a crash.
 
 use super::belief::Beliefs;
-use super::choice::ranking_to_show;
 use super::job::JobState;
 use super::snapshot::StudySnapshot;
-use super::{certification, recommended};
+use super::trial_choice::ranking_to_show;
+use super::{certification, certified_best};
 use crate::error::Error;
 use crate::workers::Certify;
 use gaitwright_compute::OnPool;
@@ -205,7 +205,7 @@ impl Certifier {
         let rank = move |pool: &OnPool| ranking_to_show(pool, &snapshot, &beliefs);
         let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
         let refused = self.state().refused.clone();
-        let next = recommended::next_to_certify(&mut *self.store.read().await?, &ranking, &refused).await?;
+        let next = certified_best::next_to_certify(&mut *self.store.read().await?, &ranking, &refused).await?;
         let Some(trial) = next else { return Ok(false) };
         self.certify(trial).await?;
         Ok(true)

@@ -1,6 +1,6 @@
 //! Chooses the pairs that are compared, and answers them from Gait RMSE where no person does.
 
-use super::motion::is_same_gait;
+use super::same_motion::is_same_gait;
 use super::snapshot::StudySnapshot;
 use super::walkable::{NotWalkable, WalkablePair};
 use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_among};

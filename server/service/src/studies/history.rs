@@ -16,13 +16,13 @@ use utoipa::ToSchema;
 pub struct Milestone {
     /// Number of results so far, from 1.
     pub iteration: u32,
-    /// Best trial at that time.
+    /// Best trial after this iteration.
     pub trial_id: TrialId,
-    /// Number of that trial.
+    /// Number of the best trial.
     pub number: u32,
-    /// Gait RMSE of that trial, rad. Absent if it did not converge.
+    /// Gait RMSE of the best trial, rad. Absent if it did not converge.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport of that trial.
+    /// Cost of transport of the best trial.
     pub cost_of_transport: Option<f64>,
 }
 

@@ -1,6 +1,6 @@
 //! Access to a study: adds and removes members, restricts the study to them, and invites raters. For pages and REST.
 
-use crate::access::people::{self, NewUser};
+use crate::access::user_administration::{self, NewUser};
 use crate::access::{Caller, Principal, Reach, Role};
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
@@ -125,9 +125,9 @@ pub async fn invite(
     let user = match users::by_name(writer, name).await? {
         Some(user) if user.role == Role::Rater => user,
         Some(_) => return Err(Error::invalid("name", name, "the name of a rater or a name that is not taken")),
-        None => people::add(writer, actor, &NewUser { name: name.to_owned(), role: Role::Rater }).await?,
+        None => user_administration::add(writer, actor, &NewUser { name: name.to_owned(), role: Role::Rater }).await?,
     };
-    let secret = people::link(writer, actor, user.id).await?;
+    let secret = user_administration::link(writer, actor, user.id).await?;
     let present = members::of_study(writer, study).await?;
     let present = present.into_iter().find(|member| member.kind == MemberKind::User && member.name == user.name);
     let member = match present {

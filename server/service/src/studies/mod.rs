@@ -1,6 +1,6 @@
 //! The tuning loop, and the rules for studies and trials.
 //!
-//! The rules ([`lifecycle`], [`trial_state`], [`choice`], [`comparison`]) are pure functions of the record. The
+//! The rules ([`lifecycle`], [`trial_state`], [`trial_choice`], [`comparison`]) are pure functions of the record. The
 //! [`Scheduler`](scheduler::Scheduler) applies them: it proposes trials, dispatches solves and records results. All its
 //! state is in the record, so a new process continues where a killed one stopped.
 
@@ -9,45 +9,46 @@ pub mod archive;
 pub mod assessment;
 pub mod belief;
 pub mod blind;
-pub mod catalogue;
+pub mod built_in_entries;
 pub mod certification;
+pub mod certified_best;
 mod certifier;
-pub mod change;
-pub mod choice;
 pub mod command;
 pub mod comparison;
 pub mod consent;
 pub mod device;
+pub mod equal_actions;
 mod explainer;
 pub mod explanation;
 pub mod history;
 pub mod job;
 pub mod job_status;
 pub mod lab;
+pub mod lab_script;
 pub mod lifecycle;
 pub mod membership;
-pub mod motion;
 pub mod nearest_reference;
 mod next_step;
-pub mod plan;
-mod plans_under_way;
+mod planning_tasks;
 pub mod preference;
 mod prefetch;
-pub mod recommended;
 pub mod reference_import;
 pub mod retention;
 pub mod safety_report;
 pub mod safety_reports;
 pub mod safety_review;
+pub mod same_motion;
 pub mod scheduler;
-pub mod script;
-pub mod search;
+pub mod search_space;
 pub mod seed;
 pub mod snapshot;
 pub mod solve_input;
+pub mod study_change;
+pub mod study_plan;
 pub mod subject;
 pub mod suggestion;
 pub mod summary;
+pub mod trial_choice;
 pub mod trial_result;
 pub mod trial_state;
 pub mod walkable;

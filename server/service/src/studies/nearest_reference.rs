@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 pub struct ReferenceGaitMatch {
     /// The reference gait.
     pub reference_gait: ReferenceGait,
-    /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
+    /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait does not state height and mass.
     pub distance: Option<f64>,
 }
 

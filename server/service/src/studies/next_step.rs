@@ -1,16 +1,18 @@
 //! Decides what a study needs next (a trial, a question, the end), as a pure function of its snapshot.
 
 use super::belief::Beliefs;
-use super::choice;
 use super::comparison::{self, Question};
 use super::lifecycle::Act;
 use super::snapshot::StudySnapshot;
+use super::trial_choice;
 use crate::error::Error;
+use gait_learner::ActionIndex;
 use gaitwright_compute::OnPool;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{FeedbackId, now};
+use std::collections::HashSet;
 
 /// After this many failed trials in a row a study is paused, because its set-up is probably wrong.
 const FAILURES_IN_A_ROW: usize = 3;
@@ -63,14 +65,22 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
         return Ok(Step::Nothing);
     }
     let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;
-    match choice::next_trial(pool, snapshot, &belief) {
+    match trial_choice::next_trial(pool, snapshot, &belief) {
         Ok(new) => Ok(Step::Try(new)),
-        Err(e) if e.is_exhausted() && open == 0 => {
-            Ok(Step::Act(Act::Finish, "Every action of the search space was tried.".into()))
-        }
+        Err(e) if e.is_exhausted() && open == 0 => Ok(Step::Act(Act::Finish, all_known(snapshot))),
         Err(e) if e.is_exhausted() => Ok(Step::Nothing),
-        Err(choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
-        Err(choice::ChoiceError::Bounds(e)) => Err(e.into()),
+        Err(trial_choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
+        Err(trial_choice::ChoiceError::Bounds(e)) => Err(e.into()),
+    }
+}
+
+/// Why no action is left.
+fn all_known(snapshot: &StudySnapshot) -> String {
+    let tried: HashSet<ActionIndex> = snapshot.trials.iter().map(|trial| trial.action_index).collect();
+    if (tried.len() as u64) < snapshot.study.plan.search_space.len() {
+        "Every action of the search space was tried or has the gait of one that was tried.".to_owned()
+    } else {
+        "Every action of the search space was tried.".to_owned()
     }
 }
 

@@ -69,7 +69,7 @@ pub enum Strikes {
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewReferenceGait {
-    /// Name shown to people.
+    /// Name shown to users.
     pub name: String,
     /// File format of the recording.
     #[serde(default)]
@@ -90,7 +90,7 @@ pub struct NewReferenceGait {
     /// How to find right heel strikes if `heel_strikes_s` is empty.
     #[serde(default)]
     pub strikes: Strikes,
-    /// Times of right heel strikes, s. Empty: detect them.
+    /// Times of right heel strikes, s. If empty, they are detected.
     #[serde(default)]
     pub heel_strikes_s: Vec<f64>,
     /// Height of the recorded person, m.

@@ -17,7 +17,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewSafetyReport)]
 pub struct Report {
-    /// Who reports: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    /// Who reports: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     #[serde(default)]
     pub source: Option<Source>,
     /// Name or pseudonym of the author. Defaults to the caller's name.

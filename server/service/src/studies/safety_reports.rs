@@ -1,6 +1,6 @@
 //! Collects the safety reports and the "cannot tell" answers of a study from all places where people give them.
 
-use super::motion::Motion;
+use super::same_motion::GaitMotion;
 use crate::access::Reach;
 use gait_optimizer::TunedBounds;
 use gaitwright_store::presentations::Judgement;
@@ -82,12 +82,12 @@ pub struct ClosedMotion {
     number: u32,
     /// Whether its study has the device of the study for which the reports were read.
     same_device: bool,
-    motion: Option<Motion>,
+    motion: Option<GaitMotion>,
 }
 
 impl ClosedMotion {
     /// Whether the report is about this motion of a trial of the study for which the reports were read.
-    fn has(&self, motion: &Motion) -> bool {
+    fn has(&self, motion: &GaitMotion) -> bool {
         self.motion.as_ref().is_some_and(|own| {
             if self.same_device { own.is_same(motion) } else { own.is_same_with_another_device(motion) }
         })
@@ -144,7 +144,7 @@ impl SafetyReports {
     ) -> StoreResult<()> {
         for report in closed {
             let trial = trials::get(db, report.trial).await?;
-            let (number, motion) = (trial.number, Motion::of(&trial));
+            let (number, motion) = (trial.number, GaitMotion::of(&trial));
             self.motions.push(ClosedMotion { report, study, number, same_device, motion });
         }
         Ok(())
@@ -236,14 +236,14 @@ impl SafetyReports {
             return None;
         }
         let own = self.motions.iter().find(|closed| closed.report.trial == trial.id);
-        own.or_else(|| Motion::of(trial).and_then(|motion| self.motions.iter().find(|closed| closed.has(&motion))))
+        own.or_else(|| GaitMotion::of(trial).and_then(|motion| self.motions.iter().find(|closed| closed.has(&motion))))
     }
 
     /// The bounds of gaits with an open report and with the device of this study. A lab script must not evaluate them
     /// again, because the subject may walk in its evaluation.
     pub fn closed_bounds(&self) -> impl Iterator<Item = TunedBounds> {
         let on_device = self.motions.iter().filter(|closed| closed.same_device);
-        on_device.filter_map(|closed| closed.motion.as_ref()).map(Motion::bounds)
+        on_device.filter_map(|closed| closed.motion.as_ref()).map(GaitMotion::bounds)
     }
 
     /// Whether the gait of this trial has an open report.

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewSafetyReview)]
 pub struct Decision {
-    /// `walkable`: the gait may be walked again. `unsafe`: the gait stays unsafe, and the review is complete.
+    /// `walkable`: the gait may be walked again. `unsafe`: the gait remains marked as unsafe, and the review is complete.
     pub decision: SafetyDecision,
     /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]

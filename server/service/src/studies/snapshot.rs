@@ -1,6 +1,6 @@
 //! A consistent snapshot of a study: its trials, its feedback log and its walkable gaits.
 
-use super::search;
+use super::search_space;
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
@@ -169,7 +169,7 @@ impl StudySnapshot {
         let plan = &self.study.plan;
         let open = self.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index);
         let closed = self.grounds.safety_reports.closed_bounds().filter(|_| plan.evaluation == Evaluation::Script);
-        let closed = closed.filter_map(|bounds| search::action_of(&plan.search_space, plan.base_bounds, bounds));
+        let closed = closed.filter_map(|bounds| search_space::action_of(&plan.search_space, plan.base_bounds, bounds));
         open.chain(closed).collect()
     }
 }

@@ -23,7 +23,7 @@ pub struct Suggestion {
     /// Suggested values of tuned bounds, such as `{"a5": 0.026}`, each a level of the search space. Other bounds keep
     /// the values of the trial.
     pub bounds: BTreeMap<String, f64>,
-    /// Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
+    /// Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     #[serde(default)]
     pub source: Option<Source>,
     /// Name or pseudonym of the author. Defaults to the caller's name.

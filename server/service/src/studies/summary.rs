@@ -1,6 +1,6 @@
 //! The summary of a study as one document, as `tune --json` prints it for scripts.
 
-use super::recommended::{CertificateState, Judged};
+use super::certified_best::{CertificateState, Judged};
 use super::snapshot::StudySnapshot;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use gaitwright_store::studies::StudyState;

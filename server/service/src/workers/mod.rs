@@ -5,7 +5,6 @@
 //! broker (`nats`). Solves are CPU-bound, so each runs on its own thread and never on the async runtime.
 
 mod after_solves;
-mod board;
 mod certify;
 mod dispatch;
 mod evaluate;
@@ -13,11 +12,12 @@ mod explain;
 mod in_process;
 #[cfg(feature = "nats")]
 pub mod nats;
+mod solve_progress;
 
 pub use after_solves::AfterSolves;
-pub use board::{Board, Progress, Track};
 pub use certify::{Certify, GaitCertifier};
 pub use dispatch::{Assignment, Attempt, Dispatch, DispatchError, Finding, News, Receipt};
 pub use evaluate::{Evaluate, GaitSolver};
 pub use explain::{Explain, GaitExplainer, Unexplained};
 pub use in_process::{IN_PROCESS, InProcess, LEASE};
+pub use solve_progress::{Board, Progress, Track};

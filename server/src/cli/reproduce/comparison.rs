@@ -2,8 +2,8 @@
 
 use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
+use gaitwright_service::studies::certified_best::CertificateState;
 use gaitwright_service::studies::history::Milestone;
-use gaitwright_service::studies::recommended::CertificateState;
 
 /// The five coordinates of Gait RMSE.
 pub(super) const COORDINATES: [&str; 5] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R"];
@@ -45,13 +45,13 @@ pub(super) struct Outcome {
     pub(super) best_bounds: Option<String>,
     /// State of the certificate of the best gait.
     pub(super) certificate: CertificateState,
-    /// Reasons if it failed.
+    /// Reasons if the certificate failed.
     pub(super) failures: Vec<String>,
     /// If it failed, number and Gait RMSE, rad, of the best trial whose gait passed.
     pub(super) passing: Option<(u32, Option<f64>)>,
     /// Best gait.
     pub(super) gait: Option<Gait>,
-    /// The reference gait of Gait RMSE.
+    /// Reference gait for Gait RMSE.
     pub(super) reference: ReferenceGait,
 }
 

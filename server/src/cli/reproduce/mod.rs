@@ -5,10 +5,10 @@ mod report;
 mod statements;
 
 use super::Ended;
-use super::numbers::{seed, trials, whole};
+use super::flag_numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem::reference_of;
+use super::problem_flags::reference_of;
 use super::unattended::{self, Lines};
 use clap::{Args, ValueEnum};
 use comparison::Outcome;
@@ -17,18 +17,18 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::catalogue;
-use gaitwright_service::studies::choice::best_trial;
+use gaitwright_service::studies::built_in_entries;
+use gaitwright_service::studies::certified_best::Judged;
 use gaitwright_service::studies::history;
-use gaitwright_service::studies::plan::{self, NewStudy};
-use gaitwright_service::studies::recommended::Judged;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::study_plan::{self, NewStudy};
+use gaitwright_service::studies::trial_choice::best_trial;
 use gaitwright_store::studies::{self, Chosen, Study, StudyState};
 use gaitwright_store::{Store, commit, gaits, reference_gaits};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Subjects of the paper.
+/// Subjects from the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Subjects {
     /// Female, 1.727 m, 65.7 kg.
@@ -57,10 +57,10 @@ fn seeds(text: &str) -> Result<u64, String> {
 
 #[derive(Debug, Args)]
 pub(super) struct Reproduce {
-    /// Subjects of the paper.
+    /// Subjects from the paper.
     #[arg(long, value_enum, default_value = "both")]
     subject: Subjects,
-    /// Number of trials of each study.
+    /// Number of trials in each study.
     #[arg(long, default_value = "30", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
     /// First seed. Both studies of a subject use the same seed.
@@ -161,18 +161,19 @@ impl Reproduce {
         reference: &ReferenceGait,
     ) -> Result<(Study, bool), Error> {
         let mut writer = store.write().await?;
-        catalogue::ensure(&mut writer).await?;
+        built_in_entries::ensure(&mut writer).await?;
         let reference = reference_gaits::ensure(&mut writer, reference).await?.0.id;
-        let person = catalogue::subject_with(&mut writer, Subject::builtin(subject)?).await?;
+        let person = built_in_entries::subject_with(&mut writer, Subject::builtin(subject)?).await?;
         let new = NewStudy {
             muscles,
             trial_budget: self.trials,
             seed,
             parallel_trials: 1,
+            repeat_results: Some(true),
             reference_gait_id: Some(reference),
             ..NewStudy::of(person.id)
         };
-        let wanted = plan::checked(&mut writer, new.clone()).await?;
+        let wanted = study_plan::checked(&mut writer, new.clone()).await?;
         // A folder has at most two subjects, two variants and a hundred seeds.
         let known = studies::page(&mut writer, Reach::Every, Chosen::newest(1000)).await?;
         commit(writer).await?;

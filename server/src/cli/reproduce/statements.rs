@@ -1,7 +1,7 @@
 //! The statements of the paper about its experiment, each with the result of this comparison.
 
 use super::comparison::{Outcome, PairComparison};
-use gaitwright_service::studies::recommended::CertificateState;
+use gaitwright_service::studies::certified_best::CertificateState;
 
 /// A statement of the paper.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +60,7 @@ fn stable(outcomes: &[Outcome]) -> Statement {
         failed => format!("; where it failed, a lower-ranked gait passes in {fallback} of {failed} studies"),
     };
     Statement {
-        paper: "Both gaits walk in stable limit cycles (figure 5)".to_owned(),
+        paper: "Both gaits are stable limit cycles (figure 5)".to_owned(),
         here: format!(
             "{passed} of {with_gait} best gaits pass their certificate (20 strides of the simulated closed loop, multipliers, \
              constraints between nodes){others}"

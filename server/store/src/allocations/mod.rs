@@ -57,12 +57,12 @@ pub struct OfSession {
     pub files: Vec<DeviceFile>,
 }
 
-/// Release of the controller file of a walk.
+/// Download of the controller file of a walk.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct DeviceFile {
     /// Number of the walk, 2 or 3.
     pub walk: u8,
-    /// Whether the device itself fetched the file. Otherwise the caller could know which gait the walk uses.
+    /// Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
     pub to_device: bool,
     /// Who fetched it.
     pub actor: String,

@@ -117,9 +117,9 @@ class AccessMethods(Transport):
     def list_study_members(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Member]:
         """List members of a study.
 
-        Raters can access studies of which they are members. Clinicians, and tokens with more scopes than `rate`, can
-        access every unrestricted study, and restricted studies as members. A request for any other study is answered
-        with 404.
+        Raters can access studies of which they are members. Clinicians, and tokens with any scope besides `rate`, can
+        access every unrestricted study, and the restricted studies of which they are members. A request for any other
+        study is answered with 404.
         """
         return Pages(self, "/api/v1/studies/{id}/members", {"id": study_id}, query={"limit": page_size})
 
@@ -230,14 +230,14 @@ class AccessMethods(Transport):
     def create_sign_in_link(self, user_id: UserId) -> Link:
         """Create a sign-in link for a user.
 
-        The link works once, within a day. Does not accept an Idempotency-Key.
+        The link works once, within a day. The request does not accept an Idempotency-Key.
         """
         return cast(Link, self.request_json("POST", "/api/v1/users/{id}/link", {"id": user_id}, repeatable=False))
 
     def set_user_role(self, user_id: UserId, *, idempotency_key: Optional[str] = None, **body: Unpack[NewRole]) -> User:
         """Change the role of a user.
 
-        Tokens that a former administrator created are revoked.
+        If the user is no longer an administrator, the tokens that the user created are revoked.
 
         Fields: role.
         """

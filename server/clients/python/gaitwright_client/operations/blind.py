@@ -94,8 +94,8 @@ class BlindMethods(Transport):
     ) -> UnblindedRater:
         """Unblind a rater.
 
-        Reveals which gait the rater saw on which side. The audit trail records it, and later answers of the rater do
-        not count as blind.
+        Reveals which gait the rater saw on which side. The audit trail records the unblinding, and later answers of the
+        rater do not count as blind.
 
         Fields: rater, reason.
         """

@@ -101,8 +101,8 @@ class LabMethods(Transport):
         """Download the controller file of a lab walk.
 
         The file does not name the trial, but comparing it with the controller files of both gaits reveals the
-        allocation. It is meant for the device, which uses a token with the scope `device` only. If anybody else fetches
-        it, the session and the audit trail record it, and later answers of that caller do not count as blind.
+        allocation. It is meant for the device, which uses a token with only the `device` scope. If anybody else fetches
+        the file, the session and the audit trail record this, and later answers of that caller do not count as blind.
 
         walk: 2 or 3. Walk 1 is without the device.
 
@@ -268,8 +268,8 @@ class LabMethods(Transport):
     ) -> LabSessionView:
         """Unblind a lab session.
 
-        Reveals which gait each walk used, to all readers. The audit trail records it, later walks are marked, and the
-        answer of the subject becomes a preference of the study.
+        Reveals to all readers which gait each walk used. The audit trail records the unblinding, later walks are marked
+        as recorded after it, and the answer of the subject becomes a preference of the study.
 
         Fields: reason.
         """
@@ -340,7 +340,8 @@ class LabMethods(Transport):
     ) -> LabSessionView:
         """Plan a lab session.
 
-        A walk without the device, then one with each gait, in an order that is drawn now and concealed.
+        The session consists of a walk without the device, then one with each gait, in an order that is drawn at random
+        on planning and concealed.
 
         Fields: gait_one, gait_two; optionally notes.
         """

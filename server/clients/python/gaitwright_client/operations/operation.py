@@ -36,7 +36,7 @@ class OperationMethods(Transport):
 
         Views and exports of subjects' data, and refusals, newest first.
 
-        contains: Text in kind, actor, address, object, study or pseudonym.
+        contains: Text to find in the kind, actor, address, object, study or pseudonym.
 
         subject_id: Rows of this subject.
         """
@@ -51,7 +51,7 @@ class OperationMethods(Transport):
 
         Every change by a user or a program, newest first.
 
-        contains: Text in actor, action or object.
+        contains: Text to find in the actor, action or object.
         """
         return Pages(self, "/api/v1/audit", query={"contains": contains, "limit": page_size})
 
@@ -93,8 +93,8 @@ class OperationMethods(Transport):
     def cancel_job(self, job_id: str, *, idempotency_key: Optional[str] = None) -> Job:
         """Cancel a job.
 
-        A solve stops within one iteration, and its trial is cancelled. The cancellation of a backup needs the right
-        `administer`.
+        A solve stops within one iteration, and its trial is cancelled. Cancelling a backup requires the `administer`
+        right.
         """
         return cast(Job, self.request_json("POST", "/api/v1/jobs/{id}/cancel", {"id": job_id}, key=idempotency_key))
 

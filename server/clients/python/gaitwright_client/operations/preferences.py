@@ -106,8 +106,8 @@ class PreferencesMethods(Transport):
     ) -> Assessment:
         """Record an assessment of two gaits.
 
-        States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is no longer
-        recommended, compared or planned for lab sessions, until staff have reviewed the report.
+        States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
+        recommended, compared or planned for lab sessions until staff have reviewed the report.
 
         Fields: answer, first, second; optionally author, note, source.
         """
@@ -125,7 +125,7 @@ class PreferencesMethods(Transport):
     def list_preferences(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[FeedbackRow]:
         """List preferences of a study.
 
-        Retracted ones included, oldest first.
+        Includes retracted preferences. Oldest first.
         """
         return Pages(self, "/api/v1/studies/{id}/preferences", {"id": study_id}, query={"limit": page_size})
 
@@ -170,7 +170,7 @@ class PreferencesMethods(Transport):
     def list_suggestions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[FeedbackRow]:
         """List suggestions of a study.
 
-        Retracted ones included, oldest first.
+        Includes retracted preferences. Oldest first.
         """
         return Pages(self, "/api/v1/studies/{id}/suggestions", {"id": study_id}, query={"limit": page_size})
 
@@ -233,7 +233,8 @@ class PreferencesMethods(Transport):
         """Review the safety reports of a gait.
 
         If the gait may be walked again, it can be recommended, compared and planned again, and the preferences derived
-        from the reports are retracted. When a lab session is unblinded later, its report makes the gait unsafe again.
+        from the reports are retracted. If a lab session with a report about the gait is unblinded later, that report
+        makes the gait unsafe again.
 
         Fields: decision, reason; optionally author, reports.
         """

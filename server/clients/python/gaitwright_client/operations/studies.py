@@ -57,8 +57,8 @@ class StudiesMethods(Transport):
         Starts the study, unless `start` is false.
 
         Fields: subject_id; optionally base_bounds, device_id, evaluation, feedback_mode, gait_settings, learner,
-        muscles, name, parallel_trials, priority, reference_gait_id, restricted, search_space, seed, solve_options,
-        solve_seconds_budget, start, trial_budget, unchanged_limit.
+        muscles, name, parallel_trials, priority, reference_gait_id, repeat_results, restricted, search_space, seed,
+        solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit.
         """
         return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 
@@ -213,7 +213,7 @@ class StudiesMethods(Transport):
     def get_recommendation(self, study_id: StudyId) -> Recommendation:
         """Get the recommendation of a study.
 
-        The tried action that the learner believes to be the best.
+        Of the actions tried, the one that the learner believes to be the best.
         """
         return cast(Recommendation, self.request_json("GET", "/api/v1/studies/{id}/recommendation", {"id": study_id}))
 

@@ -90,7 +90,7 @@ class SubjectsMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewCorrection],
     ) -> Correction:
-        """Correct height and mass of a subject.
+        """Correct the height and mass of a subject.
 
         New studies use the corrected values. Existing studies keep theirs.
 

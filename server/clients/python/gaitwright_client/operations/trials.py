@@ -114,7 +114,7 @@ class TrialsMethods(Transport):
     def get_controller_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> ControllerFile:
         """Download the controller file of a trial.
 
-        The gait must be walkable: converged, with a certificate, without an open safety report.
+        The gait must be walkable: converged, with a certificate, and without an open safety report.
 
         rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
         """

@@ -7,10 +7,10 @@ use self::chosen_reference::Choice;
 use self::space_editor::SpaceEditor;
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::extract::{Form, Params};
+use crate::extractors::{Form, Params};
+use crate::form_errors;
 use crate::format;
 use crate::page_error::{Page, PageError, page};
-use crate::refusal;
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
@@ -20,7 +20,7 @@ use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::{BasinChoice, SolveOptions, TunedBounds};
 use gaitwright_service::access::{Caller, Run};
 use gaitwright_service::error::{Error, FieldError};
-use gaitwright_service::studies::plan::{self, NewStudy};
+use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
 use gaitwright_store::devices::Device;
 use gaitwright_store::reference_gaits::ReferenceGait;
@@ -59,6 +59,9 @@ pub(super) struct Fields {
     unchanged_limit: String,
     parallel_trials: String,
     seed: String,
+    /// Present when ticked.
+    #[serde(default)]
+    repeat_results: Option<String>,
     #[serde(default)]
     basin_within_percent: String,
     /// The entries of the search space, which the editor reads.
@@ -89,6 +92,7 @@ impl Default for Fields {
             unchanged_limit: String::new(),
             parallel_trials: text("1"),
             seed: text("1"),
+            repeat_results: None,
             basin_within_percent: String::new(),
             space: BTreeMap::new(),
         }
@@ -222,7 +226,7 @@ impl NewStudyPage {
             let Fields { learner, unchanged_limit, parallel_trials, seed, basin_within_percent, .. } = fields.clone();
             [learner, unchanged_limit, parallel_trials, seed, basin_within_percent]
         };
-        fields(typed) != fields(&default)
+        fields(typed) != fields(&default) || typed.repeat_results.is_some()
     }
 
     /// Measured solve times, with and without muscles.
@@ -317,7 +321,7 @@ fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
             // A bound has one row in the table, whatever part of the study refuses it.
             let last = refused.field.rsplit('.').next().filter(|last| TunedBounds::NAMES.contains(last));
             let field = last.unwrap_or(&refused.field).to_owned();
-            let message = refusal::of_field(&label(&field), &refused);
+            let message = form_errors::of_field(&label(&field), &refused);
             Ok(FieldError { field, message, ..*refused })
         }
         Error::Conflict(message) => Ok(FieldError {
@@ -353,14 +357,14 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
         Chosen::New(new) => subject::add(writer, &caller.actor, &new).await?.id,
         Chosen::Known(id) => id,
     };
-    plan::create_by(writer, caller, study_of(fields, editor, subject)?).await
+    study_plan::create_by(writer, caller, study_of(fields, editor, subject)?).await
 }
 
 /// The study that [`make`] would create.
 async fn planned(db: &mut Connection, fields: &Fields, editor: &SpaceEditor) -> Result<StudyPlan, Error> {
     match subject_of(fields)? {
-        Chosen::New(new) => plan::checked_for_new(db, &new, study_of(fields, editor, SubjectId::fresh())?).await,
-        Chosen::Known(id) => plan::checked(db, study_of(fields, editor, id)?).await,
+        Chosen::New(new) => study_plan::checked_for_new(db, &new, study_of(fields, editor, SubjectId::fresh())?).await,
+        Chosen::Known(id) => study_plan::checked(db, study_of(fields, editor, id)?).await,
     }
 }
 
@@ -375,8 +379,8 @@ fn subject_of(fields: &Fields) -> Result<Chosen, Error> {
         nothing_described(fields)?;
         return Ok(Chosen::Known(number("subject", &fields.subject, "a subject from the list")?));
     }
-    let height = "a number in metres, as in 1.75";
-    let mass = "a number in kilograms, as in 65.7";
+    let height = "a number in metres, such as 1.75";
+    let mass = "a number in kilograms, such as 65.7";
     Ok(Chosen::New(NewSubject {
         pseudonym: fields.pseudonym.clone(),
         height_m: number("height_m", &fields.height_m, height)?,
@@ -407,7 +411,8 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
         trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
         unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or empty")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
-        seed: number("seed", &fields.seed, &format!("0 to {}", plan::LARGEST_SEED))?,
+        seed: number("seed", &fields.seed, &format!("0 to {}", study_plan::LARGEST_SEED))?,
+        repeat_results: Some(fields.repeat_results.is_some()),
         restricted: fields.restricted.is_some(),
         ..NewStudy::of(subject)
     })

@@ -3,7 +3,7 @@
 use gait_learner::{Dimension, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::{Error, FieldError};
-use gaitwright_service::studies::search::TABLE_I;
+use gaitwright_service::studies::search_space::TABLE_I;
 use std::collections::BTreeMap;
 
 /// The entries of one bound.
@@ -110,7 +110,7 @@ fn number(field: &str, text: &str, allowed: &str) -> Result<f64, Error> {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
-    use gaitwright_service::studies::search::table_i;
+    use gaitwright_service::studies::search_space::table_i;
 
     fn typed(fields: &[(&str, &str)]) -> BTreeMap<String, String> {
         fields.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect()

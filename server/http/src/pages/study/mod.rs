@@ -12,7 +12,7 @@ use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extract::{Form, Params};
+use crate::extractors::{Form, Params};
 use crate::figures::{COURSE, Outcome, course, warm_starts};
 use crate::format::{self, Bound, words};
 use crate::page_error::{Page, PageError, page};
@@ -27,12 +27,13 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::MOST_ANSWERS;
-use gaitwright_service::studies::change::{self, Extend};
-use gaitwright_service::studies::choice::MANY;
+use gaitwright_service::studies::certified_best::{self, CertificateState, Judged};
+use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
-use gaitwright_service::studies::recommended::{self, CertificateState, Judged};
 use gaitwright_service::studies::safety_reports::Closed;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::study_change::{self, Extend};
+use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::{command, lifecycle};
 use gaitwright_service::workers::Track;
 use gaitwright_store::assessments::{self};
@@ -71,6 +72,7 @@ struct ClosedPage {
     study: Study,
     subject: Subject,
     counts: TrialCounts,
+    may_administer: bool,
 }
 
 /// The part that changes while the study runs.
@@ -87,6 +89,8 @@ struct Live {
     counts: TrialCounts,
     /// Why trials have no gait.
     without_gait: Option<WithoutGait>,
+    /// The bounds that were active in no gait so far; empty if none or unknown.
+    never_active: String,
     /// Number of results, and number of planned trials.
     progress: [String; 2],
     /// Expected remaining time; empty if unknown.
@@ -194,7 +198,8 @@ pub(super) async fn get(
     let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
     if consents::is_withdrawn(&mut reader, id).await? {
         let counts = trials::counts(&mut reader, id).await?;
-        return page(&ClosedPage { study, subject, counts });
+        let may_administer = authorized.caller.may(Administer::NEEDED);
+        return page(&ClosedPage { study, subject, counts, may_administer });
     }
     let last_event = events::last(&mut reader, id).await?;
     let device = devices::get(&mut reader, study.plan.device_id).await?;
@@ -274,7 +279,7 @@ pub(super) async fn post(
         let refused =
             || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
         let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
-        change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
+        study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
         Vec::new()
     } else {
         command::act(&mut writer, &authorized.caller.actor, id, act, "").await?.cancelled
@@ -325,7 +330,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let (snapshot, outcome) = app.compute(draw).await?;
     let outcome = outcome.map_err(Error::Learner)?;
     let mut reader = app.read().await?;
-    let mut judged = recommended::judged(&mut reader, &outcome.ranking).await?;
+    let mut judged = certified_best::judged(&mut reader, &outcome.ranking).await?;
     let without_gait = WithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
     let has_gait = match outcome.best {
         Some(best) => gaits::is_here(&mut reader, best).await?,
@@ -345,7 +350,10 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     answers.truncate(SHOWN as usize);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
     let found = Found { outcome, judged, has_gait, without_gait };
+    // The newest trials do not say it of all.
+    let inactive = if large { Vec::new() } else { never_active(&snapshot) };
     let mut live = view(snapshot, counts, found, running, table, answers, caller.may(Run::NEEDED));
+    live.never_active = inactive.join(", ");
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
         live.pace = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
     }
@@ -423,6 +431,7 @@ fn view(
         acts: acts.into_iter().filter_map(button).collect(),
         pace: pace(&snapshot, counts),
         without_gait,
+        never_active: String::new(),
         progress: [counts.results(), snapshot.study.plan.trial_budget].map(|trials| format::count(trials.into())),
         counts,
         running,

@@ -4,8 +4,8 @@
 use crate::format::{self, words};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
-use gaitwright_store::listing::{self, Listed, Listing, SORTS};
 use gaitwright_store::trials::{TrialCounts, TrialState};
+use gaitwright_store::trials_table::{self, Listed, Listing, SORTS};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 
@@ -120,7 +120,7 @@ impl TrialsTable {
         choice: Choice,
     ) -> Result<Self, Error> {
         let listing = choice.listing()?;
-        let listed = listing::of_study(db, study, &listing).await?;
+        let listed = trials_table::of_study(db, study, &listing).await?;
         let matching = listed.first().map_or(0, |row| row.matching);
         let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
         let page = |page: u32| Choice { page, ..choice.clone() }.link();
@@ -180,7 +180,7 @@ fn columns(choice: &Choice, listing: &Listing, bounds: bool) -> Result<Vec<Colum
 
 fn heading(sort: &'static str) -> (&'static str, &'static str) {
     match sort {
-        "number" => ("Trial", "In the order of proposals"),
+        "number" => ("Trial", "In the order in which they were proposed"),
         "state" => ("State", ""),
         "gait_rmse_rad" => ("RMSE, rad", "Gait RMSE against the reference gait"),
         "cost_of_transport" => ("Cost", "Cost of transport, no unit"),

@@ -7,16 +7,16 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::comparison::by_gait_rmse;
 use crate::studies::lab::EmgResult;
-use crate::studies::{device, lab, plan, reference_import, search, solve_input, subject, trial_state};
+use crate::studies::{device, lab, reference_import, search_space, solve_input, study_plan, subject, trial_state};
 use gait_optimizer::solve::CONVERGED_VIOLATION;
 use gait_optimizer::walking::progress_error_m;
 use gait_optimizer::{Gait, GaitFigures, ReferenceGait, WarmStart};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::archive::Definition;
+use gaitwright_store::archived_row::{Cell, Row};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::quarantine::Quarantine;
-use gaitwright_store::row::{Cell, Row};
 use gaitwright_store::studies::{Chosen, FeedbackMode, Study, StudyPlan};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
@@ -112,7 +112,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     let found = at("studies", studies::page(db, Reach::Every, Chosen::newest(2)).await)?;
     let [study] = &found[..] else { return Err(refuse(format!("it has {} studies instead of one", found.len()))) };
     let study = study.clone();
-    at(format!("study {}", study.id), plan::check_plan(&study.plan))?;
+    at(format!("study {}", study.id), study_plan::check_plan(&study.plan))?;
 
     let subject = at("subject", subjects::get(db, study.plan.subject_id).await)?;
     if at("subjects", subjects::all(db).await)?.len() != 1 {
@@ -174,7 +174,7 @@ fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     if trial.action_index.0 >= plan.search_space.len() {
         return Err(format!("action_index {} is not in the search space", trial.action_index.0));
     }
-    let action = search::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
+    let action = search_space::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
     if action.map_err(|e| e.to_string())? != trial.action {
         return Err("the action does not match its index".to_owned());
     }
@@ -247,7 +247,7 @@ async fn gait(db: &mut Connection, pool: &Pool, trial: &Trial, context: &Arc<Con
 fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart) -> Result<(), String> {
     gait.validate().map_err(|e| e.to_string())?;
     if gait.subject != context.body {
-        return Err("its gait belongs to a subject of another height or body mass".to_owned());
+        return Err("its gait belongs to a subject with a different height or body mass".to_owned());
     }
     let plan = &context.study.plan;
     if gait.device != context.device
@@ -265,7 +265,7 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
         let error = progress_error_m(gait).map_err(|e| e.to_string())?;
         let follows = error <= HIP_PROGRESS_M;
         if !follows {
-            return Err(format!("the durations of its gait differ from its motion: the hip is off by {error:.1e} m"));
+            return Err(format!("the durations of its gait do not match its motion: the hip is off by {error:.1e} m"));
         }
     }
     Ok(())
@@ -276,7 +276,9 @@ fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result
     let Some(report) = &trial.report else { return Ok(()) };
     let anew = GaitFigures::of(gait, reference).map_err(|e| e.to_string())?;
     match GaitFigures::stated_in(report).difference(&anew) {
-        Some((name, stated, anew)) => Err(format!("its stated {name} is {stated}, but that of its gait is {anew}")),
+        Some((name, stated, anew)) => {
+            Err(format!("its stated {name} is {stated}, but computed from its gait it is {anew}"))
+        }
         None => Ok(()),
     }
 }
@@ -375,7 +377,7 @@ fn is_of_person(row: &FeedbackRow) -> bool {
 /// Checks that comparisons are about gaits of the study.
 fn of_gaits<const N: usize>(trials: &HashMap<TrialId, &Trial>, asked: [TrialId; N]) -> Result<(), String> {
     match asked.iter().find(|id| trials.get(*id).is_none_or(|trial| trial.state != TrialState::Converged)) {
-        Some(id) => Err(format!("trial {id} is not a gait of this study")),
+        Some(id) => Err(format!("trial {id} is not a converged trial of this study")),
         None => Ok(()),
     }
 }

@@ -74,5 +74,5 @@ pub async fn export<W: Write + Send + 'static>(
     pool.close().await;
     let packed = packing.await.map_err(|e| Error::Internal(e.to_string()))?;
     read?;
-    packed?.ok_or_else(|| Error::Internal("the archive has no end".to_owned()))
+    packed?.ok_or_else(|| Error::Internal("the end line of the archive is missing".to_owned()))
 }

@@ -6,7 +6,7 @@
 use super::signature::{PublicKey, SigningKey};
 use crate::error::Error;
 use gaitwright_store::archive::table;
-use gaitwright_store::row::{LARGEST_BLOB_BYTES, LARGEST_TEXT_BYTES, Row};
+use gaitwright_store::archived_row::{LARGEST_BLOB_BYTES, LARGEST_TEXT_BYTES, Row};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -127,7 +127,7 @@ type Source<R> = BufReader<Hashed<R>>;
 
 /// Facts about a completely read archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Whole {
+pub struct ArchiveFacts {
     /// SHA-256 of the file.
     pub file_sha256: String,
     /// Public key of the signer. The signature was checked.
@@ -157,7 +157,7 @@ pub(super) fn refuse(reason: impl std::fmt::Display) -> Error {
 /// The next part of an archive.
 pub(super) enum Next {
     Row(&'static str, Row),
-    End(Whole),
+    End(ArchiveFacts),
 }
 
 impl<R: Read> Unpacker<R> {
@@ -224,7 +224,7 @@ impl<R: Read> Unpacker<R> {
         }
     }
 
-    fn end(&mut self, end: &End) -> Result<Whole, Error> {
+    fn end(&mut self, end: &End) -> Result<ArchiveFacts, Error> {
         let sha256 = hex::encode(std::mem::take(&mut self.hash).finalize());
         if end.rows != self.rows || end.sha256 != sha256 {
             return Err(refuse("its rows were changed: they do not match the hash at its end"));
@@ -244,7 +244,7 @@ impl<R: Read> Unpacker<R> {
             _ => return Err(refuse("its signature is incomplete")),
         };
         let hashed = std::mem::take(&mut self.lines.get_mut().get_mut().get_mut().hash);
-        Ok(Whole { file_sha256: hex::encode(hashed.finalize()), signed_by, rows: self.rows })
+        Ok(ArchiveFacts { file_sha256: hex::encode(hashed.finalize()), signed_by, rows: self.rows })
     }
 }
 
@@ -252,7 +252,7 @@ impl<R: Read> Unpacker<R> {
 ///
 /// # Errors
 /// [`Error::Malformed`] with the reason.
-pub fn read_through(from: impl Read) -> Result<Whole, Error> {
+pub fn read_through(from: impl Read) -> Result<ArchiveFacts, Error> {
     let mut unpacker = Unpacker::new(from)?;
     loop {
         if let Next::End(whole) = unpacker.next()? {

@@ -1,16 +1,16 @@
 //! Imports an archive into the record.
 
-use super::super::catalogue;
+use super::super::built_in_entries;
 use super::check;
-use super::file::{Next, Unpacker, Whole, refuse};
+use super::file::{ArchiveFacts, Next, Unpacker, refuse};
 use super::signature::PublicKey;
 use crate::error::Error;
 use gaitwright_compute::Pool;
 use gaitwright_store::archive::{self, Known, Unpacking};
+use gaitwright_store::archived_row::{Cell, Row};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::imports::{self, NewImport};
 use gaitwright_store::quarantine::Quarantine;
-use gaitwright_store::row::{Cell, Row};
 use gaitwright_store::{Store, StoreError, StudyId, Writer, commit, events, studies, subjects};
 use serde_json::json;
 use std::io::Read;
@@ -37,7 +37,7 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
         clippy::disallowed_methods,
         reason = "runs while rows are still arriving; the pool takes only complete data"
     )]
-    let reading = tokio::task::spawn_blocking(move || -> Result<Option<Whole>, Error> {
+    let reading = tokio::task::spawn_blocking(move || -> Result<Option<ArchiveFacts>, Error> {
         let mut unpacker = Unpacker::new(from)?;
         loop {
             match unpacker.next()? {
@@ -195,5 +195,5 @@ fn is_built_in(row: &Row) -> bool {
     let number = |column| row.real(column).unwrap_or(f64::NAN);
     let body = gait_optimizer::Subject { height_m: number("height_m"), body_mass_kg: number("body_mass_kg") };
     let [pseudonym, notes] = ["pseudonym", "notes"].map(|column| row.text(column).unwrap_or_default());
-    catalogue::is_built_in(pseudonym, body, notes)
+    built_in_entries::is_built_in(pseudonym, body, notes)
 }

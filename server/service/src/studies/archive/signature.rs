@@ -33,7 +33,7 @@ impl SigningKey {
     /// # Errors
     /// [`Error::Malformed`] for any other text.
     pub fn read(text: &str) -> Result<Self, Error> {
-        let refuse = || Error::Malformed("This is not a key file of `gaitwright signing-key`.".to_owned());
+        let refuse = || Error::Malformed("This is not a key file written by `gaitwright signing-key`.".to_owned());
         let document = text.trim().strip_prefix(PREFIX.trim_end()).ok_or_else(refuse)?;
         let document = hex::decode(document.trim()).map_err(|_| refuse())?;
         Ed25519KeyPair::from_pkcs8(&document).map(Self).map_err(|_| refuse())
@@ -80,7 +80,7 @@ impl FromStr for PublicKey {
         if text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
             Ok(Self(text))
         } else {
-            Err("A public key has 64 hexadecimal digits, as `gaitwright signing-key` prints it.".to_owned())
+            Err("A public key has 64 hexadecimal digits, as printed by `gaitwright signing-key`.".to_owned())
         }
     }
 }

@@ -4,13 +4,13 @@
 //! also of repeated pairs, so no response of the service can reveal a repeated pair. Answers of raters who could have
 //! known the allocation are marked.
 
-mod draw;
-mod figures;
 mod knowledge;
-mod rater;
+mod next_pair;
+mod rater_answers;
+mod rater_reliability;
 
-pub use draw::{Drawn, draw};
-pub use figures::{RaterFigures, Share, figures};
 pub use knowledge::{could_have_known, sees_or_saw_gaits};
-pub use rater::{Answered, RaterAnswer, UnblindedPair, answer, next, retract, unblind};
-pub use rater::{can_be_retracted, own, own_to_show};
+pub use next_pair::{Drawn, draw};
+pub use rater_answers::{Answered, RaterAnswer, UnblindedPair, answer, next, retract, unblind};
+pub use rater_answers::{can_be_retracted, own, own_to_show};
+pub use rater_reliability::{RaterFigures, Share, figures};

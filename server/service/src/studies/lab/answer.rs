@@ -25,7 +25,7 @@ use utoipa::ToSchema;
 /// Maximum length of a note, characters.
 const LONGEST_NOTE: usize = 2000;
 
-/// Answer of the subject.
+/// The subject's answer.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(as = NewLabAnswer)]

@@ -6,14 +6,14 @@
 //! numbers, and the answer reaches the learner at unblinding.
 
 mod answer;
-mod measured;
+mod measurement_results;
 mod question;
 mod session;
 mod unblinding;
 mod upload;
 
 pub use answer::{NewAnswer, give as answer, retract};
-pub use measured::{
+pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
     with_model,
 };
@@ -25,5 +25,5 @@ pub use session::{
 };
 pub use unblinding::unblind;
 pub use upload::{
-    Brought, Checked, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, brought, check_kept, keep,
+    Checked, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, brought, check_kept, keep,
 };

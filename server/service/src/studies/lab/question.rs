@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 /// Number of walks of a session.
 pub const WALKS: u8 = 3;
 
-/// Answer of the subject, in terms of walks.
+/// The subject's answer, in terms of walks.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = LabAnswer)]
 pub struct AnswerView {

@@ -4,13 +4,13 @@ use super::question::{AnswerView, WALKS, asked_answer, can_be_retracted, has_fil
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::motion::is_same_gait;
+use crate::studies::same_motion::is_same_gait;
 use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, DeviceFile, Lot};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, Act, LabSession, LabSessionStep};
-use gaitwright_store::listing::{self, Listed, Listing};
 use gaitwright_store::trials::{self, Trial, TrialState};
+use gaitwright_store::trials_table::{self, Listed, Listing};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -244,7 +244,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
     };
     let grounds = Grounds::read(db, study).await?;
     let mut kept: Vec<(Listed, Trial)> = Vec::new();
-    for listed in listing::of_study(db, study, &listing).await? {
+    for listed in trials_table::of_study(db, study, &listing).await? {
         let trial = trials::get(db, listed.id).await?;
         if grounds.admit(&trial).is_ok() && !kept.iter().any(|(_, other)| is_same_gait(other, &trial)) {
             kept.push((listed, trial));
@@ -336,7 +336,7 @@ pub struct LabSessionProgress {
     pub report_number: Option<u32>,
     /// Current answer of the subject.
     pub answer: Option<AnswerView>,
-    /// Whether that answer can be retracted here.
+    /// Whether the current answer can be retracted in the lab view.
     pub can_be_retracted: bool,
     /// Whether the session is closed.
     pub closed: bool,

@@ -38,13 +38,13 @@ pub struct EmgReading {
     // Older records have the name `form`.
     #[serde(alias = "form")]
     pub format: MeasurementFormat,
-    /// Sampling rate of a CSV file without a column `time_s`, Hz.
+    /// Sampling rate of a CSV file without a `time_s` column, Hz.
     #[schema(minimum = 100, maximum = 20000)]
     pub rate_hz: Option<f64>,
     /// Column of each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R). By default the columns have the names of the
     /// channels.
     pub channels: BTreeMap<String, String>,
-    /// Times of right heel strikes, s, on the time axis of the file. Empty: detect them in `heel_strike_column`.
+    /// Times of right heel strikes, s, on the time axis of the file. If empty, they are detected in `heel_strike_column`.
     pub heel_strikes_s: Vec<f64>,
     /// Column of a switch under the right heel, or of the vertical force under the right foot.
     pub heel_strike_column: Option<String>,
@@ -254,7 +254,7 @@ pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &MeasurementFile
 
 /// A measurement file as uploaded, byte for byte.
 #[derive(Debug)]
-pub struct Brought {
+pub struct UploadedFile {
     /// What is known of it.
     pub recording: MeasurementFile,
     /// Its format.
@@ -267,7 +267,7 @@ pub struct Brought {
 ///
 /// # Errors
 /// [`Error::NotFound`], or an error if the file does not match its hash.
-pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Brought, Error> {
+pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<UploadedFile, Error> {
     /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
     struct Reading {
@@ -276,7 +276,7 @@ pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Broug
     }
     let recording = measurement_files::get(db, id).await?;
     let (Reading { format }, file) = measurement_files::file(db, id).await?;
-    Ok(Brought { recording, format, file })
+    Ok(UploadedFile { recording, format, file })
 }
 
 /// Stores a measurement file with its walk.

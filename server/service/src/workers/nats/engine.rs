@@ -1,7 +1,7 @@
 //! The engine of the service for remote workers: publishes jobs, receives heartbeats and results.
 
-use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
-use super::{AGAIN, BROKER_HEARTBEAT, EXPIRES, Link, unreachable};
+use super::message::{Order, PROGRAM, ResultMessage, Sign, pack, unpack};
+use super::{AGAIN, BROKER_HEARTBEAT, BrokerConnection, EXPIRES, unreachable};
 use crate::workers::Assignment;
 use crate::workers::dispatch::{Dispatch, DispatchError, News, Receipt};
 use async_nats::jetstream::stream::{LastRawMessageErrorKind, Stream};
@@ -26,7 +26,7 @@ const MOST_DELIVERIES: i64 = 10;
 
 /// An engine whose jobs are run by remote workers.
 pub struct JetStream {
-    link: Link,
+    link: BrokerConnection,
     size: usize,
     heard: Mutex<Receiver<News>>,
     /// Threads that compress jobs.
@@ -44,7 +44,7 @@ impl JetStream {
     /// # Errors
     /// [`DispatchError::Unreachable`] for a malformed address.
     pub async fn connect(url: &str, queue: &str, size: usize, lease: Duration) -> Result<Self, DispatchError> {
-        let link = Link::open(url, queue, lease).await?;
+        let link = BrokerConnection::open(url, queue, lease).await?;
         let (news, heard) = mpsc::channel(WAITING);
         let ends = CancellationToken::new();
         let (trouble, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
@@ -59,7 +59,7 @@ impl JetStream {
                         _ => results(&link, &news, &trouble, &mut storage).await,
                     };
                     if let Err(error) = ended {
-                        tracing::warn!(%error, "cannot receive messages of workers; retrying");
+                        tracing::warn!(%error, "cannot receive messages from workers; retrying");
                         if task == 1 {
                             trouble.send_replace(Some(error.to_string()));
                         }
@@ -180,7 +180,7 @@ fn gone<T>(_: T) -> DispatchError {
 }
 
 /// Forwards heartbeats until the subscription ends.
-async fn signs(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
+async fn signs(link: &BrokerConnection, news: &Sender<News>) -> Result<(), DispatchError> {
     let mut signs = link.context.client().subscribe(link.sign_subject()).await.map_err(unreachable)?;
     while let Some(message) = signs.next().await {
         match unpack::<Sign>(&message.payload) {
@@ -200,7 +200,7 @@ async fn signs(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
 
 /// Forwards results until the broker reports an error.
 async fn results(
-    link: &Link,
+    link: &BrokerConnection,
     news: &Sender<News>,
     trouble: &watch::Sender<Option<String>>,
     storage: &mut Storage,
@@ -225,7 +225,7 @@ async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) ->
         tracing::error!(subject = %message.subject, "recording a result failed {MOST_DELIVERIES} times; discarding it");
         return acker.ack_with(AckKind::Term).await.map_err(unreachable);
     }
-    let read = pool.run(move |_| unpack::<Brought>(&message.payload)).await.map_err(unreachable)?;
+    let read = pool.run(move |_| unpack::<ResultMessage>(&message.payload)).await.map_err(unreachable)?;
     let brought = match read {
         Ok(brought) => brought,
         Err(error) => {
@@ -239,6 +239,6 @@ async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) ->
             tracing::warn!(%error, "cannot acknowledge a result to the broker");
         }
     });
-    let Brought { attempt, worker, finding } = brought;
+    let ResultMessage { attempt, worker, finding } = brought;
     news.send(News::Ended { attempt, worker, finding, receipt }).await.map_err(gone)
 }

@@ -37,7 +37,7 @@ pub struct Sign {
 
 /// A result.
 #[derive(Debug, Serialize, Deserialize)]
-pub struct Brought {
+pub struct ResultMessage {
     /// The attempt.
     pub attempt: Attempt,
     /// Name of the worker.
@@ -94,20 +94,20 @@ mod tests {
         #[test]
         fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
             let _ = unpack::<Order>(&bytes);
-            let _ = unpack::<Brought>(&bytes);
+            let _ = unpack::<ResultMessage>(&bytes);
             let packed = zstd::encode_all(&bytes[..], 1).unwrap();
             prop_assert!(unpack::<Order>(&packed).is_err());
-            prop_assert!(unpack::<Brought>(&packed).is_err());
+            prop_assert!(unpack::<ResultMessage>(&packed).is_err());
         }
 
         #[test]
         fn message_with_changed_bytes_is_read_or_refused(at in any::<prop::sample::Index>(), flip in 1_u8..) {
             let attempt = Attempt { trial: TrialId::fresh(), number: 3 };
-            let brought = Brought { attempt, worker: "w".to_owned(), finding: Finding::Broke("reason".to_owned()) };
+            let brought = ResultMessage { attempt, worker: "w".to_owned(), finding: Finding::Broke("reason".to_owned()) };
             let mut bytes = rmp_serde::to_vec_named(&brought).unwrap();
             let place = at.index(bytes.len());
             bytes[place] ^= flip;
-            let _ = unpack::<Brought>(&zstd::encode_all(&bytes[..], 1).unwrap());
+            let _ = unpack::<ResultMessage>(&zstd::encode_all(&bytes[..], 1).unwrap());
         }
     }
 }

@@ -10,7 +10,7 @@ mod message;
 mod worker;
 
 pub use engine::JetStream;
-pub use message::{Brought, Order, Sign, pack, unpack};
+pub use message::{Order, ResultMessage, Sign, pack, unpack};
 pub use worker::Worker;
 
 use super::dispatch::{Attempt, DispatchError};
@@ -34,7 +34,7 @@ const BROKER_HEARTBEAT: Duration = Duration::from_secs(2);
 
 /// A connection to a broker, and the names of our streams and subjects.
 #[derive(Debug, Clone)]
-pub(super) struct Link {
+pub(super) struct BrokerConnection {
     context: Context,
     queue: String,
     lease: Duration,
@@ -51,7 +51,7 @@ pub async fn reach(url: &str) -> Result<String, DispatchError> {
     if about.jetstream { Ok(about.version) } else { Err(unreachable("it runs without JetStream")) }
 }
 
-impl Link {
+impl BrokerConnection {
     /// Connects once the broker is available, and reconnects whenever the connection breaks.
     async fn open(url: &str, queue: &str, lease: Duration) -> Result<Self, DispatchError> {
         let client = async_nats::ConnectOptions::new()

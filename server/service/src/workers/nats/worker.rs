@@ -1,7 +1,7 @@
 //! The remote worker: pulls jobs from the broker, solves them on its own threads, and publishes heartbeats and results.
 
-use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
-use super::{AGAIN, Link, unreachable};
+use super::message::{Order, PROGRAM, ResultMessage, Sign, pack, unpack};
+use super::{AGAIN, BrokerConnection, unreachable};
 use crate::workers::dispatch::{Attempt, Dispatch, DispatchError, Finding, News};
 use crate::workers::{Evaluate, InProcess};
 use async_nats::jetstream::message::Acker;
@@ -31,7 +31,7 @@ const SIGN_EVERY: Duration = Duration::from_millis(300);
 
 /// Runs jobs of a broker.
 pub struct Worker {
-    link: Link,
+    link: BrokerConnection,
     name: String,
     engine: InProcess,
     slots: Arc<Semaphore>,
@@ -67,7 +67,7 @@ impl Worker {
         lease: Duration,
         evaluate: Arc<dyn Evaluate>,
     ) -> Result<Self, DispatchError> {
-        let link = Link::open(url, queue, lease).await?;
+        let link = BrokerConnection::open(url, queue, lease).await?;
         let slots = Arc::new(Semaphore::new(size.max(1)));
         let engine = InProcess::new(size, evaluate);
         Ok(Self { link, name, engine, slots, results: TaskTracker::new(), pool: Pool::default() })
@@ -147,7 +147,11 @@ impl Worker {
             }
         };
         if order.program != PROGRAM {
-            tracing::error!(theirs = order.program, ours = PROGRAM, "ignoring a job of another version of the program");
+            tracing::error!(
+                theirs = order.program,
+                ours = PROGRAM,
+                "ignoring a job from another version of the program"
+            );
             return answer(&acker, AckKind::Nak(Some(self.link.lease))).await;
         }
         let attempt = order.assignment.attempt;
@@ -200,7 +204,7 @@ impl Worker {
         let hangs = |job: &Held| job.lived.elapsed() > self.link.ack_wait();
         let hanging: Vec<TrialId> = held.iter().filter(|(_, job)| hangs(job)).map(|(trial, _)| *trial).collect();
         for trial in hanging {
-            tracing::warn!(%trial, "a solve hangs; returning its job");
+            tracing::warn!(%trial, "a solve is hanging; returning its job");
             self.drop_job(held, trial, AckKind::Nak(None)).await;
         }
     }
@@ -229,14 +233,14 @@ impl Worker {
 
 /// Publishes a result, with retries, then acknowledges the job. A result that cannot be published is dropped: its slot
 /// is freed and its job left to other workers.
-async fn bring(link: Link, pool: Pool, worker: String, attempt: Attempt, finding: Finding, job: Held) {
+async fn bring(link: BrokerConnection, pool: Pool, worker: String, attempt: Attempt, finding: Finding, job: Held) {
     let Held { acker, permit, .. } = job;
-    let brought = Brought { attempt, worker, finding };
+    let brought = ResultMessage { attempt, worker, finding };
     let bytes = pool.run(move |_| {
         let fits = |bytes: Vec<u8>| link.fits("a result", &bytes).map(|()| bytes);
         let bytes = pack(&brought)
             .and_then(fits)
-            .or_else(|error| pack(&Brought { finding: Finding::Broke(error.to_string()), ..brought }));
+            .or_else(|error| pack(&ResultMessage { finding: Finding::Broke(error.to_string()), ..brought }));
         (link, bytes)
     });
     let Ok((link, bytes)) = bytes.await else { return };
@@ -257,7 +261,12 @@ async fn bring(link: Link, pool: Pool, worker: String, attempt: Attempt, finding
 }
 
 /// Publishes a result, with retries and growing pauses until `limit`.
-async fn publish_within(link: &Link, attempt: Attempt, bytes: &[u8], limit: Duration) -> Result<(), DispatchError> {
+async fn publish_within(
+    link: &BrokerConnection,
+    attempt: Attempt,
+    bytes: &[u8],
+    limit: Duration,
+) -> Result<(), DispatchError> {
     let begun = Instant::now();
     let mut pause = AGAIN;
     loop {
@@ -272,7 +281,7 @@ async fn publish_within(link: &Link, attempt: Attempt, bytes: &[u8], limit: Dura
     }
 }
 
-async fn publish(link: &Link, attempt: Attempt, bytes: &[u8]) -> Result<(), DispatchError> {
+async fn publish(link: &BrokerConnection, attempt: Attempt, bytes: &[u8]) -> Result<(), DispatchError> {
     link.results().await?;
     let acknowledged =
         link.context.publish(link.result_subject(attempt), bytes.to_vec().into()).await.map_err(unreachable)?;

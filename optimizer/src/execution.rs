@@ -1,0 +1,181 @@
+//! Execution of a gait outside the optimiser's model: simulated walks with the controllers of a laboratory.
+//!
+//! The plant has a floating base, compliant ground under heel and toe of both feet, Coulomb friction, joint stops, and
+//! drives with limited torque and torque rate (`plant`, `ground`, `actuator`). The prosthesis tracks the gait with what
+//! it can measure (`prosthesis`, `sensors`); the human joints track it compliantly (`human`). Both tell the time of the
+//! stride from a phase variable (`stride_clock`). Gains and plant are the same for every gait.
+//!
+//! A random walk has a random body mass, speed at the start, push, delay, sensor noise and ground. The report says how
+//! many walks end without a fall. It depends on the gait and the seed only, whatever the number of threads.
+
+mod actuator;
+mod disturbance;
+mod foot_contact;
+mod gains;
+mod ground;
+mod human;
+mod planned_stride;
+mod plant;
+mod prosthesis;
+mod random;
+mod report;
+mod sensors;
+mod simulated_walk;
+mod stride_clock;
+mod terrain;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod simulation_tests;
+
+pub use report::{ExecutionReport, StridesOnYield, SurvivedPushes, WalksOnGround};
+
+use crate::certificate::CertifiedGait;
+use crate::gait::Gait;
+use crate::subject::ModelError;
+use disturbance::{Disturbance, LADDER_N_S, Push, YIELD_LADDER_M};
+use serde::{Deserialize, Serialize};
+use simulated_walk::{End, WalkOutcome, Walker};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Period of the controllers, s.
+const CONTROL_PERIOD_S: f64 = 1e-3;
+/// Version of the layout of [`ExecutionReport`] and of the simulation.
+pub const FORMAT_VERSION: u32 = 1;
+/// Strides before the push of the ladder, which comes in mid-stance of the prosthesis.
+const STRIDES_BEFORE_PUSH: f64 = 3.2;
+
+/// Options of [`simulate`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ExecutionOptions {
+    /// Number of simulated walks on each ground, 1 to [`Self::MOST_WALKS`].
+    pub walks: u32,
+    /// Strides of a complete walk, 1 to 1000.
+    pub strides: u32,
+    /// Largest height and depth of the plateaus of each ground, m; 0 to 0.05.
+    pub ground_heights_m: Vec<f64>,
+    /// Seed of the disturbances.
+    pub seed: u64,
+    /// Number of threads, 1 to 64. The report does not depend on it.
+    pub threads: usize,
+}
+
+impl Default for ExecutionOptions {
+    fn default() -> Self {
+        Self { walks: 50, strides: 20, ground_heights_m: vec![0.0, 0.005, 0.01], seed: 1, threads: 1 }
+    }
+}
+
+impl ExecutionOptions {
+    /// Largest number of simulated walks on a ground.
+    pub const MOST_WALKS: u32 = 100_000;
+
+    /// Checks each option.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] with the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::check_range("walks", f64::from(self.walks), 1.0, f64::from(Self::MOST_WALKS))?;
+        ModelError::check_range("strides", f64::from(self.strides), 1.0, 1e3)?;
+        ModelError::check_range("threads", self.threads as f64, 1.0, 64.0)?;
+        for height in &self.ground_heights_m {
+            ModelError::check_range("ground_heights_m", *height, 0.0, 0.05)?;
+        }
+        Ok(())
+    }
+}
+
+/// Simulates walks with a gait. A walk takes some hundredths of a second.
+///
+/// # Errors
+/// [`ModelError`] if the gait is malformed or an option is out of range.
+pub fn simulate(gait: &Gait, options: &ExecutionOptions) -> Result<ExecutionReport, ModelError> {
+    options.validate()?;
+    let gait_sha256 = CertifiedGait::of(gait)?.gait_sha256;
+    let walker = Walker::new(gait)?;
+    let strides = options.strides;
+    let undisturbed = walker.walk(&Disturbance::none(), strides)?;
+    let pushed_within_s = 0.5 * f64::from(strides) * walker.stride_s();
+    let walk = |ground_m: f64, number: u32| {
+        let disturbance = Disturbance::random(options.seed, number, ground_m, walker.step_m(), pushed_within_s);
+        walker.walk(&disturbance, strides)
+    };
+    let grounds = options
+        .ground_heights_m
+        .iter()
+        .map(|&ground_m| {
+            let outcomes = in_parallel(options.walks, options.threads, &|number| walk(ground_m, number))?;
+            Ok(WalksOnGround::of(ground_m, &outcomes))
+        })
+        .collect::<Result<_, ModelError>>()?;
+    let strides_by_yield = YIELD_LADDER_M
+        .into_iter()
+        .map(|yield_m| {
+            let outcome = walker.walk(&Disturbance { yield_m, ..Disturbance::none() }, strides)?;
+            Ok(StridesOnYield { yield_m, strides: outcome.strides })
+        })
+        .collect::<Result<_, ModelError>>()?;
+    let pushes = if undisturbed.end == End::Completed { Some(survived_pushes(&walker, strides)?) } else { None };
+    Ok(ExecutionReport {
+        format_version: FORMAT_VERSION,
+        gait_sha256,
+        seed: options.seed,
+        strides,
+        undisturbed_strides: undisturbed.strides,
+        grounds,
+        strides_by_yield,
+        pushes,
+    })
+}
+
+fn survived_pushes(walker: &Walker<'_>, strides: u32) -> Result<SurvivedPushes, ModelError> {
+    let largest = |direction: f64| {
+        let mut survived = 0.0;
+        for impulse in LADDER_N_S {
+            let push = Push { start_s: STRIDES_BEFORE_PUSH * walker.stride_s(), impulse_n_s: direction * impulse };
+            if walker.walk(&Disturbance::only(push), strides)?.end != End::Completed {
+                break;
+            }
+            survived = impulse;
+        }
+        Ok::<_, ModelError>(survived)
+    };
+    Ok(SurvivedPushes {
+        forwards_n_s: largest(1.0)?,
+        backwards_n_s: largest(-1.0)?,
+        largest_tried_n_s: LADDER_N_S.into_iter().fold(0.0, f64::max),
+    })
+}
+
+/// The walks 0 to `count`, in order.
+fn in_parallel(
+    count: u32,
+    threads: usize,
+    walk: &(dyn Fn(u32) -> Result<WalkOutcome, ModelError> + Sync),
+) -> Result<Vec<WalkOutcome>, ModelError> {
+    let next = AtomicU32::new(0);
+    let worker = || {
+        let mut done = Vec::new();
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            if number >= count {
+                return done;
+            }
+            done.push((number, walk(number)));
+        }
+    };
+    let mut all = std::thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(worker)).collect();
+        let mut all = worker();
+        for other in others {
+            match other.join() {
+                Ok(done) => all.extend(done),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        }
+        all
+    });
+    all.sort_unstable_by_key(|(number, _)| *number);
+    all.into_iter().map(|(_, outcome)| outcome).collect()
+}

@@ -1,0 +1,132 @@
+//! The controller of the prosthesis, as a laboratory runs it at 1 kHz: proportional-derivative tracking of knee and ankle
+//! with feed-forward torques.
+//!
+//! It knows what the prosthesis measures: the angle of its own thigh, knee and ankle, and the force on its own foot. While
+//! the foot is on the ground, the linearised hip position over its toe is the phase variable; in swing it is the thigh
+//! angle. A heel strike restarts the clock.
+
+use super::CONTROL_PERIOD_S;
+use super::actuator::Drive;
+use super::foot_contact::FootContact;
+use super::gains::Gains;
+use super::planned_stride::PlannedStride;
+use super::sensors::Measured;
+use super::stride_clock::{PhaseVariable, StrideClock};
+use crate::body::{LegGeometry, WalkerModel};
+use crate::device::Device;
+
+/// Gains of knee and ankle in stance.
+const STANCE: [Gains; 2] = [Gains::new(450.0, 15.0), Gains::new(300.0, 6.0)];
+/// Gains in swing. With the inertias of shank and foot they keep a delay margin of 15 ms: the foot alone is light.
+const SWING: [Gains; 2] = [Gains::new(250.0, 12.0), Gains::new(15.0, 0.4)];
+/// Time from zero to the largest torque, s (assumption).
+const RISE_S: f64 = 0.04;
+
+/// Smallest planned rate of the hip position that tells the time, m/s.
+const SLOWEST_HIP_M_S: f64 = 0.3;
+/// Smallest planned rate of the thigh angle that tells the time, rad/s.
+const SLOWEST_THIGH_RAD_S: f64 = 1.0;
+/// Share of swing after which a loaded foot has landed.
+const LANDING: f64 = 0.5;
+/// First domain after the lift of the prosthetic foot.
+const SWING_STARTS: usize = 6;
+
+/// The controller and the drives.
+#[derive(Debug, Clone)]
+pub(super) struct Prosthesis<'a> {
+    plan: &'a PlannedStride,
+    leg: LegGeometry,
+    clock: StrideClock,
+    foot: FootContact,
+    /// Knee and ankle.
+    pub(super) drives: [Drive; 2],
+}
+
+impl<'a> Prosthesis<'a> {
+    /// At the start of a stride.
+    pub(super) fn new(plan: &'a PlannedStride, model: &WalkerModel, device: &Device) -> Self {
+        let drive = |limit| Drive::new(limit, RISE_S);
+        Self {
+            plan,
+            leg: model.right,
+            clock: StrideClock { time_s: 0.0 },
+            foot: FootContact::new(true),
+            drives: [drive(device.knee_torque_limit_n_m), drive(device.ankle_torque_limit_n_m)],
+        }
+    }
+
+    /// Linearised hip position over the toe of the prosthesis, m, from its thigh, knee and ankle; also its rate.
+    fn hip_position(&self, thigh: f64, [knee, ankle]: [f64; 2]) -> f64 {
+        let shank = thigh - knee;
+        let foot = shank + ankle;
+        -(self.leg.thigh_length_m * thigh + self.leg.shank_length_m * shank + self.leg.ankle_height_m * foot)
+    }
+
+    /// One period of the controller.
+    pub(super) fn control(&mut self, measured: &Measured) {
+        self.foot.update(measured.load_n);
+        let swing_s = self.plan.start_s(SWING_STARTS);
+        let end_s = self.plan.duration_s;
+        if self.clock.time_s > swing_s + LANDING * (end_s - swing_s) && self.foot.take_heel_strike() {
+            self.clock.time_s = 0.0;
+        }
+        let planned = self.plan.at(self.clock.time_s);
+        let (q, qd) = (&planned.q, &planned.qd);
+        let phase = if self.clock.time_s < swing_s {
+            PhaseVariable {
+                measured: self.hip_position(measured.thigh_rad, measured.joints_rad),
+                planned: self.hip_position(q[6] - q[2], [q[7], q[8]]),
+                planned_rate: self.hip_position(qd[6] - qd[2], [qd[7], qd[8]]),
+                slowest: SLOWEST_HIP_M_S,
+            }
+        } else {
+            PhaseVariable {
+                measured: measured.thigh_rad,
+                planned: q[6] - q[2],
+                planned_rate: qd[6] - qd[2],
+                slowest: SLOWEST_THIGH_RAD_S,
+            }
+        };
+        self.clock.advance(CONTROL_PERIOD_S, end_s, Some(phase));
+        let planned = self.plan.at(self.clock.time_s);
+        let gains = if self.foot.loaded { &STANCE } else { &SWING };
+        for joint in 0..2 {
+            let error = (
+                planned.q[7 + joint] - measured.joints_rad[joint],
+                planned.qd[7 + joint] - measured.joint_rates_rad_s[joint],
+            );
+            let command = planned.u[4 + joint] + gains[joint].torque(error);
+            self.drives[joint].follow(command, CONTROL_PERIOD_S);
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// The delay under which proportional-derivative control of an inertia becomes unstable, s.
+    fn delay_margin(gains: Gains, inertia_kg_m2: f64) -> f64 {
+        let (stiffness, damping) = (gains.torque((1.0, 0.0)) / inertia_kg_m2, gains.torque((0.0, 1.0)) / inertia_kg_m2);
+        // Where |stiffness + damping i w| = w^2, the phase is atan(damping w / stiffness) before -180 degrees.
+        let squared = 0.5 * (damping.powi(2) + (damping.powi(4) + 4.0 * stiffness.powi(2)).sqrt());
+        let frequency = squared.sqrt();
+        (damping * frequency / stiffness).atan() / frequency
+    }
+
+    #[test]
+    fn swinging_shank_and_foot_tolerate_the_largest_delay() {
+        let device = Device::ampro3().unwrap();
+        let foot_at = |x: f64, z: f64| device.foot_inertia_kg_m2 + device.foot_mass_kg * x.hypot(z).powi(2);
+        let foot = foot_at(device.foot_com_forward_m, device.foot_com_down_m);
+        let shank = device.shank_mass_kg
+            * device.shank_length_m.powi(2)
+            * (device.shank_gyration_fraction.powi(2) + device.shank_com_fraction.powi(2))
+            + foot_at(device.foot_com_forward_m, device.shank_length_m + device.foot_com_down_m);
+        for (gains, inertia) in SWING.into_iter().zip([shank, foot]) {
+            let margin = delay_margin(gains, inertia);
+            assert!(margin > 0.015, "{margin}");
+        }
+    }
+}

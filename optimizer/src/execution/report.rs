@@ -1,0 +1,106 @@
+//! The result of simulated walks.
+
+use super::simulated_walk::{End, WalkOutcome};
+use crate::statistics::wilson_interval;
+use serde::{Deserialize, Serialize};
+
+/// Simulated walks on one ground.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WalksOnGround {
+    /// Largest height and depth of the plateaus of the ground, m.
+    pub ground_height_m: f64,
+    /// Number of simulated walks.
+    pub walks: u32,
+    /// Walks that completed all strides.
+    pub completed: u32,
+    /// Walks that ended with a fall.
+    pub fell: u32,
+    /// Walks that ended without a further step.
+    pub halted: u32,
+    /// Share of completed walks.
+    pub completed_share: f64,
+    /// 95 % confidence interval of this share (Wilson).
+    pub completed_share_interval: [f64; 2],
+    /// Mean number of completed strides.
+    pub mean_strides: f64,
+    /// Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    pub knee_saturated_share: f64,
+    /// The same for its ankle.
+    pub ankle_saturated_share: f64,
+    /// Share of the time in which the knee wanted to change its torque faster than it can.
+    pub knee_rate_limited_share: f64,
+    /// The same for the ankle.
+    pub ankle_rate_limited_share: f64,
+}
+
+/// The largest pushes of a fixed ladder that the walker survives, without other disturbances. It also survives every
+/// smaller push of the ladder.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurvivedPushes {
+    /// Forwards, N s; 0 if it survives none.
+    pub forwards_n_s: f64,
+    /// Backwards, N s.
+    pub backwards_n_s: f64,
+    /// Largest push of the ladder, N s.
+    pub largest_tried_n_s: f64,
+}
+
+/// An undisturbed walk on ground of some stiffness.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StridesOnYield {
+    /// Depth of the ground under body weight, m.
+    pub yield_m: f64,
+    /// Completed strides.
+    pub strides: u32,
+}
+
+/// The execution of a gait outside the optimiser's model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExecutionReport {
+    /// Version of this layout and of the simulation.
+    pub format_version: u32,
+    /// SHA-256 of the gait as compact JSON, as in its certificate.
+    pub gait_sha256: String,
+    /// Seed of the disturbances.
+    pub seed: u64,
+    /// Strides of a complete simulated walk.
+    pub strides: u32,
+    /// Completed strides without any disturbance.
+    pub undisturbed_strides: u32,
+    /// Randomly disturbed walks, for each ground.
+    pub grounds: Vec<WalksOnGround>,
+    /// Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    pub strides_by_yield: Vec<StridesOnYield>,
+    /// Pushes. `None` if the walker does not complete the undisturbed walk.
+    pub pushes: Option<SurvivedPushes>,
+}
+
+impl WalksOnGround {
+    pub(super) fn of(ground_height_m: f64, outcomes: &[WalkOutcome]) -> Self {
+        let ended = |end: End| u32::try_from(outcomes.iter().filter(|o| o.end == end).count()).unwrap_or(u32::MAX);
+        let walks = u32::try_from(outcomes.len()).unwrap_or(u32::MAX);
+        let periods = outcomes.iter().map(|o| o.periods).sum::<u64>().max(1);
+        let share =
+            |count: &dyn Fn(&WalkOutcome) -> u64| outcomes.iter().map(count).sum::<u64>() as f64 / periods as f64;
+        let completed = ended(End::Completed);
+        let (low, high) = wilson_interval(completed, walks);
+        Self {
+            ground_height_m,
+            walks,
+            completed,
+            fell: ended(End::Fell),
+            halted: ended(End::Halted),
+            completed_share: f64::from(completed) / f64::from(walks.max(1)),
+            completed_share_interval: [low, high],
+            mean_strides: outcomes.iter().map(|o| f64::from(o.strides)).sum::<f64>() / f64::from(walks.max(1)),
+            knee_saturated_share: share(&|o| o.saturated[0]),
+            ankle_saturated_share: share(&|o| o.saturated[1]),
+            knee_rate_limited_share: share(&|o| o.rate_limited[0]),
+            ankle_rate_limited_share: share(&|o| o.rate_limited[1]),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! The time within the planned stride at which a controller is.
+//!
+//! The clock advances with time. Where a measured phase variable moves with the planned one, the clock is corrected until
+//! they agree; where the phase variable stands still or turns round, time alone advances the clock. It never runs
+//! backwards, and it waits at the end of a section for the event that starts the next one.
+
+/// Rate at which an error of the phase decays, 1/s.
+const CORRECTION_RATE_1_S: f64 = 30.0;
+/// Largest correction, in seconds per second.
+const LARGEST_CORRECTION: f64 = 1.0;
+
+/// A phase variable: as measured, and as planned at the time of the clock.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PhaseVariable {
+    pub(super) measured: f64,
+    pub(super) planned: f64,
+    pub(super) planned_rate: f64,
+    /// Magnitude of the planned rate below which the variable does not tell the time.
+    pub(super) slowest: f64,
+}
+
+/// The clock of a controller.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StrideClock {
+    pub(super) time_s: f64,
+}
+
+impl StrideClock {
+    /// Advances by `period_s`, at most to `end_s`.
+    pub(super) fn advance(&mut self, period_s: f64, end_s: f64, phase: Option<PhaseVariable>) {
+        let correction = phase.filter(|phase| phase.planned_rate.abs() >= phase.slowest).map_or(0.0, |phase| {
+            let late_s = (phase.measured - phase.planned) / phase.planned_rate;
+            (CORRECTION_RATE_1_S * late_s).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION)
+        });
+        self.time_s = (self.time_s + period_s * (1.0 + correction)).min(end_s).max(self.time_s);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(rate: f64, slowest: f64) -> f64 {
+        let mut clock = StrideClock { time_s: 0.0 };
+        for k in 0..1000 {
+            let planned = clock.time_s;
+            let measured = rate * f64::from(k + 1) * 1e-3;
+            let phase = PhaseVariable { measured, planned, planned_rate: 1.0, slowest };
+            clock.advance(1e-3, 2.0, Some(phase));
+        }
+        clock.time_s
+    }
+
+    #[test]
+    fn clock_follows_a_phase_variable_that_moves_and_time_otherwise() {
+        assert!((run(0.8, 0.1) - 0.8).abs() < 0.01);
+        assert!((run(1.2, 0.1) - 1.2).abs() < 0.01);
+        assert!((run(1.2, 1.1) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn clock_stops_at_the_end_of_its_section_and_never_runs_backwards() {
+        let mut clock = StrideClock { time_s: 0.5 };
+        let back = PhaseVariable { measured: -9.0, planned: 0.0, planned_rate: 1.0, slowest: 0.1 };
+        clock.advance(1e-3, 0.6, Some(back));
+        assert_eq!(clock.time_s, 0.5);
+        for _ in 0..1000 {
+            clock.advance(1e-3, 0.6, None);
+        }
+        assert_eq!(clock.time_s, 0.6);
+    }
+}

@@ -1,0 +1,15 @@
+//! The walker of a gait as a figure: a body with limbs, a prosthesis, muscles and ground reaction forces.
+//!
+//! Every part has a fixed outline in the frame of its segment, so that a pose is one transformation for each segment.
+//! The script of the pages and the animation for download move the same outlines.
+
+mod animation;
+mod body;
+mod figure;
+mod muscle_paths;
+mod segment;
+
+pub use animation::Animation;
+pub(crate) use body::parts;
+pub use figure::{Ghost, WalkerFigure};
+pub(crate) use segment::UNITS_PER_M;

@@ -1,0 +1,94 @@
+//! REST: ask and tell, for lab scripts that evaluate trials.
+
+use crate::AppState;
+use crate::accessible::Id;
+use crate::idempotent::{IdempotentWith, KeptBody};
+use crate::problem_details::Refusal;
+use axum::extract::State;
+use axum::response::Response;
+use gaitwright_service::access::Run;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::lab_script::{self, Ask, Tell};
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{StudyId, TrialId};
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// How often a decision is repeated because the study has changed in the meantime.
+const TRIES: usize = 20;
+
+/// Ask for a trial to evaluate
+///
+/// Returns the same trial until its outcome is reported.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/ask",
+    operation_id = "ask_for_trial",
+    tag = "scripts",
+    params(("id" = StudyId, Path, description = "A study with `evaluation` = `script`")),
+    request_body(content = Ask, description = "Optional"),
+    responses((status = 200, description = "Trial to evaluate", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn ask(
+    State(mut app): State<AppState>,
+    Id(id, _): Id<StudyId, Run>,
+    IdempotentWith(request, ask): IdempotentWith<Run, Ask>,
+) -> Result<Response, Refusal> {
+    let worker = ask.worker.as_deref().unwrap_or(&request.caller.name).trim();
+    for _ in 0..TRIES {
+        let beliefs = Arc::clone(&app.beliefs);
+        let suggestion = lab_script::suggest(app.store_mut(), id, worker, &beliefs).await;
+        let mut writer = match request.begin(&app).await? {
+            Ok(writer) => writer,
+            Err(before) => return repeat_ask(&app, before).await,
+        };
+        if let Some(trial) = lab_script::give_out(&mut writer, &request.caller, worker, &suggestion?).await? {
+            return request.done(&app, writer, &trial).await;
+        }
+    }
+    Err(Error::conflict("The study is changing too fast. Try again.").into())
+}
+
+/// Gives out a trial again, unless its bounds were reported as unsafe in the meantime.
+async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusal> {
+    #[derive(Deserialize)]
+    struct GivenOut {
+        id: TrialId,
+    }
+    let KeptBody(body) = before.extensions().get().ok_or_else(|| Error::Internal("nothing was stored".to_owned()))?;
+    let GivenOut { id } = serde_json::from_str(body).map_err(|e| Error::Internal(e.to_string()))?;
+    lab_script::not_reported(&mut *app.read().await?, id).await?;
+    Ok(before)
+}
+
+/// Report the outcome of a trial
+///
+/// An outcome without a gait is also a result. If the script fails, cancel the trial instead.
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/tell",
+    operation_id = "tell_outcome",
+    tag = "scripts",
+    params(("id" = TrialId, Path, description = "The trial")),
+    request_body = Tell,
+    responses((status = 200, description = "Trial with its outcome", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn tell(
+    State(mut app): State<AppState>,
+    Id(id, _): Id<TrialId, Run>,
+    IdempotentWith(request, tell): IdempotentWith<Run, Tell>,
+) -> Result<Response, Refusal> {
+    for _ in 0..TRIES {
+        let checked = lab_script::check_outcome(app.store_mut(), id, &tell).await;
+        let mut writer = match request.begin(&app).await? {
+            Ok(writer) => writer,
+            Err(before) => return Ok(before),
+        };
+        if let Some(trial) = lab_script::record(&mut writer, &request.caller, id, &checked?).await? {
+            return request.done(&app, writer, &trial).await;
+        }
+    }
+    Err(Error::conflict("The study is changing too fast. Try again.").into())
+}

@@ -1,0 +1,38 @@
+//! Two gaits that walk side by side, or one behind the other.
+
+use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::{Gait, ModelError};
+use gaitwright_charts::{WalkerFigure, gait_tiles};
+use gaitwright_store::TrialId;
+
+/// One gait of the pair.
+pub(super) struct WalkingGait {
+    pub(super) trial: TrialId,
+    pub(super) number: u32,
+    pub(super) name: String,
+    /// The walker, which a script moves, with the other gait behind it.
+    pub(super) walker: String,
+    /// The stride in pictures, for readers without scripts or with reduced motion.
+    pub(super) tiles: String,
+    pub(super) has_muscles: bool,
+}
+
+/// Two gaits with their trials and names.
+///
+/// # Errors
+/// [`ModelError`] if subject or device of a gait is invalid.
+pub(super) fn walking_pair([a, b]: [(TrialId, u32, String, &Gait); 2]) -> Result<[WalkingGait; 2], ModelError> {
+    let (walker_a, walker_b) = (WalkerFigure::new(a.3)?, WalkerFigure::new(b.3)?);
+    let (ghost_a, ghost_b) = (walker_a.as_ghost(), walker_b.as_ghost());
+    let shown = |(trial, number, name, gait): (TrialId, u32, String, &Gait), walker: &WalkerFigure| {
+        Ok::<_, ModelError>(WalkingGait {
+            walker: walker.svg(&format!("{name}, walking")),
+            tiles: gait_tiles(&stick_figures(gait)?),
+            has_muscles: gait.muscles,
+            trial,
+            number,
+            name,
+        })
+    };
+    Ok([shown(a, &walker_a.with_ghost(ghost_b))?, shown(b, &walker_b.with_ghost(ghost_a))?])
+}

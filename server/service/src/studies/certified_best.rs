@@ -1,0 +1,176 @@
+//! The certificates of the best gaits of a study, so that a recommendation always states whether its gait passed.
+
+use super::belief::Beliefs;
+use super::certification;
+use super::snapshot::StudySnapshot;
+use super::trial_choice;
+use crate::error::Error;
+use gaitwright_compute::OnPool;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::{Connection, Store, StoreResult, TrialId, certificates, commit, gaits};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use utoipa::ToSchema;
+
+/// The most gaits that are certified in search of one that passes.
+pub const MOST_CERTIFIED: usize = 10;
+
+/// State of the certificate of a gait.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CertificateState {
+    /// Every quantity is within its limit, and the gait is stable.
+    Passed,
+    /// A quantity exceeds its limit, or the gait is unstable.
+    Failed,
+    /// The gait is being certified.
+    BeingCertified,
+    /// The gait has no certificate.
+    #[default]
+    NotCertified,
+}
+
+impl CertificateState {
+    /// The name in tables.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "failed",
+            Self::BeingCertified => "being_certified",
+            Self::NotCertified => "not_certified",
+        }
+    }
+}
+
+/// The certificate of the best gait of a study, and an alternative if it failed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Judged {
+    /// State of the certificate of the best gait.
+    pub certificate: CertificateState,
+    /// Reasons if the certificate failed.
+    pub failures: Vec<String>,
+    /// If the best gait failed, the best one that passed.
+    pub passing: Option<TrialId>,
+    /// The best gait without a certificate among the first [`MOST_CERTIFIED`], unless a better one passed.
+    pub without_certificate: Option<TrialId>,
+    /// Whether the service is certifying that gait.
+    pub certifying: bool,
+}
+
+impl Judged {
+    /// Sets whether the service is certifying the best gait without a certificate.
+    pub fn certified_by_service(&mut self, certifying: bool) {
+        self.certifying = certifying;
+        if certifying && self.certificate == CertificateState::NotCertified {
+            self.certificate = CertificateState::BeingCertified;
+        }
+    }
+}
+
+/// Reads the certificates of gaits that are ranked best first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Judged> {
+    let mut judged = Judged::default();
+    for (place, &trial) in ranking.iter().enumerate() {
+        let certificate = match certificates::passed(db, trial).await? {
+            Some(true) => CertificateState::Passed,
+            Some(false) => CertificateState::Failed,
+            None => CertificateState::NotCertified,
+        };
+        if place == 0 {
+            judged.certificate = certificate;
+        }
+        match certificate {
+            CertificateState::Passed => {
+                judged.passing = Some(trial).filter(|_| place > 0);
+                break;
+            }
+            CertificateState::Failed => {}
+            _ if place < MOST_CERTIFIED && gaits::is_here(db, trial).await? => {
+                judged.without_certificate.get_or_insert(trial);
+            }
+            _ => {}
+        }
+    }
+    if let Some(&best) = ranking.first().filter(|_| judged.certificate == CertificateState::Failed) {
+        judged.failures = certificates::find(db, best).await?.map(|found| found.failures).unwrap_or_default();
+    }
+    Ok(judged)
+}
+
+/// The next gait to certify. `None` if one has passed, or if the first [`MOST_CERTIFIED`] failed. Skips the gaits in
+/// `refused`, which cannot be certified.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn next_to_certify(
+    db: &mut Connection,
+    ranking: &[TrialId],
+    refused: &BTreeSet<TrialId>,
+) -> StoreResult<Option<TrialId>> {
+    for &trial in ranking.iter().take(MOST_CERTIFIED) {
+        match certificates::passed(db, trial).await? {
+            Some(true) => return Ok(None),
+            None if !refused.contains(&trial) && gaits::is_here(db, trial).await? => return Ok(Some(trial)),
+            Some(false) | None => {}
+        }
+    }
+    Ok(None)
+}
+
+/// The gaits that a study recommends or may recommend: the best one, the best one that passed its certificate, and,
+/// until one passes, those that are still to be certified.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Vec<TrialId>> {
+    let mut kept = Vec::new();
+    for (place, &trial) in ranking.iter().enumerate() {
+        let passed = certificates::passed(db, trial).await?;
+        if place == 0 || passed == Some(true) || (passed.is_none() && place < MOST_CERTIFIED) {
+            kept.push(trial);
+        }
+        if passed == Some(true) {
+            break;
+        }
+    }
+    Ok(kept)
+}
+
+/// Certifies the gaits of a study, best first, until one passes or [`MOST_CERTIFIED`] have failed.
+///
+/// A malformed gait, as another worker may have sent it, stays without a certificate.
+///
+/// # Errors
+/// Errors of the learner and the database.
+pub async fn certify(
+    store: &mut Store,
+    actor: &Actor,
+    snapshot: StudySnapshot,
+    beliefs: Arc<Beliefs>,
+) -> Result<Judged, Error> {
+    let rank = move |pool: &OnPool| trial_choice::ranking_to_show(pool, &snapshot, &beliefs);
+    let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
+    let mut refused = BTreeSet::new();
+    loop {
+        let next = next_to_certify(&mut *store.read().await?, &ranking, &refused).await?;
+        let Some(trial) = next else { break };
+        let begun = certification::begin(&mut *store.read().await?, trial).await?;
+        let certificate = match certification::certificate(store, begun).await {
+            Ok(certificate) => certificate,
+            Err(error) if error.is_input() => {
+                tracing::warn!(%trial, %error, "the gait of a trial cannot be certified");
+                refused.insert(trial);
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let mut writer = store.write().await?;
+        certification::record(&mut writer, actor, trial, &certificate).await?;
+        commit(writer).await?;
+    }
+    Ok(judged(&mut *store.read().await?, &ranking).await?)
+}

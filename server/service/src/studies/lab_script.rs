@@ -1,0 +1,282 @@
+//! Trials that a lab script evaluates: the script asks for a trial and reports its outcome.
+//!
+//! Asking again before the report returns the same trial. Proposals are computed before the transaction, and written
+//! only if the study has not changed.
+
+use super::belief::Beliefs;
+use super::comparison::{by_gait_rmse, partners};
+use super::preference;
+use super::safety_reports::SafetyReports;
+use super::snapshot::StudySnapshot;
+use super::trial_choice::{self, ChoiceError};
+use crate::access::Caller;
+use crate::error::Error;
+use crate::printable;
+use gaitwright_compute::OnPool;
+use gaitwright_store::audit;
+use gaitwright_store::feedback::FeedbackContent;
+use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
+use gaitwright_store::trials::{NewTrial, ScriptOutcome, Trial, TrialState};
+use gaitwright_store::{Connection, Store, StudyId, TrialId, Writer, events, studies, trials};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::sync::Arc;
+use utoipa::ToSchema;
+
+/// A request for a trial.
+#[derive(Debug, Clone, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Ask {
+    /// Name of the evaluator, which has at most one open trial. Defaults to the caller's name.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 80)]
+    pub worker: Option<String>,
+}
+
+/// The trial for a script that asks.
+#[derive(Debug)]
+pub enum SuggestedTrial {
+    /// The open trial of this evaluator.
+    Same(TrialId),
+    /// A new trial, valid while the study matches the snapshot.
+    New(Box<StudySnapshot>, Box<NewTrial>),
+}
+
+/// Chooses the trial for an evaluator, outside any transaction.
+///
+/// # Errors
+/// [`Error::Conflict`] if the study has no trial to give, [`Error::Invalid`] for the name of the evaluator.
+pub async fn suggest(
+    store: &mut Store,
+    study: StudyId,
+    worker: &str,
+    beliefs: &Arc<Beliefs>,
+) -> Result<SuggestedTrial, Error> {
+    let beliefs = Arc::clone(beliefs);
+    let worker = printable::name("worker", worker, 80)?;
+    let mut db = store.read().await?;
+    let study = studies::get(&mut db, study).await?;
+    if study.plan.evaluation != Evaluation::Script {
+        return Err(Error::conflict(
+            "The service evaluates the trials of this study itself. Scripts need a study with evaluation \"script\".",
+        ));
+    }
+    if let Some(open) = trials::open_of(&mut db, study.id, worker).await? {
+        return Ok(SuggestedTrial::Same(open));
+    }
+    if study.state != StudyState::Running {
+        let reason = format!("The study is {}. {}", study.state.as_str(), study.state_reason);
+        return Err(Error::conflict(reason.trim_end()));
+    }
+    let snapshot = StudySnapshot::read(&mut db, study).await?;
+    drop(db);
+    let plan = &snapshot.study.plan;
+    if snapshot.trials.len() >= plan.trial_budget as usize {
+        return Err(Error::conflict(match plan.trial_budget {
+            1 => "The only trial of the study has been handed out.".to_owned(),
+            all => format!("All {all} trials of the study have been handed out."),
+        }));
+    }
+    if snapshot.open() >= plan.parallel_trials as usize {
+        return Err(Error::conflict(match snapshot.open() {
+            1 => "A trial is open. Report its outcome first.".to_owned(),
+            open => format!("{open} trials are open. Report their outcomes first."),
+        }));
+    }
+    let choose = move |pool: &OnPool| {
+        let believed = beliefs.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
+        let chosen = believed.and_then(|belief| trial_choice::next_trial(pool, &snapshot, &belief));
+        (snapshot, chosen)
+    };
+    let (snapshot, chosen) = store.compute(choose).await?;
+    match chosen {
+        Ok(new) => Ok(SuggestedTrial::New(Box::new(snapshot), Box::new(new))),
+        Err(e) if e.is_exhausted() => Err(Error::conflict("Every action of the search space has been tried.")),
+        Err(ChoiceError::Learner(e)) => Err(Error::Learner(e)),
+        Err(ChoiceError::Bounds(e)) => Err(e.into()),
+    }
+}
+
+/// Refuses a trial whose bounds were reported as unsafe since it was handed out.
+///
+/// # Errors
+/// [`Error::Conflict`]; errors of the database.
+pub async fn not_reported(db: &mut Connection, trial: TrialId) -> Result<(), Error> {
+    let trial = trials::get(db, trial).await?;
+    let reports = SafetyReports::read(db, trial.study_id).await?;
+    if reports.closed_bounds().any(|bounds| bounds == trial.action) {
+        let number = trial.number;
+        return Err(Error::conflict(format!(
+            "A gait with the bounds of trial {number} was reported as unsafe. Cancel the trial, then ask again."
+        )));
+    }
+    Ok(())
+}
+
+/// Writes the chosen trial. Returns `None` if the study has changed, and the caller must choose again.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn give_out(
+    writer: &mut Writer,
+    caller: &Caller,
+    worker: &str,
+    suggestion: &SuggestedTrial,
+) -> Result<Option<Trial>, Error> {
+    let (snapshot, new) = match suggestion {
+        SuggestedTrial::Same(id) => {
+            let open = trials::get(writer, *id).await?;
+            not_reported(writer, open.id).await?;
+            audit::append(writer, &caller.actor, "trial.ask", &format!("trial {id}"), &json!({ "again": true }))
+                .await?;
+            return Ok(Some(open));
+        }
+        SuggestedTrial::New(snapshot, new) => (snapshot, new),
+    };
+    let study = snapshot.study.id;
+    if !is_current(writer, snapshot).await? {
+        return Ok(None);
+    }
+    let Some(id) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
+    trials::give_to(writer, id, worker).await?;
+    let payload = json!({ "trial_id": id, "number": new.number, "state": TrialState::Running });
+    events::append(writer, study, "trial_started", &payload).await?;
+    let detail = json!({ "study": study, "worker": worker, "number": new.number });
+    audit::append(writer, &caller.actor, "trial.ask", &format!("trial {id}"), &detail).await?;
+    Ok(Some(trials::get(writer, id).await?))
+}
+
+/// Outcome of a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The evaluation found a gait.
+    Converged,
+    /// The evaluation found no gait, which is a result too.
+    NotConverged,
+}
+
+/// The outcome of a trial, as a script reports it.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tell {
+    /// Whether the evaluation found a gait.
+    pub outcome: Outcome,
+    /// Why there is no gait, 1 to 2000 characters. Required for `not_converged`.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub reason: String,
+    /// Gait RMSE, rad. Required for `converged` if Gait RMSE answers the comparisons of the study.
+    #[serde(default)]
+    #[schema(minimum = 0)]
+    pub gait_rmse_rad: Option<f64>,
+    /// Cost of transport.
+    #[serde(default)]
+    pub cost_of_transport: Option<f64>,
+}
+
+/// A checked outcome, ready to be written.
+#[derive(Debug)]
+pub struct CheckedOutcome {
+    snapshot: StudySnapshot,
+    outcome: ScriptOutcome,
+    answers: Vec<FeedbackContent>,
+}
+
+/// Checks an outcome and derives its preferences, outside any transaction.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial is not open or not evaluated by a script.
+pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Result<CheckedOutcome, Error> {
+    let mut db = store.read().await?;
+    let trial = trials::get(&mut db, id).await?;
+    if trial.asked_by.is_none() {
+        return Err(Error::conflict("The service evaluates this trial itself."));
+    }
+    if trial.state != TrialState::Running {
+        return Err(Error::conflict(format!("The trial is already {}.", trial.state.as_str())));
+    }
+    let study = studies::get(&mut db, trial.study_id).await?;
+    let outcome = checked(&study, tell)?;
+    let snapshot = StudySnapshot::read(&mut db, study).await?;
+    drop(db);
+    let (TrialState::Converged, Some(rmse)) = (outcome.state, outcome.gait_rmse_rad) else {
+        return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
+    };
+    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
+        return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
+    }
+    let find = move |pool: &OnPool| {
+        let partners = partners(pool, &snapshot, id);
+        (snapshot, partners)
+    };
+    let (snapshot, partners) = store.compute(find).await?;
+    let partners = partners.map_err(Error::Learner)?;
+    let answers = partners
+        .into_iter()
+        .filter_map(|old| snapshot.trial(old)?.gait_rmse_rad.map(|figure| by_gait_rmse((id, rmse), (old, figure))))
+        .collect();
+    Ok(CheckedOutcome { snapshot, outcome, answers })
+}
+
+fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
+    let reason = tell.reason.trim();
+    printable::note("reason", reason, 2000)?;
+    for (field, value) in [("gait_rmse_rad", tell.gait_rmse_rad), ("cost_of_transport", tell.cost_of_transport)] {
+        if value.is_some_and(|value| !(0.0..1e6).contains(&value)) {
+            return Err(Error::invalid(field, json!(value), "0 to 1e6"));
+        }
+    }
+    let state = match tell.outcome {
+        Outcome::Converged => TrialState::Converged,
+        Outcome::NotConverged if reason.is_empty() => {
+            return Err(Error::invalid("reason", "", "1 to 2000 characters that say why there is no gait"));
+        }
+        Outcome::NotConverged => TrialState::NotConverged,
+    };
+    let answered_by_rmse = study.plan.feedback_mode != FeedbackMode::Human;
+    if state == TrialState::Converged && answered_by_rmse && tell.gait_rmse_rad.is_none() {
+        let allowed = "a number, because Gait RMSE answers the comparisons of this study";
+        return Err(Error::invalid("gait_rmse_rad", json!(null), allowed));
+    }
+    Ok(ScriptOutcome {
+        state,
+        gait_rmse_rad: tell.gait_rmse_rad.filter(|_| state == TrialState::Converged),
+        cost_of_transport: tell.cost_of_transport.filter(|_| state == TrialState::Converged),
+        message: reason.to_owned(),
+    })
+}
+
+/// Writes an outcome. Returns `None` if the study has changed, and the caller must check again.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn record(
+    writer: &mut Writer,
+    caller: &Caller,
+    id: TrialId,
+    checked: &CheckedOutcome,
+) -> Result<Option<Trial>, Error> {
+    let study = checked.snapshot.study.id;
+    let present = trials::get(writer, id).await?;
+    if present.state != TrialState::Running || !is_current(writer, &checked.snapshot).await? {
+        return Ok(None);
+    }
+    trials::tell(writer, id, &checked.outcome).await?;
+    preference::compute(writer, study, (id, checked.outcome.state), &checked.answers, &caller.name).await?;
+    let payload = json!({ "trial_id": id, "number": present.number, "state": checked.outcome.state });
+    events::append(writer, study, "trial_ended", &payload).await?;
+    let detail =
+        json!({ "study": study, "state": checked.outcome.state, "gait_rmse_rad": checked.outcome.gait_rmse_rad });
+    audit::append(writer, &caller.actor, "trial.tell", &format!("trial {id}"), &detail).await?;
+    Ok(Some(trials::get(writer, id).await?))
+}
+
+/// Whether the study has received no answer and given out no trial since the snapshot.
+async fn is_current(writer: &mut Writer, snapshot: &StudySnapshot) -> Result<bool, Error> {
+    let study = snapshot.study.id;
+    let total = trials::counts(writer, study).await?.total;
+    Ok(snapshot.is_current(writer).await?
+        && total as usize == snapshot.trials.len()
+        && studies::get(writer, study).await?.revision == snapshot.study.revision)
+}

@@ -1,0 +1,131 @@
+//! Tells whether two trials of a subject have the same gait, as when they differ only in a bound that is not active, or
+//! when one study is the fork of another.
+
+use gait_optimizer::{SolveReport, TunedBounds};
+use gaitwright_store::trials::{Trial, TrialState};
+
+/// Relative difference up to which two figures count as the same. Solves that find the same gait from
+/// different starts can differ by more than 1e-5.
+const TOLERANCE: f64 = 1e-4;
+/// Difference up to which two durations count as the same, s. The shortest domains last 20 ms, so a relative tolerance
+/// would be less than what the constraints leave open.
+const TOLERANCE_S: f64 = 1e-4;
+
+/// What identifies the gait of a trial, in whichever study of the subject it was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GaitMotion {
+    known_by: KnownBy,
+    bounds: TunedBounds,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum KnownBy {
+    /// The optimiser computed the gait, and these figures of its report identify it.
+    Figures(Figures),
+    /// A lab script evaluated the bounds with a tool of its own, so nothing but the bounds identifies the gait.
+    Bounds,
+}
+
+impl GaitMotion {
+    /// The motion of a trial; `None` if the trial has no gait.
+    pub fn of(trial: &Trial) -> Option<Self> {
+        let known_by = trial.report.as_ref().map_or(KnownBy::Bounds, |report| KnownBy::Figures(Figures::of(report)));
+        (trial.state == TrialState::Converged).then_some(Self { known_by, bounds: trial.action })
+    }
+
+    /// The bounds of the gait.
+    pub fn bounds(&self) -> TunedBounds {
+        self.bounds
+    }
+
+    /// Whether the gaits of two trials with the same device are the same. If one of them is known by its bounds only,
+    /// equal bounds count as the same gait: staff can clear a gait that a report closes without need.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.figures_agree(other).unwrap_or(self.bounds == other.bounds)
+    }
+
+    /// Whether the gaits of two trials with different devices are the same, where equal bounds mean nothing.
+    pub fn is_same_with_another_device(&self, other: &Self) -> bool {
+        self.figures_agree(other).unwrap_or(false)
+    }
+
+    fn figures_agree(&self, other: &Self) -> Option<bool> {
+        match (&self.known_by, &other.known_by) {
+            (KnownBy::Figures(own), KnownBy::Figures(others)) => Some(own.agree(others)),
+            _ => None,
+        }
+    }
+}
+
+/// Figures of a report that identify a motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Figures {
+    cost_of_transport: f64,
+    stride_length_m: f64,
+    vhip_m_s: [f64; 4],
+    durations_s: [f64; 8],
+}
+
+impl Figures {
+    fn of(report: &SolveReport) -> Self {
+        let SolveReport { cost_of_transport, stride_length_m, vhip_m_s, durations_s, .. } = *report;
+        Self { cost_of_transport, stride_length_m, vhip_m_s, durations_s }
+    }
+
+    fn agree(&self, other: &Self) -> bool {
+        let relative = |of: &Self| [of.cost_of_transport, of.stride_length_m].into_iter().chain(of.vhip_m_s);
+        let close = |(one, other): (f64, f64)| (one - other).abs() <= TOLERANCE * one.abs().max(other.abs());
+        let mut durations = self.durations_s.iter().zip(&other.durations_s);
+        relative(self).zip(relative(other)).all(close)
+            && durations.all(|(one, other)| (one - other).abs() <= TOLERANCE_S)
+    }
+}
+
+/// Whether two trials of a study have the same gait.
+pub fn is_same_gait(one: &Trial, other: &Trial) -> bool {
+    one.id == other.id || GaitMotion::of(one).zip(GaitMotion::of(other)).is_some_and(|(one, other)| one.is_same(&other))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FIGURES: Figures =
+        Figures { cost_of_transport: 0.07, stride_length_m: 1.31, vhip_m_s: [1.0; 4], durations_s: [0.1; 8] };
+
+    fn motion(known_by: KnownBy, a1: f64) -> GaitMotion {
+        GaitMotion { known_by, bounds: TunedBounds { a1, ..TunedBounds::default() } }
+    }
+
+    #[test]
+    fn computed_motions_differ_beyond_the_tolerance_in_any_figure_whatever_their_bounds() {
+        let one = motion(KnownBy::Figures(FIGURES), 15.0);
+        let scales: [fn(&mut Figures, f64); 4] = [
+            |figures, factor| figures.cost_of_transport *= factor,
+            |figures, factor| figures.stride_length_m *= factor,
+            |figures, factor| figures.vhip_m_s[3] *= factor,
+            |figures, factor| figures.durations_s[7] *= factor,
+        ];
+        for scale in scales {
+            let scaled = |factor| {
+                let mut figures = FIGURES;
+                scale(&mut figures, factor);
+                motion(KnownBy::Figures(figures), 16.0)
+            };
+            let (near, far) = (scaled(1.0 + 5e-5), scaled(1.0 + 3e-3));
+            assert!(one.is_same(&near) && one.is_same_with_another_device(&near), "{near:?}");
+            assert!(!one.is_same(&far) && !one.is_same_with_another_device(&far), "{far:?}");
+        }
+    }
+
+    #[test]
+    fn motions_without_figures_are_the_same_if_their_bounds_are_equal_on_one_device() {
+        let computed = motion(KnownBy::Figures(FIGURES), 15.0);
+        let by_lab = motion(KnownBy::Bounds, 15.0);
+        for other in [&computed, &by_lab] {
+            assert!(by_lab.is_same(other) && other.is_same(&by_lab));
+            assert!(!by_lab.is_same_with_another_device(other) && !other.is_same_with_another_device(&by_lab));
+        }
+        assert!(!by_lab.is_same(&motion(KnownBy::Bounds, 16.0)));
+    }
+}

@@ -1,0 +1,97 @@
+//! Dispatch of jobs: leases a queued job and submits its solve to the engine.
+
+use super::super::prefetch::{PREPARED, Prepared};
+use super::super::solve_input::{PackedInput, SolveInput};
+use super::super::trial_result;
+use super::Scheduler;
+use crate::error::Error;
+use crate::workers::{Assignment, Attempt, DispatchError};
+use gaitwright_store::jobs::{self, Lease};
+use gaitwright_store::{Store, TrialId, commit, now, trials};
+
+impl Scheduler {
+    /// Dispatches jobs while the engine has free workers.
+    pub(super) async fn dispatch(&self) -> Result<(), Error> {
+        while let Some(lease) = self.lease().await? {
+            self.submit(&lease).await?;
+        }
+        Ok(())
+    }
+
+    pub(super) async fn lease(&self) -> Result<Option<Lease>, Error> {
+        let engine = &self.0.engine;
+        // This runs on every change, so it must not occupy the only writer.
+        let (queued, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        if queued == 0 || leased as usize >= engine.size() || engine.trouble().is_some() {
+            return Ok(None);
+        }
+        let mut writer = self.0.store.write().await?;
+        let until = now().after(engine.lease());
+        let Some(lease) = jobs::lease(&mut writer, engine.name(), until, self.0.only, engine.size()).await? else {
+            return Ok(None);
+        };
+        commit(writer).await?;
+        Ok(Some(lease))
+    }
+
+    pub(super) async fn submit(&self, lease: &Lease) -> Result<(), Error> {
+        let assignment = match assignment(&mut self.0.unpacking.clone(), lease).await {
+            Ok(assignment) => assignment,
+            Err(error) => {
+                trial_result::broke(&self.0.store, lease, &error.to_string()).await?;
+                return Ok(());
+            }
+        };
+        let attempt = assignment.attempt;
+        let hand_over = self.0.hand_over.lock().await;
+        match self.0.prefetches.claim(&assignment) {
+            Prepared::Nothing => {}
+            Prepared::Running => return self.started(attempt, PREPARED).await,
+            Prepared::Done(finding) => {
+                drop(hand_over);
+                self.started(attempt, PREPARED).await?;
+                self.ended(attempt, PREPARED, finding).await?;
+                self.changed();
+                return Ok(());
+            }
+        }
+        if self.busy().await? > self.0.engine.size() {
+            self.withdraw(self.0.prefetches.forget_running()).await;
+        }
+        if let Err(error) = self.0.engine.submit(assignment).await {
+            // An expired lease is dispatched again.
+            tracing::error!(trial = %lease.trial, %error, "the engine refused a job");
+            if matches!(error, DispatchError::Unreachable(_)) {
+                self.lease_until(lease, now()).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of dispatched solves, prefetches included.
+    pub(super) async fn busy(&self) -> Result<usize, Error> {
+        let (_, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        Ok(leased as usize + self.0.prefetches.running())
+    }
+
+    pub(super) async fn withdraw(&self, names: Vec<TrialId>) {
+        for name in names {
+            self.0.engine.withdraw(name).await;
+        }
+    }
+}
+
+/// The solve of a leased job.
+async fn assignment(store: &mut Store, lease: &Lease) -> Result<Assignment, Error> {
+    let mut reader = store.read().await?;
+    let number = trials::get(&mut reader, lease.trial).await?.number;
+    let input = PackedInput::of_trial(&mut reader, lease.trial).await?;
+    drop(reader);
+    let input = store.compute(move |pool| input.unpack(pool)).await??;
+    Ok(assigned(Attempt { trial: lease.trial, number: lease.attempt }, number, input))
+}
+
+pub(super) fn assigned(attempt: Attempt, number: u32, input: SolveInput) -> Assignment {
+    let SolveInput { problem, options, warm_start } = input;
+    Assignment { attempt, number, problem, warm_start, options }
+}

@@ -1,0 +1,258 @@
+//! The scheduler: proposes trials, dispatches their solves and records the results, for every running study.
+//!
+//! One task plans and dispatches jobs, one receives the messages of workers, one prefetches solves for studies that
+//! wait for an answer. Their decisions depend on the record alone, so the process may end at any instant.
+
+mod job_dispatch;
+mod leases;
+mod message_loop;
+mod planning_loop;
+mod prefetch_loop;
+
+use super::belief::Beliefs;
+use super::certifier::Certifier;
+use super::explainer::Explainer;
+use super::explanation::Effort;
+use super::job::{JobId, JobState};
+use super::prefetch::Prefetches;
+use super::snapshot::StudySnapshot;
+use crate::error::Error;
+use crate::supervise::{Task, Tasks};
+use crate::workers::{AfterSolves, Board, Dispatch};
+use futures_util::future::BoxFuture;
+use gaitwright_store::{Store, StudyId, TrialId};
+use std::fmt;
+use std::sync::Arc;
+use tokio::sync::{Mutex, Notify, OnceCell, watch};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+
+/// How often a lease is renewed within its duration. Workers report each iteration, which is too often to write.
+const HEARTBEATS_PER_LEASE: u32 = 3;
+
+/// Runs the studies of a record. Cheap to clone.
+#[derive(Debug, Clone)]
+pub struct Scheduler(Arc<Inner>);
+
+struct Inner {
+    store: Store,
+    /// The record with its own thread pool, so that a job does not wait for the posterior of another study.
+    unpacking: Store,
+    engine: Arc<dyn Dispatch>,
+    /// Progress of the running solves.
+    board: Arc<Board>,
+    /// Prefetched solves.
+    prefetches: Prefetches,
+    /// Snapshots of the studies that wait for an answer, for prefetching.
+    waiting: watch::Sender<Arc<[Arc<StudySnapshot>]>>,
+    /// The tasks that certify the best gaits of ended studies and explain their trials without a gait.
+    after_solves: Option<(Certifier, Explainer)>,
+    beliefs: Arc<Beliefs>,
+    /// Held from the search for a free worker until the engine has the job, so that a prefetch never takes the worker
+    /// of a trial.
+    hand_over: Mutex<()>,
+    /// If set, the only study that is run.
+    only: Option<StudyId>,
+    /// Signals a change that needs planning.
+    wake: Notify,
+    /// Counts changes of the record, so that listeners know when to read events.
+    pulse: watch::Sender<u64>,
+    shutdown: CancellationToken,
+    tasks: TaskTracker,
+    /// Health of the background tasks.
+    health: Tasks,
+    leases_taken_back: OnceCell<()>,
+}
+
+impl fmt::Debug for Inner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scheduler")
+            .field("engine", &self.engine.name())
+            .field("only", &self.only)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Scheduler {
+    /// Creates a scheduler; [`Self::run`] starts it. Without `after_solves`, it certifies gaits on request only and
+    /// explains nothing.
+    pub fn new(
+        store: &Store,
+        engine: Arc<dyn Dispatch>,
+        only: Option<StudyId>,
+        after_solves: Option<AfterSolves>,
+    ) -> Self {
+        // A separate pool, so that requests cannot delay planning.
+        let store = store.with_own_pool();
+        let beliefs = Arc::<Beliefs>::default();
+        let over_record = |AfterSolves { certify, explain }| {
+            (Certifier::new(store.clone(), certify, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
+        };
+        Self(Arc::new(Inner {
+            after_solves: after_solves.map(over_record),
+            unpacking: store.with_own_pool(),
+            store,
+            beliefs,
+            engine,
+            board: Arc::default(),
+            prefetches: Prefetches::default(),
+            waiting: watch::channel(Arc::default()).0,
+            hand_over: Mutex::default(),
+            only,
+            wake: Notify::new(),
+            pulse: watch::channel(0).0,
+            shutdown: CancellationToken::new(),
+            tasks: TaskTracker::new(),
+            health: Tasks::default(),
+            leases_taken_back: OnceCell::new(),
+        }))
+    }
+
+    /// The record.
+    pub fn store(&self) -> &Store {
+        &self.0.store
+    }
+
+    /// Progress of the running solves.
+    pub fn board(&self) -> &Arc<Board> {
+        &self.0.board
+    }
+
+    /// Cached posteriors of studies.
+    pub fn beliefs(&self) -> &Arc<Beliefs> {
+        &self.0.beliefs
+    }
+
+    /// Number of solves that can run in parallel.
+    pub fn workers(&self) -> usize {
+        self.0.engine.size()
+    }
+
+    /// Changes with every change of the record.
+    pub fn pulse(&self) -> watch::Receiver<u64> {
+        self.0.pulse.subscribe()
+    }
+
+    /// Cancelled when the scheduler stops, so that endless streams end.
+    pub fn stopping(&self) -> CancellationToken {
+        self.0.shutdown.clone()
+    }
+
+    /// Announces a change of the record: wakes planning and listeners.
+    pub fn changed(&self) {
+        self.0.pulse.send_modify(|count| *count = count.wrapping_add(1));
+        self.0.wake.notify_one();
+    }
+
+    /// Requests certificates of the best gaits of a study; `next` is the first one without. Returns `false` if this
+    /// process certifies gaits on request only.
+    pub fn certify_best_of(&self, study: StudyId, next: TrialId) -> bool {
+        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.ask(study, next))
+    }
+
+    /// Requests the certificate of one gait. Returns `false` if this process certifies none.
+    pub fn certify(&self, trial: TrialId) -> bool {
+        self.0.after_solves.as_ref().map(|(certifier, _)| certifier.ask_for(trial)).is_some()
+    }
+
+    /// The gaits whose certificates were requested, each with the state of its job.
+    pub fn certifying(&self) -> Vec<(TrialId, JobState)> {
+        self.0.after_solves.as_ref().map(|(certifier, _)| certifier.jobs()).unwrap_or_default()
+    }
+
+    /// Stops the work of a job that was cancelled.
+    pub async fn cancel_job(&self, id: JobId) {
+        match (id, &self.0.after_solves) {
+            (JobId::Solve(trial), _) => self.cancel_solve(trial).await,
+            (JobId::Certificate(trial), Some((certifier, _))) => certifier.cancel(trial),
+            (JobId::Explanation(trial), Some((_, explainer))) => explainer.cancel(trial),
+            (JobId::Certificate(_) | JobId::Explanation(_), None) | (JobId::Backup(_), _) => {}
+        }
+    }
+
+    /// Resumes the explanation of a trial whose explanation was cancelled.
+    pub fn explain_again(&self, trial: TrialId) {
+        if let Some((_, explainer)) = &self.0.after_solves {
+            explainer.again(trial);
+        }
+    }
+
+    /// Whether a gait of a study is being certified or is queued.
+    pub fn is_certifying(&self, study: StudyId, gait: TrialId) -> bool {
+        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.is_at(study, gait))
+    }
+
+    /// The state of the explanation of a trial in this process.
+    pub fn explaining(&self, trial: TrialId) -> Effort {
+        self.0.after_solves.as_ref().map_or(Effort::None, |(_, explainer)| explainer.effort(trial))
+    }
+
+    /// Cancels the solve of a trial, which stops within one iteration.
+    pub async fn cancel_solve(&self, trial: TrialId) {
+        self.0.engine.withdraw(self.0.prefetches.name_of(trial)).await;
+        self.0.board.close(trial);
+    }
+
+    /// Keeps another background task running until the scheduler stops; [`Self::trouble`] reports its failures too.
+    pub async fn keep<F>(&self, name: &'static str, begin: impl Fn(Task) -> F)
+    where
+        F: Future<Output = Result<(), Error>> + Send + 'static,
+    {
+        self.0.health.keep(name, &self.0.shutdown, begin).await;
+    }
+
+    /// Stops the scheduler; [`Self::run`] returns soon after.
+    pub fn stop(&self) {
+        self.0.shutdown.cancel();
+    }
+
+    /// Runs until [`Self::stop`]. Solves that are still running in this process return to the queue.
+    ///
+    /// # Errors
+    /// Errors of the database while stopping. A task that fails earlier is restarted, and [`Self::trouble`] reports it.
+    pub async fn run(&self) -> Result<(), Error> {
+        let keep = |name, begin: fn(Self, Task) -> BoxFuture<'static, Result<(), Error>>| {
+            let scheduler = self.clone();
+            async move {
+                let begin = |task| begin(scheduler.clone(), task);
+                scheduler.0.health.keep(name, &scheduler.0.shutdown, begin).await;
+            }
+        };
+        tokio::join!(
+            keep("planning", |scheduler, task| Box::pin(async move { scheduler.keep_planning(&task).await })),
+            keep("listening to workers", |scheduler, task| Box::pin(
+                async move { scheduler.keep_listening(&task).await }
+            )),
+            keep("prefetching", |scheduler, task| { Box::pin(async move { scheduler.keep_prefetching(&task).await }) }),
+            keep("certifying gaits", |scheduler, task| Box::pin(async move { scheduler.keep_certifying(&task).await })),
+            keep("explaining trials", |scheduler, task| Box::pin(
+                async move { scheduler.keep_explaining(&task).await }
+            )),
+        );
+        self.0.tasks.close();
+        self.0.tasks.wait().await;
+        self.withdraw(self.0.prefetches.forget_running()).await;
+        self.take_back_leases().await
+    }
+
+    /// Which background tasks have failed, in words; `None` if all run.
+    pub fn trouble(&self) -> Option<String> {
+        self.0.health.trouble().or_else(|| self.0.engine.trouble())
+    }
+
+    /// Certifies gaits forever.
+    async fn keep_certifying(&self, task: &Task) -> Result<(), Error> {
+        let Some((certifier, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        task.works();
+        certifier.run(self.pulse(), || self.changed(), |study| explainer.take_up(study)).await;
+        Ok(())
+    }
+
+    /// Explains trials without a gait forever.
+    async fn keep_explaining(&self, task: &Task) -> Result<(), Error> {
+        let Some((_, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        task.works();
+        explainer.run(self.pulse(), || self.changed()).await;
+        Ok(())
+    }
+}

@@ -1,0 +1,154 @@
+//! Changes a study: its name and limits, its trial budget, or a fork of it. For pages and REST.
+
+use super::lifecycle::{self, Act};
+use super::study_plan;
+use crate::error::Error;
+use crate::printable;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::studies::{FeedbackMode, Study, StudyLimits, StudyState};
+use gaitwright_store::{StudyId, Writer, events, members, studies};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Changes to a study. Absent fields keep their values.
+#[derive(Debug, Clone, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// Name shown to users.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 120)]
+    pub name: Option<String>,
+    /// Priority, -10 to 10. Higher values run first.
+    #[serde(default)]
+    #[schema(minimum = -10, maximum = 10)]
+    pub priority: Option<i32>,
+    /// Number of trials that run in parallel.
+    #[serde(default)]
+    #[schema(minimum = 1, maximum = 64)]
+    pub parallel_trials: Option<u32>,
+}
+
+/// Applies changes to a study.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`].
+pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Change) -> Result<Study, Error> {
+    let study = studies::get(writer, id).await?;
+    let name = match change.name.as_deref().map(str::trim) {
+        None => study.plan.name.clone(),
+        Some(name) => printable::name("name", name, study_plan::LONGEST_NAME)?.to_owned(),
+    };
+    let limits = StudyLimits {
+        name,
+        priority: change.priority.unwrap_or(study.plan.priority),
+        parallel_trials: change.parallel_trials.unwrap_or(study.plan.parallel_trials),
+        trial_budget: study.plan.trial_budget,
+    };
+    study_plan::check_range("priority", i64::from(limits.priority), -10, 10)?;
+    study_plan::check_range("parallel_trials", i64::from(limits.parallel_trials), 1, 64)?;
+    studies::set_limits(writer, id, &limits).await?;
+    let detail = json!({
+        "name": limits.name, "priority": limits.priority, "parallel_trials": limits.parallel_trials,
+        "before": { "name": study.plan.name, "priority": study.plan.priority, "parallel_trials": study.plan.parallel_trials },
+    });
+    changed(writer, actor, "study.change", &study, study.state, &detail).await
+}
+
+/// A larger trial budget.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Extend {
+    /// Total number of trials. Must exceed the current budget.
+    #[schema(minimum = 2, maximum = 10000)]
+    pub trial_budget: u32,
+}
+
+/// Raises the trial budget of a study. A study that has ended resumes.
+///
+/// # Errors
+/// [`Error::Invalid`] if the budget would not increase, [`Error::NotFound`].
+pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Extend) -> Result<Study, Error> {
+    let study = studies::get(writer, id).await?;
+    let least = i64::from(study.plan.trial_budget) + 1;
+    study_plan::check_range("trial_budget", i64::from(more.trial_budget), least, 10_000)?;
+    let state = match study.state {
+        ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, Act::Extend)?,
+        other => other,
+    };
+    let limits = StudyLimits {
+        name: study.plan.name.clone(),
+        priority: study.plan.priority,
+        parallel_trials: study.plan.parallel_trials,
+        trial_budget: more.trial_budget,
+    };
+    studies::set_limits(writer, id, &limits).await?;
+    if state != study.state && !studies::set_state(writer, &study, state, "extended").await? {
+        return Err(Error::conflict("The study was changed at the same time. Try again."));
+    }
+    let detail = json!({ "from": study.plan.trial_budget, "to": more.trial_budget, "state": state });
+    changed(writer, actor, "study.extend", &study, state, &detail).await
+}
+
+/// A new study with the set-up of another one. Absent fields are copied.
+#[derive(Debug, Clone, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fork {
+    /// Name shown to users.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Seed for all random draws except allocations.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// Number of trials.
+    #[serde(default)]
+    pub trial_budget: Option<u32>,
+    /// Whether to solve with muscles.
+    #[serde(default)]
+    pub muscles: Option<bool>,
+    /// Who answers comparisons.
+    #[serde(default)]
+    pub feedback_mode: Option<FeedbackMode>,
+    /// Whether to start the study immediately.
+    #[serde(default)]
+    pub start: bool,
+}
+
+/// Creates a study with the set-up of another one, without its trials.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`].
+pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) -> Result<Study, Error> {
+    let from = studies::get(writer, id).await?;
+    let mut new = study_plan::NewStudy::like(&from.plan);
+    new.name = Some(fork.name.clone().unwrap_or_else(|| fork_of(&from.plan.name)));
+    new.seed = fork.seed.unwrap_or(new.seed);
+    new.trial_budget = fork.trial_budget.unwrap_or(new.trial_budget);
+    new.muscles = fork.muscles.unwrap_or(new.muscles);
+    new.feedback_mode = fork.feedback_mode.unwrap_or(new.feedback_mode);
+    new.start = fork.start;
+    let made = study_plan::create_from(writer, actor, new, Some(id)).await?;
+    // The set-up of a restricted study stays visible to its members only.
+    members::inherit(writer, id, made.id, actor.as_str()).await?;
+    Ok(made)
+}
+
+/// The default name of a fork: that of the study, shortened if it would be too long.
+fn fork_of(name: &str) -> String {
+    const MARK: &str = " (fork)";
+    let kept: String = name.chars().take(study_plan::LONGEST_NAME - MARK.len()).collect();
+    format!("{}{MARK}", kept.trim_end())
+}
+
+async fn changed(
+    writer: &mut Writer,
+    actor: &Actor,
+    action: &str,
+    before: &Study,
+    state: StudyState,
+    detail: &serde_json::Value,
+) -> Result<Study, Error> {
+    events::append(writer, before.id, "study_changed", &json!({ "state": state, "reason": action })).await?;
+    audit::append(writer, actor, action, &format!("study {}", before.id), detail).await?;
+    Ok(studies::get(writer, before.id).await?)
+}

@@ -1,0 +1,362 @@
+//! Checks and creates a study, for pages, REST and the command line.
+
+use super::search_space::{self, GivenSpace};
+use super::subject::{self, NewSubject};
+use super::{built_in_entries, membership, nearest_reference};
+use crate::access::Caller;
+use crate::error::{Error, FieldError};
+use crate::printable;
+use gait_learner::{LearnerError, LearnerSettings};
+use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
+use gaitwright_store::{
+    Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, openapi_schemas,
+    reference_gaits, studies, subjects,
+};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// A study to create. Every field except the subject has a default.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewStudy {
+    /// Subject of the study.
+    pub subject_id: SubjectId,
+    /// Name shown to users. Made from subject and variant by default.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Device. The built-in one by default.
+    #[serde(default)]
+    pub device_id: Option<DeviceId>,
+    /// Reference gait for Gait RMSE. By default the one nearest to the subject in height and body mass, or the built-in
+    /// one if no reference gait states height and mass.
+    #[serde(default)]
+    pub reference_gait_id: Option<ReferenceGaitId>,
+    /// Whether to solve with muscles (C1-C12) or without (C1-C4).
+    #[serde(default = "yes")]
+    pub muscles: bool,
+    /// Settings of the gait problem. Unless they set muscles, the measured muscle values of the subject apply.
+    #[serde(default)]
+    #[schema(value_type = openapi_schemas::GaitSettings)]
+    pub gait_settings: Box<GaitSettings>,
+    /// Limits of one solve.
+    #[serde(default)]
+    #[schema(value_type = openapi_schemas::SolveOptions)]
+    pub solve_options: SolveOptions,
+    /// Values of the bounds that are not tuned.
+    #[serde(default)]
+    #[schema(value_type = openapi_schemas::Bounds)]
+    pub base_bounds: TunedBounds,
+    /// Tuned bounds and their values. Table I of the paper by default.
+    #[serde(default)]
+    #[schema(value_type = Option<openapi_schemas::SearchSpace>)]
+    pub search_space: Option<GivenSpace>,
+    /// Settings of the learner. Absent settings take the values that the method recommends.
+    #[serde(default)]
+    #[schema(value_type = openapi_schemas::LearnerSettings)]
+    pub learner: LearnerSettings,
+    /// Who answers comparisons.
+    #[serde(default = "automatic")]
+    pub feedback_mode: FeedbackMode,
+    /// Who evaluates trials.
+    #[serde(default = "optimizer")]
+    pub evaluation: Evaluation,
+    /// Number of trials.
+    #[serde(default = "fifteen")]
+    #[schema(minimum = 1, maximum = 10000)]
+    pub trial_budget: u32,
+    /// Total solve time, s, after which no new trial starts.
+    #[serde(default)]
+    pub solve_seconds_budget: Option<f64>,
+    /// The study finishes when the best action has not changed over this many results.
+    #[serde(default)]
+    #[schema(minimum = 1, maximum = 10000)]
+    pub unchanged_limit: Option<u32>,
+    /// Whether a trial may have an action whose gait is known from another trial, as in the paper. By default, only if
+    /// the learner may repeat actions. Has no effect if scripts evaluate the trials.
+    #[serde(default)]
+    pub repeat_results: Option<bool>,
+    /// Number of trials that run in parallel.
+    #[serde(default = "one")]
+    pub parallel_trials: u32,
+    /// Priority, -10 to 10. Higher values run first.
+    #[serde(default)]
+    pub priority: i32,
+    /// Seed for all random draws except allocations.
+    #[serde(default = "one_seed")]
+    pub seed: u64,
+    /// Whether to start the study immediately.
+    #[serde(default = "yes")]
+    pub start: bool,
+    /// Whether only members and administrators can access the study. The creator becomes a member.
+    #[serde(default)]
+    pub restricted: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+fn automatic() -> FeedbackMode {
+    FeedbackMode::Automatic
+}
+fn optimizer() -> Evaluation {
+    Evaluation::Optimizer
+}
+fn fifteen() -> u32 {
+    15
+}
+fn one() -> u32 {
+    1
+}
+fn one_seed() -> u64 {
+    1
+}
+
+impl NewStudy {
+    /// A study of this subject with all defaults.
+    pub fn of(subject_id: SubjectId) -> Self {
+        Self {
+            subject_id,
+            name: None,
+            device_id: None,
+            reference_gait_id: None,
+            muscles: true,
+            gait_settings: Box::default(),
+            solve_options: SolveOptions::default(),
+            base_bounds: TunedBounds::default(),
+            search_space: None,
+            learner: LearnerSettings::default(),
+            feedback_mode: FeedbackMode::Automatic,
+            evaluation: Evaluation::Optimizer,
+            trial_budget: fifteen(),
+            solve_seconds_budget: None,
+            unchanged_limit: None,
+            repeat_results: None,
+            parallel_trials: one(),
+            priority: 0,
+            seed: one_seed(),
+            start: true,
+            restricted: false,
+        }
+    }
+}
+
+impl NewStudy {
+    /// A draft with the set-up of another study.
+    pub fn like(plan: &StudyPlan) -> Self {
+        Self {
+            subject_id: plan.subject_id,
+            name: Some(plan.name.clone()),
+            device_id: Some(plan.device_id),
+            reference_gait_id: Some(plan.reference_gait_id),
+            muscles: plan.muscles,
+            gait_settings: plan.gait_settings.clone(),
+            solve_options: plan.solve_options,
+            base_bounds: plan.base_bounds,
+            search_space: Some(plan.search_space.clone().into()),
+            learner: plan.learner.clone(),
+            feedback_mode: plan.feedback_mode,
+            evaluation: plan.evaluation,
+            trial_budget: plan.trial_budget,
+            solve_seconds_budget: plan.solve_seconds_budget,
+            unchanged_limit: plan.unchanged_limit,
+            repeat_results: Some(plan.repeat_results),
+            parallel_trials: plan.parallel_trials,
+            priority: plan.priority,
+            seed: plan.seed,
+            start: false,
+            restricted: false,
+        }
+    }
+}
+
+/// Maximum length of a name, characters.
+pub(super) const LONGEST_NAME: usize = 120;
+
+/// The largest seed: many JSON readers keep only 53 bits of an integer.
+pub const LARGEST_SEED: u64 = (1 << 53) - 1;
+
+/// Creates a study.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference gait.
+pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result<Study, Error> {
+    create_from(writer, actor, new, None).await
+}
+
+/// [`create`], and makes the caller a member if the study is restricted.
+///
+/// # Errors
+/// As [`create`].
+pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> Result<Study, Error> {
+    let study = create(writer, &caller.actor, new).await?;
+    membership::keep_in(writer, caller, study.id).await?;
+    Ok(study)
+}
+
+/// The same, for a fork of a study.
+pub(super) async fn create_from(
+    writer: &mut Writer,
+    actor: &Actor,
+    new: NewStudy,
+    forked_from: Option<StudyId>,
+) -> Result<Study, Error> {
+    writer.room()?;
+    let state = if new.start { StudyState::Running } else { StudyState::Draft };
+    // A fork copies the set-up of its parent, muscle values included.
+    let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };
+    let restricted = new.restricted;
+    let mut plan = check(writer, new).await?;
+    if let Some(parent) = forked_from {
+        // Both studies will be compared, so a correction of the subject since then does not apply.
+        plan.body = studies::get(writer, parent).await?.plan.body;
+    }
+    let study = studies::insert(writer, &plan, state, forked_from).await?;
+    if restricted {
+        members::set_restricted(writer, study.id, true, actor.as_str()).await?;
+    }
+    let payload = json!({ "state": study.state, "reason": "created" });
+    events::append(writer, study.id, "study_changed", &payload).await?;
+    let detail = json!({
+        "name": study.plan.name, "state": study.state, "seed": study.plan.seed, "forked_from": forked_from,
+        "restricted": restricted,
+    });
+    audit::append(writer, actor, "study.create", &format!("study {}", study.id), &detail).await?;
+    Ok(study)
+}
+
+/// The plan of a study with all defaults filled in.
+///
+/// # Errors
+/// As [`create`]; nothing is written.
+pub async fn checked(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+    let new = with_own_muscles(db, new).await?;
+    check(db, new).await
+}
+
+/// As [`checked`], for a subject who is not on record yet. Ignores [`NewStudy::subject_id`].
+///
+/// # Errors
+/// As [`create`]; nothing is written.
+pub async fn checked_for_new(db: &mut Connection, subject: &NewSubject, new: NewStudy) -> Result<StudyPlan, Error> {
+    let body = subject::checked(db, subject).await?;
+    check_for(db, subject.pseudonym.trim(), body, new).await
+}
+
+/// Fills in the measured muscle values of the subject, unless the study sets muscles itself.
+async fn with_own_muscles(db: &mut Connection, mut new: NewStudy) -> Result<NewStudy, Error> {
+    if new.gait_settings.muscles.is_published() {
+        new.gait_settings.muscles = subjects::muscles(db, new.subject_id).await?;
+    }
+    Ok(new)
+}
+
+async fn check(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+    let subject = subjects::get(db, new.subject_id).await?;
+    check_for(db, &subject.pseudonym, subject.body(), new).await
+}
+
+async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStudy) -> Result<StudyPlan, Error> {
+    let device_id = match new.device_id {
+        Some(id) => devices::get(db, id).await?.id,
+        None => built_in_entries::device(db).await?.id,
+    };
+    let reference_gait_id = match new.reference_gait_id {
+        Some(id) => reference_gaits::get(db, id).await?.id,
+        None => match nearest_reference::nearest(db, &body).await? {
+            Some(nearest) => nearest.id,
+            None => built_in_entries::reference_gait(db).await?.id,
+        },
+    };
+    let variant = if new.muscles { "with muscles" } else { "without muscles" };
+    let name = match new.name.as_deref().map(str::trim) {
+        None => format!("{}, {variant}, seed {}", pseudonym, new.seed),
+        Some(name) => printable::name("name", name, LONGEST_NAME)?.to_owned(),
+    };
+    let search_space = match new.search_space {
+        Some(given) => given.checked()?,
+        None => search_space::table_i().map_err(Error::Learner)?,
+    };
+    let plan = StudyPlan {
+        name,
+        subject_id: new.subject_id,
+        body: Some(body),
+        device_id,
+        reference_gait_id,
+        muscles: new.muscles,
+        gait_settings: new.gait_settings,
+        solve_options: new.solve_options,
+        base_bounds: new.base_bounds,
+        search_space,
+        feedback_mode: new.feedback_mode,
+        evaluation: new.evaluation,
+        trial_budget: new.trial_budget,
+        solve_seconds_budget: new.solve_seconds_budget,
+        unchanged_limit: new.unchanged_limit,
+        repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
+        parallel_trials: new.parallel_trials,
+        priority: new.priority,
+        seed: new.seed,
+        learner: new.learner,
+    };
+    check_plan(&plan)?;
+    Ok(plan)
+}
+
+/// Checks every number of a new or imported study.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
+    printable::name("name", &plan.name, LONGEST_NAME)?;
+    check_range("trial_budget", i64::from(plan.trial_budget), 1, 10_000)?;
+    check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
+    check_range("priority", i64::from(plan.priority), -10, 10)?;
+    if plan.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {
+        return Err(Error::invalid("solve_seconds_budget", json!(plan.solve_seconds_budget), "1 to 1e8, or absent"));
+    }
+    if let Some(limit) = plan.unchanged_limit {
+        check_range("unchanged_limit", i64::from(limit), 1, 10_000)?;
+    }
+    if plan.seed > LARGEST_SEED {
+        return Err(Error::invalid("seed", plan.seed, &format!("0 to {LARGEST_SEED}")));
+    }
+    let within = |part: &'static str| move |error: ModelError| FieldError::from(error).within(part);
+    plan.gait_settings.validate().map_err(within("gait_settings"))?;
+    plan.solve_options.validate().map_err(within("solve_options"))?;
+    plan.base_bounds.validate().map_err(within("base_bounds"))?;
+    search_space::validate(&plan.search_space, plan.base_bounds)?;
+    check_learner(&plan.learner)?;
+    if plan.learner.categories() != 2 {
+        let allowed = "one threshold, because a trial is either converged or not converged";
+        return Err(Error::invalid("learner.ordinal_thresholds", json!(plan.learner.ordinal_thresholds), allowed));
+    }
+    Ok(())
+}
+
+/// Checks the settings of the learner.
+///
+/// # Errors
+/// [`Error::Invalid`] with the path of the field.
+fn check_learner(settings: &LearnerSettings) -> Result<(), Error> {
+    let (setting, reason) = match settings.validate() {
+        Ok(()) => return Ok(()),
+        Err(LearnerError::InvalidSetting { setting, reason }) => (setting, reason),
+        Err(other) => return Err(Error::Learner(other)),
+    };
+    let field = format!("learner.{setting}");
+    let message = format!("{field} {reason}.");
+    let value = json!(settings).get(setting).cloned();
+    let allowed = reason.rsplit_once("must be ").map_or(reason.as_str(), |(_, allowed)| allowed).to_owned();
+    Err(FieldError { field, value, allowed: Some(allowed), message }.into())
+}
+
+pub(super) fn check_range(field: &str, value: i64, minimum: i64, maximum: i64) -> Result<(), Error> {
+    if (minimum..=maximum).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::invalid(field, value, &format!("{minimum} to {maximum}")))
+    }
+}

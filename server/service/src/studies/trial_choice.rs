@@ -1,0 +1,131 @@
+//! Chooses the next trial and the best trial of a study, as pure functions of its snapshot.
+
+use super::belief::Beliefs;
+use super::equal_actions::equal_actions;
+use super::search_space;
+use super::seed::{Purpose, derive};
+use super::snapshot::StudySnapshot;
+use gait_learner::{LearnerError, Posterior, ProposalReason, propose, propose_outside};
+use gait_optimizer::ModelError;
+use gaitwright_compute::OnPool;
+use gaitwright_store::TrialId;
+use gaitwright_store::trials::{NewTrial, Trial, TrialState};
+use thiserror::Error;
+
+/// Why no trial could be chosen.
+#[derive(Debug, Error)]
+pub enum ChoiceError {
+    /// The learner failed.
+    #[error(transparent)]
+    Learner(#[from] LearnerError),
+    /// The action gives invalid bounds.
+    #[error(transparent)]
+    Bounds(#[from] ModelError),
+}
+
+impl ChoiceError {
+    /// Whether the gait of every action of the search space is known, which ends a study.
+    pub fn is_exhausted(&self) -> bool {
+        matches!(self, Self::Learner(LearnerError::Exhausted { .. }))
+    }
+}
+
+/// The next trial of a study. It depends on the snapshot alone: the same log gives the same trial, bit for bit.
+///
+/// # Errors
+/// [`ChoiceError`], even if every action was tried.
+pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
+    let plan = &snapshot.study.plan;
+    let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);
+    let log = snapshot.log();
+    let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
+    let barred = snapshot.barred_without_result();
+    let proposal = if plan.tries_new_gaits_only() {
+        let known = equal_actions(snapshot)?;
+        propose_outside(&plan.search_space, &log, &barred, &known, &plan.learner, seed)?
+    } else {
+        propose(&plan.search_space, &log, &barred, &plan.learner, seed)?
+    };
+    Ok(NewTrial {
+        number,
+        action_index: proposal.action,
+        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
+        reason: reason_in_words(proposal.reason),
+        best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
+        warm_started_from: best_converged(snapshot, belief)?,
+    })
+}
+
+/// The converged trial with the highest posterior mean, from whose gait the next solve starts. The earliest wins a tie.
+///
+/// # Errors
+/// When a trial's action is not in the search space.
+pub fn best_converged(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(by_mean(snapshot, belief, |_| true)?.first().copied())
+}
+
+/// The recommended trial: the one with the highest posterior mean among gaits without an open safety report.
+///
+/// # Errors
+/// As [`best_converged`].
+pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(ranking(snapshot, belief)?.first().copied())
+}
+
+/// The gaits of a study without an open safety report, by decreasing posterior mean. The first is recommended.
+///
+/// # Errors
+/// As [`best_converged`].
+pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
+    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial))
+}
+
+/// Converged trials by decreasing posterior mean; ties by number.
+fn by_mean(
+    snapshot: &StudySnapshot,
+    belief: &Posterior,
+    counts: impl Fn(&Trial) -> bool,
+) -> Result<Vec<TrialId>, LearnerError> {
+    let mut ranked = Vec::new();
+    for trial in snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
+        ranked.push((belief.mean(trial.action_index)?, trial.id));
+    }
+    ranked.sort_by(|(mean_a, _), (mean_b, _)| mean_b.total_cmp(mean_a));
+    Ok(ranked.into_iter().map(|(_, id)| id).collect())
+}
+
+/// From this number of trials on, pages show the last known best trial instead of computing the posterior.
+pub const MANY: usize = 400;
+
+/// The ranking for pages. For a large study it has only the trial that was best when the newest one was proposed.
+///
+/// # Errors
+/// When the learner cannot work with the log.
+pub fn ranking_to_show(
+    pool: &OnPool,
+    snapshot: &StudySnapshot,
+    beliefs: &Beliefs,
+) -> Result<Vec<TrialId>, LearnerError> {
+    if snapshot.trials.len() >= MANY {
+        return Ok(last_believed(snapshot).into_iter().collect());
+    }
+    ranking(snapshot, &*beliefs.posterior(pool, snapshot)?)
+}
+
+/// The trial that was best at the newest proposal, if its gait has no open safety report. Needs only the newest trials.
+pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
+    let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
+    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.closes(best)).then_some(best.id)
+}
+
+fn reason_in_words(reason: ProposalReason) -> String {
+    match reason {
+        ProposalReason::FirstAction => "first trial, drawn at random",
+        ProposalReason::RandomAction => "drawn at random",
+        ProposalReason::ThompsonOnLine => "on a line through the best action",
+        ProposalReason::ExpectedBestUtility => "most useful comparison with the best action",
+        ProposalReason::LinesExhausted => "drawn at random, because no action was left on the lines",
+        _ => "chosen by the learner",
+    }
+    .to_owned()
+}

@@ -1,0 +1,56 @@
+//! Choices of the command line whose types belong to the rules of studies, which know no command line.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+/// A name and its help.
+type Choice = (&'static str, &'static str);
+
+/// Formats of a file of joint angles.
+pub(super) const JOINT_ANGLE_FORMATS: [Choice; 3] = [
+    ("opensim", "OpenSim motion or storage file (.mot, .sto) of a gait model"),
+    ("camargo", "The `data` table of an `ik` file of Camargo 2021, written by MATLAB's writetable"),
+    ("csv", "time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad; optionally knee_R_rad, right_force_n"),
+];
+/// Units of angles.
+pub(super) const ANGLE_UNITS: [Choice; 2] = [("degrees", "Degrees"), ("radians", "Radians")];
+/// Ways to find right heel strikes.
+pub(super) const HEEL_STRIKES: [Choice; 3] = [
+    ("force", "Whenever the vertical force under the right foot rises above 20 N"),
+    ("kinematics", "Whenever the right heel is farthest ahead of the pelvis"),
+    ("ends", "At the first and the last row: the file is one stride"),
+];
+/// Formats of an EMG recording.
+pub(super) const EMG_FORMATS: [Choice; 2] =
+    [("csv", "A header with the names of the columns"), ("opensim", "OpenSim storage file (.sto)")];
+
+/// Reads one of these names as the REST interface reads it.
+pub(super) fn one_of<T>(choices: impl IntoIterator<Item = Choice>) -> impl TypedValueParser<Value = T>
+where
+    T: DeserializeOwned + Clone + Send + Sync + 'static,
+{
+    let values = choices.into_iter().map(|(name, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(values).try_map(|name| serde_json::from_value::<T>(Value::String(name)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gaitwright_service::studies::lab::MeasurementFormat;
+    use gaitwright_service::studies::reference_import::{JointAngleFormat, Strikes, Unit};
+
+    fn all_are_known<T: DeserializeOwned>(choices: &[Choice]) {
+        for (name, _) in choices {
+            assert!(serde_json::from_value::<T>(Value::from(*name)).is_ok(), "{name}");
+        }
+    }
+
+    #[test]
+    fn every_choice_is_a_value_of_the_rest_interface() {
+        all_are_known::<JointAngleFormat>(&JOINT_ANGLE_FORMATS);
+        all_are_known::<Unit>(&ANGLE_UNITS);
+        all_are_known::<Strikes>(&HEEL_STRIKES);
+        all_are_known::<MeasurementFormat>(&EMG_FORMATS);
+    }
+}

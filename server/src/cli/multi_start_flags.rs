@@ -1,0 +1,35 @@
+//! Flags for the initial guesses of a cold start, shared by `solve` and `tune`.
+
+use super::flag_numbers::whole;
+use clap::Args;
+use gait_optimizer::{BasinChoice, InitialGuess, ModelError, SolveOptions};
+use gaitwright_service::error::Error;
+
+fn initial_guesses(text: &str) -> Result<usize, String> {
+    whole(text, 1, InitialGuess::MOST)
+}
+
+#[derive(Debug, Clone, Args)]
+pub(super) struct MultiStartFlags {
+    /// Number of initial guesses that a cold start always tries. They may lead to different gaits, called local optima or
+    /// basins.
+    #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
+    initial_guesses: Option<usize>,
+    /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest
+    /// (default: the lowest objective).
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    nearest_within: Option<f64>,
+}
+
+impl MultiStartFlags {
+    /// The options with these flags, validated.
+    pub(super) fn applied_to(&self, mut options: SolveOptions) -> Result<SolveOptions, Error> {
+        options.initial_guesses = self.initial_guesses.unwrap_or(options.initial_guesses);
+        if let Some(within_percent) = self.nearest_within {
+            ModelError::check_range("--nearest-within", within_percent, 0.0, 100.0)?;
+            options.basin_choice = BasinChoice::NearestToReference { within_percent };
+        }
+        options.validate()?;
+        Ok(options)
+    }
+}

@@ -1,0 +1,110 @@
+//! `gaitwright simulate`: walks with a gait outside the optimiser's model.
+
+use super::flag_numbers::{seed, whole};
+use super::gait_file::read_gait_file;
+use super::output::data;
+use clap::Args;
+use gait_optimizer::execution::{ExecutionOptions, ExecutionReport, WalksOnGround, simulate};
+use gaitwright_compute::Pool;
+use gaitwright_service::error::Error;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(super) struct Simulate {
+    /// File written by `solve --out`, or a gait downloaded from the service.
+    #[arg(value_name = "GAIT.json")]
+    gait: PathBuf,
+    /// Number of simulated walks on each ground.
+    #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().walks, value_parser = walks, allow_negative_numbers = true)]
+    walks: u32,
+    /// Largest height and depth of the ground, mm, instead of 0, 5 and 10.
+    #[arg(long, value_name = "MILLIMETRES", allow_negative_numbers = true)]
+    ground: Option<f64>,
+    /// Seed of the disturbances.
+    #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().seed, value_parser = seed, allow_negative_numbers = true)]
+    seed: u64,
+    /// Print the report as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+fn walks(text: &str) -> Result<u32, String> {
+    whole(text, 1, ExecutionOptions::MOST_WALKS)
+}
+
+impl Simulate {
+    /// Simulates the walks. Falls are a result, not an error.
+    pub(super) async fn run(self) -> Result<(), Error> {
+        let mut options = ExecutionOptions {
+            walks: self.walks,
+            seed: self.seed,
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            ..ExecutionOptions::default()
+        };
+        if let Some(millimetres) = self.ground {
+            options.ground_heights_m = vec![millimetres / 1000.0];
+        }
+        options.validate()?;
+        let gait = read_gait_file(&self.gait)?.gait;
+        let report = Pool::new(1).run(move |_| simulate(&gait, &options)).await??;
+        if self.json {
+            data(&serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?)
+        } else {
+            data(&for_people(&report))
+        }
+    }
+}
+
+/// The report as text.
+fn for_people(report: &ExecutionReport) -> String {
+    let strides = report.strides;
+    let mut lines = vec![
+        format!("simulated walks of {strides} strides, gait {}", report.gait_sha256),
+        format!("  undisturbed: {} of {strides} strides", report.undisturbed_strides),
+    ];
+    let by_yield: Vec<String> = report
+        .strides_by_yield
+        .iter()
+        .map(|walk| format!("{} at {:.0} mm", walk.strides, 1000.0 * walk.yield_m))
+        .collect();
+    lines.push(format!("  undisturbed strides on ground that yields under body weight: {}", by_yield.join(", ")));
+    lines.extend(report.grounds.iter().flat_map(ground_for_people));
+    lines.push(match report.pushes {
+        Some(pushes) => format!(
+            "  pushes survived at the hip: {:.0} N s forwards, {:.0} N s backwards (of at most {:.0} N s)",
+            pushes.forwards_n_s, pushes.backwards_n_s, pushes.largest_tried_n_s
+        ),
+        None => "  pushes: not tried, because the undisturbed walk is not complete".to_owned(),
+    });
+    lines.push("  the intact side is a person who tracks the gait; a real person can do better or worse".to_owned());
+    lines.join("\n")
+}
+
+fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let [low, high] = ground.completed_share_interval;
+    let ground_in_words = match 1000.0 * ground.ground_height_m {
+        0.0 => "level ground".to_owned(),
+        millimetres => format!("ground of +-{millimetres} mm"),
+    };
+    [
+        format!(
+            "  {ground_in_words}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; {} falls, {} halts",
+            ground.completed,
+            ground.walks,
+            percent(ground.completed_share),
+            percent(low),
+            percent(high),
+            ground.mean_strides,
+            ground.fell,
+            ground.halted
+        ),
+        format!(
+            "    torque at its limit: knee {}, ankle {} of the time; changing as fast as it can: knee {}, ankle {}",
+            percent(ground.knee_saturated_share),
+            percent(ground.ankle_saturated_share),
+            percent(ground.knee_rate_limited_share),
+            percent(ground.ankle_rate_limited_share)
+        ),
+    ]
+}

@@ -1,0 +1,45 @@
+//! Flags for the subject and the variant.
+
+use super::flag_numbers::subject;
+use clap::{Args, ValueEnum};
+use gait_optimizer::Subject;
+use gaitwright_service::error::Error;
+
+/// The subject: one of the paper's, or a height and a mass.
+#[derive(Debug, Clone, Args)]
+pub(super) struct Body {
+    /// Subject from the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg). Default: 1.
+    #[arg(long, value_name = "NUMBER", value_parser = subject, allow_negative_numbers = true, conflicts_with_all = ["height_m", "mass_kg"])]
+    subject: Option<u32>,
+    /// Body height, m.
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, requires = "mass_kg")]
+    height_m: Option<f64>,
+    /// Body mass, kg.
+    #[arg(long, value_name = "KILOGRAMS", allow_negative_numbers = true, requires = "height_m")]
+    mass_kg: Option<f64>,
+}
+
+impl Body {
+    /// The subject, validated.
+    pub(super) fn subject(&self) -> Result<Subject, Error> {
+        Ok(match (self.height_m, self.mass_kg) {
+            (Some(height), Some(mass)) => Subject::new(height, mass)?,
+            _ => Subject::builtin(self.subject.unwrap_or(1))?,
+        })
+    }
+}
+
+/// A switch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Switch {
+    /// On.
+    On,
+    /// Off.
+    Off,
+}
+
+impl Switch {
+    pub(super) fn is_on(self) -> bool {
+        self == Self::On
+    }
+}

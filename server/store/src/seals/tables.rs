@@ -1,0 +1,140 @@
+//! The tables whose rows have seals or checksums, and the keys of their rows.
+
+use super::super::{Connection, StoreResult};
+use super::JOINT;
+
+/// A table whose rows are sealed.
+#[derive(Debug, Clone, Copy)]
+pub struct Sealed {
+    /// Its name.
+    pub table: &'static str,
+    /// Its primary key.
+    pub key: &'static [&'static str],
+    /// Whether the columns of the key may contain any text, so that they are joined in hexadecimal.
+    pub(super) hex: bool,
+}
+
+const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
+    Sealed { table, key, hex: false }
+}
+
+/// Tables with seals: everything that was measured, answered, decided or permitted. A column that is added later must
+/// be null in existing rows, or the rows must be written again.
+pub const TABLES: &[Sealed] = &[
+    sealed("subjects", &["id"]),
+    sealed("consents", &["seq"]),
+    sealed("subject_muscles", &["seq"]),
+    sealed("subject_corrections", &["seq"]),
+    sealed("devices", &["id"]),
+    sealed("reference_gaits", &["id"]),
+    sealed("studies", &["id"]),
+    sealed("trials", &["id"]),
+    sealed("gaits", &["trial_id"]),
+    sealed("results", &["trial_id", "attempt"]),
+    sealed("certificates", &["trial_id", "format_version"]),
+    sealed("explanation_requests", &["trial_id"]),
+    sealed("explanations", &["trial_id"]),
+    sealed("feedback", &["seq"]),
+    sealed("retractions", &["feedback_seq"]),
+    sealed("presentations", &["id"]),
+    sealed("presentation_answers", &["presentation_id"]),
+    sealed("presentation_retractions", &["presentation_id"]),
+    sealed("presentation_allocations", &["presentation_id"]),
+    sealed("unblindings", &["seq"]),
+    sealed("assessments", &["id"]),
+    sealed("assessment_retractions", &["assessment_id"]),
+    sealed("safety_reports", &["id"]),
+    sealed("safety_reviews", &["id"]),
+    sealed("safety_review_reports", &["review_id", "report_id"]),
+    sealed("lab_sessions", &["id"]),
+    sealed("lab_allocations", &["session_id"]),
+    sealed("lab_device_files", &["id"]),
+    sealed("lab_acts", &["session_id", "act"]),
+    sealed("lab_answers", &["session_id", "number"]),
+    sealed("lab_answer_retractions", &["session_id", "number"]),
+    sealed("measurement_files", &["id"]),
+    sealed("emg_results", &["id"]),
+    sealed("users", &["id"]),
+    sealed("tokens", &["id"]),
+    sealed("study_members", &["id"]),
+    sealed("study_member_ends", &["member_id"]),
+    sealed("study_restrictions", &["seq"]),
+    sealed("access_log", &["seq"]),
+    sealed("access_prunings", &["seq"]),
+    sealed("imports", &["seq"]),
+];
+
+/// Tables of earlier schema versions, each with the table to which a migration copied its rows under the same keys. Their
+/// seals stay in the chain, before those of the copies.
+pub(super) const RETIRED: &[(Sealed, &str)] = &[
+    (sealed("remarks", &["id"]), "assessments"),
+    (sealed("remark_retractions", &["remark_id"]), "assessment_retractions"),
+    (sealed("lab_recordings", &["id"]), "measurement_files"),
+];
+
+/// Tables with checksums: their rows change often, or only repeat other data.
+pub const CHECKED: &[Sealed] = &[
+    sealed("events", &["seq"]),
+    sealed("jobs", &["id"]),
+    Sealed { table: "idempotency_keys", key: &["actor", "key"], hex: true },
+    sealed("sessions", &["hash"]),
+    sealed("sign_in_links", &["hash"]),
+    sealed("clock", &["id"]),
+    Sealed { table: "sign_in_failures", key: &["name", "source"], hex: true },
+    sealed("sign_in_sources", &["network"]),
+    sealed(MIGRATIONS, &["version"]),
+];
+
+/// Tables without either: the chains themselves, and the table of checksums.
+pub const NOT_SEALED: &[&str] = &["audit", "seals", "checksums"];
+
+/// The table of applied migrations.
+pub(super) const MIGRATIONS: &str = "_sqlx_migrations";
+
+impl Sealed {
+    /// SQL for the key of a row as text; `row` is `new.`, `old.`, or the table and a dot.
+    pub(super) fn key_of(&self, row: &str) -> String {
+        let column = |column| if self.hex { format!("hex({row}{column})") } else { format!("{row}{column}") };
+        let columns: Vec<String> = self.key.iter().map(column).collect();
+        columns.join(&format!(" || '{JOINT}' || "))
+    }
+
+    pub(super) fn is_checked(&self) -> bool {
+        CHECKED.iter().any(|checked| checked.table == self.table)
+    }
+
+    /// SQL for the hash that the record has of a row: its newest seal or its checksum.
+    pub(super) fn known_hash(&self, key: &str) -> String {
+        let table = self.table;
+        if self.is_checked() {
+            format!("(select c.sha256 from checksums c where c.evidence = '{table}' and c.key = cast({key} as text))")
+        } else {
+            format!(
+                "(select s.sha256 from seals s where s.evidence = '{table}' and s.key = cast({key} as text) \
+                 order by s.seq desc limit 1)"
+            )
+        }
+    }
+
+    /// A column of a key.
+    pub(super) fn part(&self, part: &str) -> String {
+        let text = hex::decode(part).ok().and_then(|bytes| String::from_utf8(bytes).ok());
+        text.filter(|_| self.hex).unwrap_or_else(|| part.to_owned())
+    }
+}
+
+/// SQL for the hash in the newest seal of a row; `None` if the table has no seals.
+pub(in super::super) fn newest_of(table: &str) -> Option<String> {
+    let sealed = TABLES.iter().find(|sealed| sealed.table == table)?;
+    Some(sealed.known_hash(&sealed.key_of(&format!("{table}."))))
+}
+
+/// The existing tables whose rows have seals or checksums.
+pub(in super::super) async fn present(db: &mut Connection) -> StoreResult<Vec<Sealed>> {
+    let names: Vec<String> =
+        sqlx::query_scalar("select name from sqlite_master where type = 'table'").fetch_all(db).await?;
+    let is_there = |table: &str| names.iter().any(|name| name == table);
+    let sealed = TABLES.iter().chain(RETIRED.iter().map(|(retired, _)| retired)).filter(|_| is_there("seals"));
+    let all = sealed.chain(CHECKED.iter().filter(|_| is_there("checksums")));
+    Ok(all.filter(|sealed| is_there(sealed.table)).copied().collect())
+}

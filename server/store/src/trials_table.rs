@@ -1,0 +1,116 @@
+//! The table of a study's trials, sorted and filtered by the database.
+
+use super::trials::{TrialState, of_a_gait};
+use super::{Connection, StoreResult, StudyId, TrialId, json_columns};
+use gait_optimizer::TunedBounds;
+use sqlx::Row;
+
+/// Columns other than the bounds by which trials can be sorted.
+const COLUMNS: [&str; 6] = ["number", "state", "gait_rmse_rad", "cost_of_transport", "iterations", "seconds_total"];
+/// Columns by which trials can be sorted.
+pub const SORTS: [&str; COLUMNS.len() + TunedBounds::COUNT] = {
+    let mut sorts = [""; COLUMNS.len() + TunedBounds::COUNT];
+    let mut at = 0;
+    while at < sorts.len() {
+        sorts[at] = if at < COLUMNS.len() { COLUMNS[at] } else { TunedBounds::NAMES[at - COLUMNS.len()] };
+        at += 1;
+    }
+    sorts
+};
+
+/// Filter, order and page of a listing.
+#[derive(Debug, Clone)]
+pub struct Listing {
+    /// One of [`SORTS`].
+    pub sort: &'static str,
+    /// Whether to sort in descending order. Trials without a value come last in both orders.
+    pub descending: bool,
+    /// Only trials in this state.
+    pub state: Option<TrialState>,
+    /// Only trials whose reason or message contains this text, ignoring case.
+    pub contains: String,
+    /// Maximum number of trials.
+    pub limit: u32,
+    /// Number of trials to skip.
+    pub offset: u32,
+}
+
+/// A row of the table.
+#[derive(Debug, Clone)]
+pub struct Listed {
+    /// Identifier.
+    pub id: TrialId,
+    /// Number of the trial, from 1.
+    pub number: u32,
+    /// The action as bounds.
+    pub action: TunedBounds,
+    /// Reason for the trial.
+    pub reason: String,
+    /// Identifier and number of the trial that gave the warm start.
+    pub from: Option<(TrialId, u32)>,
+    /// State of the trial.
+    pub state: TrialState,
+    /// Gait RMSE, rad, of a converged gait.
+    pub gait_rmse_rad: Option<f64>,
+    /// Cost of transport of a converged gait.
+    pub cost_of_transport: Option<f64>,
+    /// Interior-point iterations.
+    pub iterations: Option<u32>,
+    /// Wall time of the solve, s.
+    pub seconds_total: Option<f64>,
+    /// Human-readable message about how the trial ended; may be empty.
+    pub message: String,
+    /// Number of trials that match the filter.
+    pub matching: u32,
+}
+
+/// The trials of a study.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<Listed>> {
+    let rows = sqlx::query(
+        "select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
+         t.cost_of_transport, t.iterations, t.seconds_total, t.message, (select w.number from trials w where w.id = t.warm_started_from) as from_number, \
+         count(*) over () as matching, \
+         case ?2 when 'number' then t.number when 'state' then t.state \
+             when 'gait_rmse_rad' then iif(t.state = 'converged', t.gait_rmse_rad, null) \
+             when 'cost_of_transport' then iif(t.state = 'converged', t.cost_of_transport, null) \
+             when 'iterations' then t.iterations \
+             when 'seconds_total' then t.seconds_total else json_extract(t.action, '$.' || ?2) end as key \
+         from trials t \
+         where t.study_id = ?1 and (?4 is null or t.state = ?4) \
+             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0) \
+         order by key is null, case when ?3 then key end desc, case when ?3 then null else key end, t.number desc \
+         limit ?6 offset ?7",
+    )
+    .bind(study)
+    .bind(listing.sort)
+    .bind(listing.descending)
+    .bind(listing.state.map(TrialState::as_str))
+    .bind(&listing.contains)
+    .bind(listing.limit)
+    .bind(listing.offset)
+    .fetch_all(db)
+    .await?;
+    rows.iter()
+        .map(|row| {
+            let from: Option<TrialId> = row.try_get("warm_started_from")?;
+            let state = row.try_get::<&str, _>("state")?.parse()?;
+            Ok(Listed {
+                id: row.try_get("id")?,
+                number: row.try_get("number")?,
+                action: json_columns::column(row, "action")?,
+                reason: row.try_get("reason")?,
+                from: from.zip(row.try_get("from_number")?),
+                state,
+                gait_rmse_rad: of_a_gait(row, state, "gait_rmse_rad")?,
+                cost_of_transport: of_a_gait(row, state, "cost_of_transport")?,
+                iterations: row.try_get("iterations")?,
+                seconds_total: row.try_get("seconds_total")?,
+                message: row.try_get("message")?,
+                matching: row.try_get("matching")?,
+            })
+        })
+        .collect()
+}
