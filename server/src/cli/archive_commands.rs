@@ -1,10 +1,10 @@
 //! `gaitwright export`, `gaitwright import`, `gaitwright signing-key` and `gaitwright prune`.
 
-use super::config::{AnchoredFlags, RecordFlags, Settings};
 use super::database_file::{exists, note_export};
 use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem_flags::read;
+use super::settings::{AnchoredFlags, RecordFlags, Settings};
 use clap::Args;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;

@@ -1,12 +1,12 @@
 //! `gaitwright tune`: runs an unattended study.
 
 use super::Ended;
-use super::config::{AnchoredFlags, Settings};
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
 use super::problem_flags::ProblemFiles;
 use super::serve::cores_or;
+use super::settings::{AnchoredFlags, Settings};
 use super::subject_flags::{Body, Switch};
 use super::unattended::{self, Lines, action_line};
 use clap::Args;
