@@ -24,8 +24,6 @@ fn main() {
         ),
         ("mu 1e-4, one", NlpSettings { mu_initial: 1e-4, ..d() }),
         ("dc when singular", NlpSettings { dual_regularisation: DualRegularisation::WhenSingular, ..d() }),
-        ("no short-step rule", NlpSettings { short_step_limit: 0, ..d() }),
-        ("no soft steps", NlpSettings { max_soft_steps: 0, ..d() }),
         ("gradient scaling", NlpSettings { gradient_scaling: Some(100.0), ..d() }),
     ];
     for (label, settings) in &variants {

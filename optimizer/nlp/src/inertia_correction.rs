@@ -26,7 +26,7 @@ impl InertiaCorrection {
         self.delta_w = self.proximal;
         if self.skip > 0 {
             self.skip -= 1;
-            let fading = (self.last * DECREASE).max(settings.hessian_regularisation_min);
+            let fading = (self.last * DECREASE).max(settings.constants.hessian_regularisation_min);
             self.delta_w = self.delta_w.max(fading);
         }
         self.bare = self.delta_w == 0.0;
@@ -79,18 +79,18 @@ impl InertiaCorrection {
             if self.last == 0.0 {
                 settings.hessian_regularisation_first
             } else {
-                (self.last * DECREASE).max(settings.hessian_regularisation_min)
+                (self.last * DECREASE).max(settings.constants.hessian_regularisation_min)
             }
         } else if self.last == 0.0 || 1e5 * self.last < self.delta_w {
             self.delta_w * FIRST_INCREASE
         } else {
             self.delta_w * INCREASE
         };
-        self.delta_w <= settings.hessian_regularisation_max
+        self.delta_w <= settings.constants.hessian_regularisation_max
     }
 
     fn dual(settings: &NlpSettings, mu: f64) -> f64 {
-        settings.dual_regularisation_value * mu.powf(0.25)
+        settings.constants.dual_regularisation_value * mu.powf(0.25)
     }
 }
 

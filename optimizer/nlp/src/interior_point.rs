@@ -21,7 +21,7 @@ impl Iterate<'_> {
         let scale = self.form.objective_scale;
         now.error() <= settings.tolerance
             && self.largest_violation() <= settings.violation_tolerance
-            && now.dual / scale <= settings.dual_tolerance
+            && now.dual / scale <= settings.constants.dual_tolerance
             && now.complementarity / scale <= settings.complementarity_tolerance
     }
 
@@ -88,7 +88,7 @@ impl Iterate<'_> {
             if session.started.elapsed().as_secs_f64() >= settings.max_seconds {
                 return Ending::TimeLimit;
             }
-            if largest(&self.point.w[..self.form.n]) > settings.divergence_limit {
+            if largest(&self.point.w[..self.form.n]) > settings.constants.divergence_limit {
                 return Ending::Unbounded;
             }
             if tiny_steps > 1 && self.mu <= barrier::smallest_mu(settings, self.form.objective_scale) {
@@ -116,11 +116,11 @@ impl Iterate<'_> {
                     && short_steps >= settings.short_step_limit
                     && self.phase() == NlpPhase::Regular
                     && largest(&self.c) > settings.tolerance
-                    && session.counts.restoration_phases < settings.max_restoration_phases;
+                    && session.counts.restoration_phases < settings.constants.max_restoration_phases;
                 if !crawls {
                     continue;
                 }
-            } else if found && soft_steps < settings.max_soft_steps && self.soft_step(session) {
+            } else if found && soft_steps < settings.constants.max_soft_steps && self.soft_step(session) {
                 soft_steps += 1;
                 continue;
             }
@@ -134,15 +134,16 @@ impl Iterate<'_> {
                     if elastic_resets > 2 {
                         return Ending::Stalled;
                     }
-                    if elastic_resets > 1 || !restoration::reset_elastics(self) {
+                    if elastic_resets > 1 || !settings.constants.resets_elastics || !restoration::reset_elastics(self) {
                         self.recentre(session);
                     }
                 }
                 NlpPhase::Regular => {
                     let nearly_feasible = largest(&self.c) <= 1e-2 * settings.tolerance;
-                    if nearly_feasible || session.counts.restoration_phases >= settings.max_restoration_phases {
+                    if nearly_feasible || session.counts.restoration_phases >= settings.constants.max_restoration_phases
+                    {
                         rescues += 1;
-                        if rescues > 1 {
+                        if rescues > 1 || !settings.constants.recentres {
                             return Ending::Stalled;
                         }
                         self.recentre(session);

@@ -1,6 +1,6 @@
 //! Backtracking filter line search with second-order corrections (WB06 sections 2.3, 2.4).
 
-use crate::barrier::{self, DAMPING};
+use crate::barrier;
 use crate::iterate::{Iterate, SolveSession, StepRecord};
 use crate::line_search_filter::{GAMMA_PHI, GAMMA_THETA, not_above};
 use crate::line_search_state::{MeritReference, Watch};
@@ -22,8 +22,6 @@ const GAMMA_ALPHA: f64 = 0.05;
 const KAPPA_SOC: f64 = 0.99;
 /// Required decrease of a soft step (IPOPT `soft_resto_pderror_reduction_factor`).
 const SOFT_REDUCTION: f64 = 0.9999;
-/// Largest increase of phi, in powers of ten (IPOPT `obj_max_inc`).
-const MAX_PHI_INCREASE: f64 = 5.0;
 
 impl MeritReference {
     /// m(alpha) < 0 and alpha (-slope)^s_phi > delta theta^s_theta (WB06 eq. 19).
@@ -57,14 +55,14 @@ impl Iterate<'_> {
         let mut alpha =
             barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
         let mut corrects = true;
-        if tiny {
+        if tiny && settings.constants.accepts_tiny_steps {
             let (_, _, finite) = self.try_step(alpha, false);
             if finite {
                 self.accept(session, alpha, tau, 1);
                 return true;
             }
         }
-        if settings.watchdog_trigger > 0 && self.search.shortened >= 2 * settings.watchdog_trigger {
+        if settings.constants.watchdog_trigger > 0 && self.search.shortened >= 2 * settings.constants.watchdog_trigger {
             self.search.shortened = 0;
             self.search.watched_point.copy_from(&self.point);
             self.search.watched_direction.copy_from(&self.direction);
@@ -77,7 +75,7 @@ impl Iterate<'_> {
                 return true;
             }
             watch.trials += 1;
-            if finite && watch.trials <= settings.watchdog_trials {
+            if finite && watch.trials <= settings.constants.watchdog_trials {
                 self.search.watch = Some(watch);
                 self.accept(session, alpha, tau, 1);
                 return true;
@@ -153,7 +151,7 @@ impl Iterate<'_> {
         let (mut slope, mut size) = (0.0, 0.0);
         for j in 0..self.form.length() {
             let barrier = self.mu / self.at.slack_upper[j] - self.mu / self.at.slack_lower[j];
-            let damping = DAMPING * self.mu * self.form.single_side(j);
+            let damping = self.form.constants.damping * self.mu * self.form.single_side(j);
             let term = (self.gradient[j] + barrier + damping) * self.direction.w[j];
             slope += term;
             size += term.abs();
@@ -184,7 +182,7 @@ impl Iterate<'_> {
         }
         if phi > reference.phi {
             let base = if reference.phi.abs() > 10.0 { reference.phi.abs().log10() } else { 1.0 };
-            if (phi - reference.phi).log10() > MAX_PHI_INCREASE + base {
+            if (phi - reference.phi).log10() > self.form.constants.max_phi_increase + base {
                 return None;
             }
         }
@@ -230,7 +228,7 @@ impl Iterate<'_> {
                 &mut self.search.correction,
             );
             std::mem::swap(&mut self.rhs.y, &mut self.search.corrected_rhs);
-            if solved.refined > settings.residual_limit {
+            if solved.refined > settings.constants.residual_limit {
                 return None;
             }
             step = barrier::fraction_to_boundary(
@@ -295,6 +293,6 @@ impl Iterate<'_> {
         self.objective = self.search.trial_objective;
         self.measure_slacks();
         self.linearise();
-        barrier::keep_near_centre(&mut self.point, &self.at, self.mu);
+        barrier::keep_near_centre(&mut self.point, &self.at, self.mu, session.settings.constants.kappa_sigma);
     }
 }

@@ -11,9 +11,6 @@ use crate::iterate::{Ending, Iterate, SolveSession};
 use crate::primal_dual::{PrimalDual, largest};
 use crate::settings::{BoundMultiplierStart, NlpSettings};
 
-/// Bound multipliers above this are reset after the phase (IPOPT `bound_mult_reset_threshold`).
-const MULTIPLIER_RESET: f64 = 1e3;
-
 /// Up to a hundred times the tolerance a violation can be a remainder of the termination of the phase itself, so the
 /// point counts as feasible. Larger tolerances than this do not extend that range.
 const NEAR_TOLERANCE: f64 = 1e-4;
@@ -81,7 +78,7 @@ pub(crate) fn begin<'p>(run: &mut Iterate<'p>, session: &mut SolveSession) -> Op
     let (theta, phi) = (run.theta(), run.phi());
     run.filter.add(theta, phi);
 
-    let rho = settings.elastic_weight;
+    let rho = settings.constants.elastic_weight;
     let mu = run.mu.max(largest(&run.c));
     let form = elastic_formulation(&run.form, &run.point.w, mu, rho);
     let length = run.form.length();
@@ -158,7 +155,9 @@ pub(crate) fn finish(
     match ending {
         Ending::Left => {}
         // A feasible point that the filter rejects because of entries from before the phase.
-        Ending::Converged | Ending::Stalled if feasible && progress => run.filter.clear(),
+        Ending::Converged | Ending::Stalled if feasible && progress && settings.constants.clears_filter => {
+            run.filter.clear()
+        }
         Ending::Converged if !feasible || run.program_violation() > LEFT_OVER * settings.violation_tolerance => {
             // The multipliers of the phase belong to an objective without scale.
             for (y, of_phase) in run.point.y.iter_mut().zip(&phase.point.y) {
@@ -187,11 +186,12 @@ pub(crate) fn finish(
         &step.zu,
         tau,
     ));
+    let alpha = if settings.constants.steps_multipliers { alpha } else { 0.0 };
     for j in 0..length {
         run.point.zl[j] += alpha * step.zl[j];
         run.point.zu[j] += alpha * step.zu[j];
     }
-    if largest(&run.point.zl).max(largest(&run.point.zu)) > MULTIPLIER_RESET {
+    if largest(&run.point.zl).max(largest(&run.point.zu)) > settings.constants.multiplier_reset {
         let mu = run.mu;
         let first = |slack: f64| match (slack.is_finite(), settings.bound_multiplier_start) {
             (false, _) => 0.0,
@@ -203,7 +203,7 @@ pub(crate) fn finish(
             run.point.zu[j] = first(run.at.slack_upper[j]);
         }
     }
-    barrier::keep_near_centre(&mut run.point, &run.at, run.mu);
+    barrier::keep_near_centre(&mut run.point, &run.at, run.mu, settings.constants.kappa_sigma);
     run.estimate_multipliers(session);
     None
 }

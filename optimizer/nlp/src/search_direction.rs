@@ -1,14 +1,10 @@
 //! The search direction: Newton steps with inertia correction, and least-squares multipliers.
 
-use crate::barrier::DAMPING;
 use crate::factorisation::MatrixChange;
 use crate::iterate::{Iterate, SolveSession};
 use crate::newton_system::NewtonSystem;
 use crate::status::NlpPhase;
 
-/// In an iteration, the wrong inertia at which the factorisation itself is checked. The first one is usually right,
-/// and a false one costs only an unneeded regularisation.
-const DOUBTED_REFUSAL: usize = 2;
 /// Fraction of an ascent that the rows may explain (see [`Iterate::curves_downwards`]).
 const ROWS_SHARE: f64 = 0.1;
 /// Regularisation that stands in for that of unregularised rows there.
@@ -28,7 +24,7 @@ impl Iterate<'_> {
         self.form.hessian(&self.point.w, multipliers, &mut self.at.hessian);
         for j in 0..self.form.length() {
             let (sl, su) = (self.at.slack_lower[j], self.at.slack_upper[j]);
-            self.rhs.w[j] = -(self.lagrangian[j] + DAMPING * self.mu * self.form.single_side(j));
+            self.rhs.w[j] = -(self.lagrangian[j] + settings.constants.damping * self.mu * self.form.single_side(j));
             self.rhs.zl[j] = if sl.is_finite() { self.mu - sl * self.point.zl[j] } else { 0.0 };
             self.rhs.zu[j] = if su.is_finite() { self.mu - su * self.point.zu[j] } else { 0.0 };
         }
@@ -54,9 +50,11 @@ impl Iterate<'_> {
                         &self.rhs,
                         &mut self.direction,
                     );
-                    let distrusts = solved.unrefined > settings.residual_limit && session.newton.distrust();
-                    let solves = !distrusts && solved.refined <= settings.residual_limit;
-                    if solves && self.curves_downwards(&session.newton) {
+                    let distrusts = settings.constants.distrusts_unrefined
+                        && solved.unrefined > settings.constants.residual_limit
+                        && session.newton.distrust();
+                    let solves = !distrusts && solved.refined <= settings.constants.residual_limit;
+                    if solves && settings.constants.checks_curvature && self.curves_downwards(&session.newton) {
                         session.newton.distrust() || self.correction.increase(settings)
                     } else if solves {
                         self.correction.accept(settings);
@@ -69,14 +67,14 @@ impl Iterate<'_> {
                     // Element growth that spoils solutions spoils the inertia as well, and regularisation would only
                     // hide it.
                     refusals += 1;
-                    let distrusts = refusals == DOUBTED_REFUSAL
+                    let distrusts = refusals == settings.constants.doubted_refusal
                         && session.newton.unrefined_residual(
                             &self.form,
                             &self.point,
                             &self.at,
                             &self.rhs,
                             &mut self.direction,
-                        ) > settings.residual_limit
+                        ) > settings.constants.residual_limit
                         && session.newton.distrust();
                     distrusts || self.correction.increase(settings)
                 }

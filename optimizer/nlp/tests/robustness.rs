@@ -75,7 +75,7 @@ fn restoration_phase_ignores_the_scale_of_the_objective() {
         assert_eq!(r.status, NlpStatus::Infeasible, "{r:?}");
         // The multiplier of a violated row is the weight of its violation, in the units of the scaled row.
         let weight = r.row_multipliers[0].abs();
-        assert!((weight - settings.elastic_weight / 4.0).abs() < 1.0, "{weight}");
+        assert!((weight - settings.constants.elastic_weight / 4.0).abs() < 1.0, "{weight}");
     }
     assert!(steep.iterations <= plain.iterations + 3, "{} {}", steep.iterations, plain.iterations);
 }
@@ -214,8 +214,8 @@ fn invalid_input_is_reported_by_name() {
     let settings = NlpSettings::default();
     assert!(matches!(go(&problem, vec![0.0; 2], &settings), Err(NlpError::InvalidStart(_))));
     assert!(matches!(go(&problem, vec![f64::NAN], &settings), Err(NlpError::InvalidStart(_))));
-    let bad = NlpSettings { kappa_mu: 1.5, ..settings };
-    assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "kappa_mu", .. })));
+    let bad = NlpSettings { required_reduction: 1.5, ..settings };
+    assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "required_reduction", .. })));
     let bad = NlpSettings { tolerance: f64::NAN, ..settings };
     assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "tolerance", .. })));
     let crossed = Small::new("p", &[0.0], &[(1.0, -1.0)], &[], |x| (x[0], vec![x[0]]));
