@@ -8,7 +8,7 @@ use interior_point::{
 };
 use standard_problems::sparse::{Sparse, cart_pole, gait_sized};
 use standard_problems::swing_up::SwingUp;
-use standard_problems::{Small, hock_schittkowski, optimal_control};
+use standard_problems::{Small, hock_schittkowski, optimal_control, sets};
 
 fn misses(settings: &NlpSettings, golden: Option<&[(&str, usize)]>) -> Vec<String> {
     let mut misses = Vec::new();
@@ -105,13 +105,7 @@ const LOCALLY_INFEASIBLE: [&str; 2] = ["HS63 from start 0", "HS104 from start 0"
 fn solves_from_random_starts_end_at_kkt_points() {
     let mut infeasible = Vec::new();
     for problem in hock_schittkowski::all() {
-        let mut seed = 777u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
-        for start in 0..3 {
-            let x = problem.start.iter().map(|v| v + (1.0 + v.abs()) * random()).collect();
+        for (start, x) in sets::random_starts(&problem).into_iter().enumerate() {
             let r = solve(&problem, &StartPoint::Cold(x), &NlpSettings::default(), &mut |_| {}, &|| false).unwrap();
             let name = format!("{} from start {start}", problem.name);
             if r.status == NlpStatus::Infeasible {
