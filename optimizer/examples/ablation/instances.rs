@@ -12,7 +12,7 @@ use rustix::time::{ClockId, clock_gettime};
 
 use crate::splitmix::SplitMix;
 use crate::standard_problems::sets::{self, Case};
-use crate::tuned_actions::LEVELS;
+use crate::tuned_actions::{LEVELS, TIGHT};
 
 /// What a variant changes.
 pub(crate) struct Target {
@@ -54,12 +54,19 @@ enum Problem {
 
 const MOST_ITERATIONS: usize = 500;
 
-pub(crate) fn all(cold: usize, warm: usize, seed: u64) -> Result<Vec<Instance>, Box<dyn Error>> {
+/// `cold` and `tight` random actions from one initial guess, `warm` random changes of two bounds.
+pub(crate) fn all(
+    cold: usize,
+    tight: usize,
+    warm: usize,
+    muscles: bool,
+    seed: u64,
+) -> Result<Vec<Instance>, Box<dyn Error>> {
     let mut instances = Vec::new();
     for (set, cases) in sets::all() {
         instances.extend(cases.into_iter().map(|case| Instance { set, problem: Problem::Standard(case) }));
     }
-    let base = GaitProblem::new(Subject::builtin(1)?, false)?;
+    let base = GaitProblem::new(Subject::builtin(1)?, muscles)?;
     let mut random = SplitMix(seed);
     let mut drawn = Vec::new();
     let mut draw = |changed: &mut dyn FnMut(&mut SplitMix) -> [f64; TunedBounds::COUNT]| loop {
@@ -69,9 +76,11 @@ pub(crate) fn all(cold: usize, warm: usize, seed: u64) -> Result<Vec<Instance>, 
             return TunedBounds::from_array(action).map(|bounds| Box::new(GaitProblem { bounds, ..base.clone() }));
         }
     };
-    for _ in 0..cold {
-        let problem = draw(&mut |random| LEVELS.map(|levels| levels[random.below(levels.len())]))?;
-        instances.push(Instance { set: "gaits, cold", problem: Problem::Cold(problem) });
+    for (set, count, values) in [("gaits, cold", cold, &LEVELS), ("gaits, tight", tight, &TIGHT)] {
+        for _ in 0..count {
+            let problem = draw(&mut |random| values.map(|levels| levels[random.below(levels.len())]))?;
+            instances.push(Instance { set, problem: Problem::Cold(problem) });
+        }
     }
     let start = solve(&base, None, &options(), &mut |_| {}, &CancelToken::new())?.warm_start;
     for _ in 0..warm {

@@ -1,9 +1,10 @@
 //! Ablation of the interior-point solver: every setting and every heuristic switched off, or to another value, one at a
 //! time, over the standard problems and random gaits.
 //!
-//! `cargo run --release -p gait-optimizer --example ablation -- [--cold 12] [--warm 12] [--seed 1] [--threads 2]
-//! [--variants WORD] [--sets WORD]`: `--cold` random actions of Table I from one initial guess and `--warm` random changes of two bounds
-//! from the gait of the default bounds, both for subject 1 without muscles. At most 500 iterations a phase.
+//! `cargo run --release -p gait-optimizer --example ablation -- [--cold 12] [--tight 4] [--warm 12] [--muscles off]
+//! [--seed 1] [--threads 2] [--variants WORD] [--sets WORD]`: `--cold` random actions of Table I and `--tight` actions
+//! far beyond it from one initial guess, and `--warm` random changes of two bounds from the gait of the default bounds,
+//! all for subject 1. At most 500 iterations a phase. `--variants` and `--sets` select those whose names contain a word.
 //!
 //! A row has the problems that a variant solves in a set, its iterations and factorisations and its processor time
 //! relative to the default on the same problems, how many objectives are worse and better by more than 1e-6
@@ -32,7 +33,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 fn main() -> Result<(), Box<dyn Error>> {
     let mut instances = instances::all(
         argument("--cold", "12").parse()?,
+        argument("--tight", "4").parse()?,
         argument("--warm", "12").parse()?,
+        argument("--muscles", "off") == "on",
         argument("--seed", "1").parse()?,
     )?;
     let word = argument("--sets", "");
