@@ -1,7 +1,7 @@
 //! The variants: each changes one setting or mechanism.
 
 use gait_optimizer::InitialGuess;
-use interior_point::{BarrierStrategy, BoundMultiplierStart, DualRegularisation, LinearSolver};
+use interior_point::{BarrierStrategy, BoundMultiplierStart, LinearSolver};
 
 use crate::instances::Target;
 
@@ -74,7 +74,6 @@ pub(crate) fn all() -> Vec<Variant> {
             target.settings.regularisation_memory = if target.is_gait { 0 } else { 4 };
         }),
         set!("proximal term: off", proximal_first = 0.0),
-        set!("dual_regularisation: when singular", dual_regularisation = DualRegularisation::WhenSingular),
         set!("dual_regularisation_value: 1e-6", constants.dual_regularisation_value = 1e-6),
         // Linear algebra.
         set!("residual_target: 1e-10", constants.residual_target = 1e-10),

@@ -1,6 +1,7 @@
-//! Inertia correction: regularisation until the KKT matrix has the inertia (n, m, 0) (WB06 algorithm IC).
+//! Inertia correction: regularisation until the KKT matrix has the inertia (n, m, 0) (WB06 algorithm IC). Rows
+//! are always regularised, so that redundant rows need no second factorisation.
 
-use crate::settings::{DualRegularisation, NlpSettings};
+use crate::settings::NlpSettings;
 
 /// The last nonzero delta_w, and the current regularisation.
 #[derive(Debug, Clone, Copy, Default)]
@@ -30,10 +31,7 @@ impl InertiaCorrection {
             self.delta_w = self.delta_w.max(fading);
         }
         self.bare = self.delta_w == 0.0;
-        self.delta_c = match settings.dual_regularisation {
-            DualRegularisation::Always => Self::dual(settings, mu),
-            DualRegularisation::WhenSingular => 0.0,
-        };
+        self.delta_c = settings.constants.dual_regularisation_value * mu.powf(0.25);
     }
 
     /// Adapts the proximal term to the line search: after a step that was shortened often, a proximal term shortens
@@ -64,16 +62,8 @@ impl InertiaCorrection {
         }
     }
 
-    /// The next regularisation after a singular matrix or an inaccurate solution; false when out of range.
-    pub(crate) fn singular(&mut self, settings: &NlpSettings, mu: f64) -> bool {
-        if self.delta_c == 0.0 {
-            self.delta_c = Self::dual(settings, mu);
-            return true;
-        }
-        self.increase(settings)
-    }
-
-    /// The next regularisation after too many negative eigenvalues; false when out of range.
+    /// The next regularisation after a wrong inertia, a singular matrix or an inaccurate solution; false when out of
+    /// range.
     pub(crate) fn increase(&mut self, settings: &NlpSettings) -> bool {
         self.delta_w = if self.delta_w == 0.0 {
             if self.last == 0.0 {
@@ -87,10 +77,6 @@ impl InertiaCorrection {
             self.delta_w * INCREASE
         };
         self.delta_w <= settings.constants.hessian_regularisation_max
-    }
-
-    fn dual(settings: &NlpSettings, mu: f64) -> f64 {
-        settings.constants.dual_regularisation_value * mu.powf(0.25)
     }
 }
 

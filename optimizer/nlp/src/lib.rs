@@ -123,7 +123,7 @@ mod vector_instructions;
 pub use method_constants::MethodConstants;
 pub use nonlinear_program::{EliminationBlocks, NonlinearProgram, SparsityPattern};
 pub use sensitivity::{ParameterDerivative, Sensitivity, SensitivityError, sensitivities};
-pub use settings::{BarrierStrategy, BoundMultiplierStart, DualRegularisation, LinearSolver, NlpSettings};
+pub use settings::{BarrierStrategy, BoundMultiplierStart, LinearSolver, NlpSettings};
 pub use solve::solve;
 pub use starting_point::{StartPoint, WarmPoint};
 pub use status::{NlpCounts, NlpError, NlpIteration, NlpPhase, NlpResult, NlpStatus, Residuals, Timing};

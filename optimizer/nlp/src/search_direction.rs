@@ -60,7 +60,7 @@ impl Iterate<'_> {
                         self.correction.accept(settings);
                         return true;
                     } else {
-                        distrusts || self.correction.singular(settings, self.mu)
+                        distrusts || self.correction.increase(settings)
                     }
                 }
                 Some(i) if i.zero == 0 && i.negative > self.form.m => {
@@ -78,7 +78,7 @@ impl Iterate<'_> {
                         && session.newton.distrust();
                     distrusts || self.correction.increase(settings)
                 }
-                _ => self.correction.singular(settings, self.mu),
+                _ => self.correction.increase(settings),
             };
             if !go_on {
                 return false;

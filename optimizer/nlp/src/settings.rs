@@ -32,18 +32,6 @@ pub enum BoundMultiplierStart {
     Centred,
 }
 
-/// When the constraint block of the KKT matrix is regularised by -delta_c.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum DualRegularisation {
-    /// Only after a numerically singular factorisation (WB06 algorithm IC). Problems whose rows become dependent may
-    /// stall.
-    WhenSingular,
-    /// Always, so that redundant rows need no second factorisation.
-    #[default]
-    Always,
-}
-
 /// Factorisation of the KKT systems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
@@ -114,8 +102,6 @@ pub struct NlpSettings {
     /// Initial weight of the proximal term after steps that the line search shortened often; 0: none. Default 1e-4. 0
     /// to 1e4.
     pub proximal_first: f64,
-    /// When delta_c > 0. Default always.
-    pub dual_regularisation: DualRegularisation,
 
     /// Second-order corrections per iteration. Default 4 (WB06 p^max).
     pub max_second_order_corrections: usize,
@@ -157,7 +143,6 @@ impl Default for NlpSettings {
             hessian_regularisation_first: 1e-4,
             regularisation_memory: 0,
             proximal_first: 1e-4,
-            dual_regularisation: DualRegularisation::default(),
             max_second_order_corrections: 4,
             required_reduction: 0.9,
             short_step_limit: 5,
