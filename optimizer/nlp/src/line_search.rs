@@ -143,20 +143,12 @@ impl Iterate<'_> {
 
     /// grad phi^T dw.
     fn slope(&self) -> f64 {
-        self.slope_and_size().0
-    }
-
-    /// grad phi^T dw, and the sum of the magnitudes of its terms, which bounds its rounding error.
-    pub(crate) fn slope_and_size(&self) -> (f64, f64) {
-        let (mut slope, mut size) = (0.0, 0.0);
-        for j in 0..self.form.length() {
+        let of = |j: usize| {
             let barrier = self.mu / self.at.slack_upper[j] - self.mu / self.at.slack_lower[j];
             let damping = self.form.constants.damping * self.mu * self.form.single_side(j);
-            let term = (self.gradient[j] + barrier + damping) * self.direction.w[j];
-            slope += term;
-            size += term.abs();
-        }
-        (slope, size)
+            (self.gradient[j] + barrier + damping) * self.direction.w[j]
+        };
+        (0..self.form.length()).map(of).sum()
     }
 
     /// Evaluates theta and phi at w + alpha dw, with dw of the second-order correction if `corrected`.

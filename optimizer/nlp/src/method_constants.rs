@@ -54,8 +54,6 @@ pub struct MethodConstants {
     /// In an iteration, the wrong inertia at which the factorisation itself is checked; 0: never. The first one is
     /// usually right, and a false one costs only an unneeded regularisation.
     pub doubted_refusal: usize,
-    /// Whether directions are checked for the curvature that the inertia promises.
-    pub checks_curvature: bool,
     /// After this many consecutive distrusted matrices, the next ones go to the most trusted factorisation directly; 0:
     /// never.
     pub doubts: usize,
@@ -116,7 +114,6 @@ impl Default for MethodConstants {
             max_refinements: 10,
             distrusts_unrefined: true,
             doubted_refusal: 2,
-            checks_curvature: true,
             doubts: 3,
             two_stage_fronts: true,
             roomy_fronts: true,

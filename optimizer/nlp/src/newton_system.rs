@@ -92,11 +92,6 @@ impl NewtonSystem {
         self.solver.fallbacks()
     }
 
-    /// delta_c of a row in the last factorisation.
-    pub(crate) fn row_regularisation(&self, form: &Formulation, row: usize) -> f64 {
-        if self.unregularised[form.n + row] { 0.0 } else { self.delta_c }
-    }
-
     /// See [`KktSolver::distrust`].
     pub(crate) fn distrust(&mut self) -> bool {
         self.solver.distrust()

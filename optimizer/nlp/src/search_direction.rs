@@ -2,15 +2,7 @@
 
 use crate::factorisation::MatrixChange;
 use crate::iterate::{Iterate, SolveSession};
-use crate::newton_system::NewtonSystem;
 use crate::status::NlpPhase;
-
-/// Fraction of an ascent that the rows may explain (see [`Iterate::curves_downwards`]).
-const ROWS_SHARE: f64 = 0.1;
-/// Regularisation that stands in for that of unregularised rows there.
-const LITTLE_REGULARISATION: f64 = 1e-9;
-/// An ascent below this fraction of the sum of the magnitudes of its terms is a rounding error.
-const CANCELLATION: f64 = 1e-8;
 
 impl Iterate<'_> {
     /// Computes the Newton direction with inertia correction; false when no regularisation gives one.
@@ -54,9 +46,7 @@ impl Iterate<'_> {
                         && solved.unrefined > settings.constants.residual_limit
                         && session.newton.distrust();
                     let solves = !distrusts && solved.refined <= settings.constants.residual_limit;
-                    if solves && settings.constants.checks_curvature && self.curves_downwards(&session.newton) {
-                        session.newton.distrust() || self.correction.increase(settings)
-                    } else if solves {
+                    if solves {
                         self.correction.accept(settings);
                         return true;
                     } else {
@@ -83,28 +73,6 @@ impl Iterate<'_> {
             if !go_on {
                 return false;
             }
-        }
-    }
-
-    /// Whether the direction d shows that the inertia is wrong. With the right inertia and regularised rows the
-    /// matrix K + A^T A / `delta_c` with K = W + Sigma + `delta_w` I is positive definite. From A d = `delta_c` dy -
-    /// c and d^T K d = (c - `delta_c` dy)^T (y + dy) - grad phi^T d follows that its quadratic form along d is the
-    /// sum over the rows below minus the slope. For rows without regularisation A d = -c, and K only has to be
-    /// positive definite in their null space; they get a small regularisation, so that their violation explains any
-    /// curvature.
-    fn curves_downwards(&self, newton: &NewtonSystem) -> bool {
-        let (slope, size) = self.slope_and_size();
-        slope > CANCELLATION * size && {
-            let of_row = |i: usize| {
-                let (c, y, dy) = (self.c[i], self.point.y[i], self.direction.y[i]);
-                let delta_c = newton.row_regularisation(&self.form, i);
-                if delta_c > 0.0 {
-                    c * (y - dy) - delta_c * dy * y + c * c / delta_c
-                } else {
-                    c * (y + dy) + c * c / LITTLE_REGULARISATION
-                }
-            };
-            (0..self.form.m).map(of_row).sum::<f64>() < ROWS_SHARE * slope
         }
     }
 
