@@ -81,7 +81,6 @@ pub(crate) fn all() -> Vec<Variant> {
         set!("refinement: off", constants.max_refinements = 0),
         set!("refinements: at most 1", constants.max_refinements = 1),
         set!("distrusts_unrefined: off", constants.distrusts_unrefined = false),
-        set!("doubted_refusal: off", constants.doubted_refusal = 0),
         set!("doubts: off", constants.doubts = 0),
         set!("two_stage_fronts: off", constants.two_stage_fronts = false),
         set!("roomy_fronts: off", constants.roomy_fronts = false),

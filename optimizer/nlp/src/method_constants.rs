@@ -51,9 +51,6 @@ pub struct MethodConstants {
     pub max_refinements: usize,
     /// Whether a large residual before refinement is a reason to distrust the factorisation.
     pub distrusts_unrefined: bool,
-    /// In an iteration, the wrong inertia at which the factorisation itself is checked; 0: never. The first one is
-    /// usually right, and a false one costs only an unneeded regularisation.
-    pub doubted_refusal: usize,
     /// After this many consecutive distrusted matrices, the next ones go to the most trusted factorisation directly; 0:
     /// never.
     pub doubts: usize,
@@ -113,7 +110,6 @@ impl Default for MethodConstants {
             residual_limit: 1e-5,
             max_refinements: 10,
             distrusts_unrefined: true,
-            doubted_refusal: 2,
             doubts: 3,
             two_stage_fronts: true,
             roomy_fronts: true,

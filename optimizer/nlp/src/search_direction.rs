@@ -25,7 +25,6 @@ impl Iterate<'_> {
         }
         self.correction.begin(settings, self.mu);
         let mut change = MatrixChange::Any;
-        let mut refusals = 0;
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, (dw, dc), change);
@@ -53,21 +52,7 @@ impl Iterate<'_> {
                         distrusts || self.correction.increase(settings)
                     }
                 }
-                Some(i) if i.zero == 0 && i.negative > self.form.m => {
-                    // Element growth that spoils solutions spoils the inertia as well, and regularisation would only
-                    // hide it.
-                    refusals += 1;
-                    let distrusts = refusals == settings.constants.doubted_refusal
-                        && session.newton.unrefined_residual(
-                            &self.form,
-                            &self.point,
-                            &self.at,
-                            &self.rhs,
-                            &mut self.direction,
-                        ) > settings.constants.residual_limit
-                        && session.newton.distrust();
-                    distrusts || self.correction.increase(settings)
-                }
+                Some(i) if i.zero == 0 && i.negative > self.form.m => self.correction.increase(settings),
                 _ => self.correction.increase(settings),
             };
             if !go_on {
