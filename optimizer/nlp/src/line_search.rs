@@ -172,12 +172,6 @@ impl Iterate<'_> {
         if !self.filter.accepts(theta, phi) {
             return None;
         }
-        if phi > reference.phi {
-            let base = if reference.phi.abs() > 10.0 { reference.phi.abs().log10() } else { 1.0 };
-            if (phi - reference.phi).log10() > self.form.constants.max_phi_increase + base {
-                return None;
-            }
-        }
         if reference.theta <= self.theta_min && reference.switches(alpha) {
             return reference.armijo(alpha, phi).then_some(Accepted::Objective);
         }
