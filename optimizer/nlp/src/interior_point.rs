@@ -104,7 +104,7 @@ impl Iterate<'_> {
             let found = self.compute_direction(session);
             let tiny = found && self.relative_step() < 10.0 * f64::EPSILON && self.theta() < 1e-4;
             tiny_steps = if tiny { tiny_steps + 1 } else { 0 };
-            if found && self.line_search(session, tiny) {
+            if found && self.line_search(session) {
                 rescues = 0;
                 elastic_resets = 0;
                 soft_steps = 0;

@@ -48,20 +48,13 @@ impl MeritReference {
 
 impl Iterate<'_> {
     /// Searches along the direction and moves to the accepted point; false when the step becomes too small.
-    pub(crate) fn line_search(&mut self, session: &mut SolveSession, tiny: bool) -> bool {
+    pub(crate) fn line_search(&mut self, session: &mut SolveSession) -> bool {
         let settings = session.settings;
         let tau = barrier::boundary_fraction(settings, self.mu);
         let mut reference = MeritReference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
         let mut alpha =
             barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
         let mut corrects = true;
-        if tiny && settings.constants.accepts_tiny_steps {
-            let (_, _, finite) = self.try_step(alpha, false);
-            if finite {
-                self.accept(session, alpha, tau, 1);
-                return true;
-            }
-        }
         if settings.constants.watchdog_trigger > 0 && self.search.shortened >= 2 * settings.constants.watchdog_trigger {
             self.search.shortened = 0;
             self.search.watched_point.copy_from(&self.point);

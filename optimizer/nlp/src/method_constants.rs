@@ -68,8 +68,6 @@ pub struct MethodConstants {
     /// Consecutive steps of the soft restoration phase, which reduce the primal-dual error when the line search fails
     /// (IPOPT `max_soft_resto_iters`); 0: none.
     pub max_soft_steps: usize,
-    /// Whether steps of the size of rounding errors are accepted without a test (WB06 section 3.9).
-    pub accepts_tiny_steps: bool,
     /// Whether multipliers and filter are reset once where the line search fails at a nearly feasible point.
     pub recentres: bool,
 
@@ -114,7 +112,6 @@ impl Default for MethodConstants {
             watchdog_trigger: 10,
             watchdog_trials: 3,
             max_soft_steps: 10,
-            accepts_tiny_steps: true,
             recentres: true,
             elastic_weight: 1000.0,
             max_restoration_phases: 50,
