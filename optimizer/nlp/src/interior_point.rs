@@ -69,7 +69,6 @@ impl Iterate<'_> {
         session.newton.fit(&self.form);
         let settings = session.settings;
         let mut tiny_steps = 0usize;
-        let mut rescues = 0usize;
         let mut short_steps = 0usize;
         let mut soft_steps = 0usize;
         let mut elastic_resets = 0usize;
@@ -105,7 +104,6 @@ impl Iterate<'_> {
             let tiny = found && self.relative_step() < 10.0 * f64::EPSILON && self.theta() < 1e-4;
             tiny_steps = if tiny { tiny_steps + 1 } else { 0 };
             if found && self.line_search(session) {
-                rescues = 0;
                 elastic_resets = 0;
                 soft_steps = 0;
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
@@ -142,12 +140,9 @@ impl Iterate<'_> {
                     let nearly_feasible = largest(&self.c) <= 1e-2 * settings.tolerance;
                     if nearly_feasible || session.counts.restoration_phases >= settings.constants.max_restoration_phases
                     {
-                        rescues += 1;
-                        if rescues > 1 || !settings.constants.recentres {
-                            return Ending::Stalled;
-                        }
-                        self.recentre(session);
-                    } else if let Some(ending) = self.restore(session) {
+                        return Ending::Stalled;
+                    }
+                    if let Some(ending) = self.restore(session) {
                         return ending;
                     }
                 }

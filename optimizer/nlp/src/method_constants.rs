@@ -68,8 +68,6 @@ pub struct MethodConstants {
     /// Consecutive steps of the soft restoration phase, which reduce the primal-dual error when the line search fails
     /// (IPOPT `max_soft_resto_iters`); 0: none.
     pub max_soft_steps: usize,
-    /// Whether multipliers and filter are reset once where the line search fails at a nearly feasible point.
-    pub recentres: bool,
 
     /// Weight of the l1 violation in the restoration phase (WB06 rho).
     pub elastic_weight: f64,
@@ -112,7 +110,6 @@ impl Default for MethodConstants {
             watchdog_trigger: 10,
             watchdog_trials: 3,
             max_soft_steps: 10,
-            recentres: true,
             elastic_weight: 1000.0,
             max_restoration_phases: 50,
             resets_elastics: true,
