@@ -71,7 +71,7 @@ impl Iterate<'_> {
         let mut tiny_steps = 0usize;
         let mut short_steps = 0usize;
         let mut soft_steps = 0usize;
-        let mut elastic_resets = 0usize;
+        let mut recentred = 0usize;
         loop {
             let now = self.current_optimality();
             self.report(session, &now);
@@ -104,7 +104,7 @@ impl Iterate<'_> {
             let tiny = found && self.relative_step() < 10.0 * f64::EPSILON && self.theta() < 1e-4;
             tiny_steps = if tiny { tiny_steps + 1 } else { 0 };
             if found && self.line_search(session) {
-                elastic_resets = 0;
+                recentred = 0;
                 soft_steps = 0;
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
                     return Ending::Left;
@@ -128,13 +128,11 @@ impl Iterate<'_> {
             session.last_step = StepRecord::default();
             match self.phase() {
                 NlpPhase::Restoration => {
-                    elastic_resets += 1;
-                    if elastic_resets > 2 {
+                    recentred += 1;
+                    if recentred > 2 {
                         return Ending::Stalled;
                     }
-                    if elastic_resets > 1 || !settings.constants.resets_elastics || !restoration::reset_elastics(self) {
-                        self.recentre(session);
-                    }
+                    self.recentre(session);
                 }
                 NlpPhase::Regular => {
                     let nearly_feasible = largest(&self.c) <= 1e-2 * settings.tolerance;

@@ -73,8 +73,6 @@ pub struct MethodConstants {
     pub elastic_weight: f64,
     /// Largest number of restoration phases, after which the solve is stalled.
     pub max_restoration_phases: usize,
-    /// Whether elastic variables are reset to their optimal values where the line search of the phase fails.
-    pub resets_elastics: bool,
     /// Whether a phase that ends at a feasible point which the filter rejects clears the filter.
     pub clears_filter: bool,
     /// Whether bound multipliers take the Newton step that belongs to the movement of the phase.
@@ -112,7 +110,6 @@ impl Default for MethodConstants {
             max_soft_steps: 10,
             elastic_weight: 1000.0,
             max_restoration_phases: 50,
-            resets_elastics: true,
             clears_filter: true,
             steps_multipliers: true,
             multiplier_reset: 1e3,

@@ -48,28 +48,6 @@ fn elastic_formulation<'p>(base: &Formulation<'p>, w: &[f64], mu: f64, rho: f64)
     form
 }
 
-/// Sets p and n to their optimal values for the current x and slacks; false when that changes nothing.
-pub(crate) fn reset_elastics(run: &mut Iterate) -> bool {
-    let Objective::Restoration { first, rho, .. } = run.form.objective else { return false };
-    let (n, mu) = (run.form.n, run.mu);
-    if run.theta() <= 10.0 * f64::EPSILON {
-        return false;
-    }
-    let mut own = run.c.clone();
-    for (a, t) in run.form.row_variables.iter().zip(&run.point.w[n..]).skip(first) {
-        own[a.row] -= a.sign * t;
-    }
-    for k in first..run.form.row_variables.len() {
-        let a = run.form.row_variables[k];
-        let (p, q) = best_elastics(own[a.row], mu, rho);
-        run.point.w[n + k] = if a.sign < 0.0 { p } else { q };
-        run.point.zl[n + k] = mu / run.point.w[n + k];
-    }
-    run.filter.clear();
-    run.evaluate();
-    run.is_finite()
-}
-
 /// Adds the current point to the filter and builds the first iterate of the restoration phase; `None` where it cannot
 /// be evaluated.
 pub(crate) fn begin<'p>(run: &mut Iterate<'p>, session: &mut SolveSession) -> Option<Iterate<'p>> {
