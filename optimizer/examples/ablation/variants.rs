@@ -101,7 +101,6 @@ pub(crate) fn all() -> Vec<Variant> {
         set!("elastic_weight: 10", constants.elastic_weight = 10.0),
         set!("restoration phases: 0", constants.max_restoration_phases = 0),
         set!("restoration phases: 3", constants.max_restoration_phases = 3),
-        set!("clears_filter: off", constants.clears_filter = false),
         set!("steps_multipliers: off", constants.steps_multipliers = false),
         set!("multiplier_reset: off", constants.multiplier_reset = f64::INFINITY),
     ]

@@ -73,8 +73,6 @@ pub struct MethodConstants {
     pub elastic_weight: f64,
     /// Largest number of restoration phases, after which the solve is stalled.
     pub max_restoration_phases: usize,
-    /// Whether a phase that ends at a feasible point which the filter rejects clears the filter.
-    pub clears_filter: bool,
     /// Whether bound multipliers take the Newton step that belongs to the movement of the phase.
     pub steps_multipliers: bool,
     /// Bound multipliers above this are reset after the phase (IPOPT `bound_mult_reset_threshold`).
@@ -110,7 +108,6 @@ impl Default for MethodConstants {
             max_soft_steps: 10,
             elastic_weight: 1000.0,
             max_restoration_phases: 50,
-            clears_filter: true,
             steps_multipliers: true,
             multiplier_reset: 1e3,
         }

@@ -129,13 +129,8 @@ pub(crate) fn finish(
 
     let near = 100.0 * settings.tolerance.min(NEAR_TOLERANCE);
     let feasible = run.program_violation() <= settings.violation_tolerance.max(near);
-    let progress = run.theta() <= settings.required_reduction * theta;
     match ending {
         Ending::Left => {}
-        // A feasible point that the filter rejects because of entries from before the phase.
-        Ending::Converged | Ending::Stalled if feasible && progress && settings.constants.clears_filter => {
-            run.filter.clear()
-        }
         Ending::Converged if !feasible || run.program_violation() > LEFT_OVER * settings.violation_tolerance => {
             // The multipliers of the phase belong to an objective without scale.
             for (y, of_phase) in run.point.y.iter_mut().zip(&phase.point.y) {
