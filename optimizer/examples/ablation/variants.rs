@@ -94,7 +94,6 @@ pub(crate) fn all() -> Vec<Variant> {
         }),
         set!("watchdog: off", constants.watchdog_trigger = 0),
         set!("watchdog_trials: 1", constants.watchdog_trials = 1),
-        set!("soft restoration: off", constants.max_soft_steps = 0),
         // Restoration.
         set!("short_step_limit: off", short_step_limit = 0),
         set!("required_reduction: 0.1", required_reduction = 0.1),

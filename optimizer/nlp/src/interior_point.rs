@@ -70,7 +70,6 @@ impl Iterate<'_> {
         let settings = session.settings;
         let mut tiny_steps = 0usize;
         let mut short_steps = 0usize;
-        let mut soft_steps = 0usize;
         let mut recentred = 0usize;
         loop {
             let now = self.current_optimality();
@@ -105,7 +104,6 @@ impl Iterate<'_> {
             tiny_steps = if tiny { tiny_steps + 1 } else { 0 };
             if found && self.line_search(session) {
                 recentred = 0;
-                soft_steps = 0;
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
                     return Ending::Left;
                 }
@@ -118,12 +116,8 @@ impl Iterate<'_> {
                 if !crawls {
                     continue;
                 }
-            } else if found && soft_steps < settings.constants.max_soft_steps && self.soft_step(session) {
-                soft_steps += 1;
-                continue;
             }
             short_steps = 0;
-            soft_steps = 0;
             self.search.end_watch();
             session.last_step = StepRecord::default();
             match self.phase() {

@@ -212,13 +212,6 @@ impl<'p> Iterate<'p> {
         self.optimality(0.0)
     }
 
-    /// Sum of the parts of the primal-dual error at the current mu.
-    pub(crate) fn primal_dual_error(&mut self) -> f64 {
-        self.update_lagrangian();
-        let now = self.optimality(self.mu);
-        now.violation + now.dual + now.complementarity
-    }
-
     pub(crate) fn phase(&self) -> NlpPhase {
         match self.form.objective {
             Objective::Program => NlpPhase::Regular,

@@ -20,8 +20,6 @@ const S_PHI: f64 = 2.3;
 const ETA: f64 = 1e-8;
 const GAMMA_ALPHA: f64 = 0.05;
 const KAPPA_SOC: f64 = 0.99;
-/// Required decrease of a soft step (IPOPT `soft_resto_pderror_reduction_factor`).
-const SOFT_REDUCTION: f64 = 0.9999;
 
 impl MeritReference {
     /// m(alpha) < 0 and alpha (-slope)^s_phi > delta theta^s_theta (WB06 eq. 19).
@@ -106,31 +104,6 @@ impl Iterate<'_> {
             }
             alpha *= 0.5;
         }
-        false
-    }
-
-    /// Soft restoration phase of IPOPT, after a failed search: takes the longest step within the bounds if it reduces
-    /// the primal-dual error of the barrier problem. Near a solution phi is dominated by rounding errors, this error
-    /// is not.
-    pub(crate) fn soft_step(&mut self, session: &mut SolveSession) -> bool {
-        let tau = barrier::boundary_fraction(session.settings, self.mu);
-        let before = self.primal_dual_error();
-        let alpha = barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau)
-            .min(barrier::fraction_to_zero(&self.point.zl, &self.direction.zl, tau))
-            .min(barrier::fraction_to_zero(&self.point.zu, &self.direction.zu, tau));
-        let (theta, phi) = (self.theta(), self.phi());
-        let (_, _, finite) = self.try_step(alpha, false);
-        if !finite {
-            return false;
-        }
-        self.search.before.copy_from(&self.point);
-        self.accept(session, alpha, tau, 1);
-        if self.is_finite() && self.primal_dual_error() <= SOFT_REDUCTION * before {
-            self.filter.add(theta, phi);
-            return true;
-        }
-        self.point.copy_from(&self.search.before);
-        self.evaluate();
         false
     }
 

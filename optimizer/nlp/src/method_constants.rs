@@ -65,9 +65,6 @@ pub struct MethodConstants {
     pub watchdog_trigger: usize,
     /// Full steps of the watchdog (IPOPT `watchdog_trial_iter_max`).
     pub watchdog_trials: usize,
-    /// Consecutive steps of the soft restoration phase, which reduce the primal-dual error when the line search fails
-    /// (IPOPT `max_soft_resto_iters`); 0: none.
-    pub max_soft_steps: usize,
 
     /// Weight of the l1 violation in the restoration phase (WB06 rho).
     pub elastic_weight: f64,
@@ -105,7 +102,6 @@ impl Default for MethodConstants {
             roomy_fronts: true,
             watchdog_trigger: 10,
             watchdog_trials: 3,
-            max_soft_steps: 10,
             elastic_weight: 1000.0,
             max_restoration_phases: 50,
             steps_multipliers: true,
