@@ -48,11 +48,9 @@ impl Iterate<'_> {
                     if solves {
                         self.correction.accept(settings);
                         return true;
-                    } else {
-                        distrusts || self.correction.increase(settings)
                     }
+                    distrusts || self.correction.increase(settings)
                 }
-                Some(i) if i.zero == 0 && i.negative > self.form.m => self.correction.increase(settings),
                 _ => self.correction.increase(settings),
             };
             if !go_on {
