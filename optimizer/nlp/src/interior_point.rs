@@ -61,7 +61,7 @@ impl Iterate<'_> {
             let mut leave = restoration::may_leave(self, session.settings, theta);
             phase.iterate(session, Some(&mut leave))
         };
-        restoration::finish(self, session, &phase, theta, ending)
+        restoration::finish(self, session, &phase, ending)
     }
 
     /// Iterates until an ending. `leave` is called after each step of a restoration phase.

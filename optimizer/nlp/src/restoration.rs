@@ -100,15 +100,9 @@ pub(crate) fn may_leave(run: &mut Iterate, settings: &NlpSettings, theta: f64) -
     }
 }
 
-/// Returns from the restoration phase to the problem, whose violation was `theta` before. `None` if the solve
-/// continues from the point of the phase; otherwise the ending of the solve at that point.
-pub(crate) fn finish(
-    run: &mut Iterate,
-    session: &mut SolveSession,
-    phase: &Iterate,
-    theta: f64,
-    ending: Ending,
-) -> Option<Ending> {
+/// Returns from the restoration phase to the problem. `None` if the solve continues from the point of the phase;
+/// otherwise the ending of the solve at that point.
+pub(crate) fn finish(run: &mut Iterate, session: &mut SolveSession, phase: &Iterate, ending: Ending) -> Option<Ending> {
     let settings = session.settings;
     let length = run.form.length();
     run.form.tally.seconds += phase.form.tally.seconds;
