@@ -272,11 +272,11 @@ fn solver_settings_are_refused_with_field_value_and_range() {
     let commands = [&["solve"][..], &["tune"], &["sweep", "--actions", "actions.csv", "--out", "out.csv"]];
     for (settings, expected) in [
         (
-            r#"{"tau_min": 1.5}"#,
-            "solver.json is not a file of solver settings: solver: setting tau_min is 1.5; it must be 0.1",
+            r#"{"required_reduction": 1.5}"#,
+            "solver.json is not a file of solver settings: solver: setting required_reduction is 1.5; it must be 0",
         ),
-        (r#"{"tau_mni": 0.9}"#, "field tau_mni is unknown (line 1, column 10). Known fields: tolerance, "),
-        (r#"{"tau_min": "high"}"#, "field tau_min is \"high\" (line 1, column 18); it must be a number"),
+        (r#"{"bound_psuh": 0.1}"#, "field bound_psuh is unknown (line 1, column 13). Known fields: tolerance, "),
+        (r#"{"bound_push": "high"}"#, "field bound_push is \"high\" (line 1, column 21); it must be a number"),
         (r#"{"linear_solver": "ma57"}"#, "field linear_solver is \"ma57\""),
         (
             r#"{"max_iterations": 5}"#,

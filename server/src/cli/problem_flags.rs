@@ -33,7 +33,7 @@ pub(super) struct ProblemFiles {
     /// `gaitwright reference` (default: falisse-2019).
     #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
-    /// Settings of the interior-point method that differ from the defaults (JSON), as in {"tau_min": 0.995,
+    /// Settings of the interior-point method that differ from the defaults (JSON), as in {"bound_push": 0.01,
     /// "linear_solver": "delayed_pivots"}. The error for an unknown name lists the known ones.
     #[arg(long, value_name = "FILE")]
     solver_settings: Option<PathBuf>,
