@@ -244,7 +244,7 @@ impl Settings {
             return Ok(None);
         }
         if !folder.is_dir() {
-            return Err(self.refused("backup_folder", "a folder that exists"));
+            return Err(self.refused("backup_folder", "an existing folder"));
         }
         Ok(Some(BackupPlan { folder, every: Duration::from_secs(3600 * hours), keep }))
     }
@@ -459,7 +459,7 @@ pub(super) struct Config {
 
 #[derive(Debug, Subcommand)]
 enum ConfigCommand {
-    /// Show every setting of `gaitwright serve`, its value and where that comes from.
+    /// Show every setting of `gaitwright serve`, its value and where the value comes from.
     Show {
         #[command(flatten)]
         flags: Box<Flags>,
