@@ -63,7 +63,7 @@ pub enum FeedbackContent {
     Preference {
         /// Better trial.
         winner: TrialId,
-        /// Other trial.
+        /// Worse trial.
         loser: TrialId,
     },
     /// Two trials are equally good.
@@ -78,7 +78,7 @@ pub enum FeedbackContent {
         /// Index of the suggested action.
         #[schema(value_type = u64)]
         suggested: ActionIndex,
-        /// Trial.
+        /// Trial that it would have been better than.
         over: TrialId,
     },
 }
@@ -94,7 +94,7 @@ pub struct FeedbackRow {
     pub study_id: StudyId,
     /// Content of the entry.
     pub content: FeedbackContent,
-    /// Source.
+    /// Who or what it came from.
     pub source: Source,
     /// Author.
     pub author: String,
