@@ -1,4 +1,4 @@
-//! Execution of a gait outside the optimiser's model: simulated walks with the controllers of a laboratory.
+//! Execution of a gait outside the optimiser's model: simulated walks under laboratory controllers.
 //!
 //! The plant has a floating base, compliant ground under heel and toe of both feet, Coulomb friction, joint stops, and
 //! drives with limited torque and torque rate (`plant`, `ground`, `actuator`). The prosthesis tracks the gait with what
@@ -53,7 +53,7 @@ pub struct ExecutionOptions {
     pub walks: u32,
     /// Strides of a complete walk, 1 to 1000.
     pub strides: u32,
-    /// Largest height and depth of the plateaus of each ground, m; 0 to 0.05.
+    /// Largest height and depth of the plateaus of each ground, m; 0 to [`Self::HIGHEST_GROUND_M`].
     pub ground_heights_m: Vec<f64>,
     /// Seed of the disturbances.
     pub seed: u64,
@@ -70,6 +70,8 @@ impl Default for ExecutionOptions {
 impl ExecutionOptions {
     /// Largest number of simulated walks on a ground.
     pub const MOST_WALKS: u32 = 100_000;
+    /// Largest height and depth of the ground, m.
+    pub const HIGHEST_GROUND_M: f64 = 0.05;
 
     /// Checks each option.
     ///
@@ -80,7 +82,7 @@ impl ExecutionOptions {
         ModelError::check_range("strides", f64::from(self.strides), 1.0, 1e3)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 64.0)?;
         for height in &self.ground_heights_m {
-            ModelError::check_range("ground_heights_m", *height, 0.0, 0.05)?;
+            ModelError::check_range("ground_heights_m", *height, 0.0, Self::HIGHEST_GROUND_M)?;
         }
         Ok(())
     }

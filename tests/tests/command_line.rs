@@ -78,7 +78,12 @@ fn other_invalid_arguments_are_refused() {
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
     refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["simulate", "nowhere.json", "--walks", "0"], "must be a whole number from 1 to 100000");
-    refused(&["simulate", "nowhere.json", "--ground", "-5"], "ground_heights_m is -0.005; it must be 0 to 0.05.");
+    refused(&["simulate", "nowhere.json", "--ground", "-5"], "'--ground <MILLIMETRES>': must be a number from 0 to 50");
+    refused(&["solve", "--height-m", "tall", "--mass-kg", "65"], "'--height-m <METRES>': must be a number");
+    refused(&["emg", "nowhere.csv", "--order", "high"], "must be 2, 4, 6 or 8");
+    refused(&["solve", "--warm", "nowhere.json", "--warm-basin", "first"], "must be a whole number");
+    refused(&["prune", "--older-than-days", "0"], "must be a whole number from 1 to 36500");
+    refused(&["export", "first", "study.gait"], "must be the identifier of a study");
 }
 
 #[test]

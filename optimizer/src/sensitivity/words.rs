@@ -25,7 +25,7 @@ impl GaitSensitivities {
         let mut sentences: Vec<String> = self.bounds.iter().filter(matters).map(BoundSensitivity::sentence).collect();
         let others: Vec<&str> = self.bounds.iter().filter(|bound| !matters(bound)).map(|bound| bound.bound).collect();
         if !others.is_empty() {
-            sentences.push(format!("Small changes of {} change nothing.", others.join(", ")));
+            sentences.push(format!("Small changes in {} have no effect.", others.join(", ")));
         }
         sentences
     }
@@ -45,8 +45,11 @@ impl BoundSensitivity {
         if more > 0 {
             places.push(&rest);
         }
-        let weak =
-            if self.is_weakly_active { " The two sides differ, because a constraint is only just active." } else { "" };
+        let weak = if self.is_weakly_active {
+            " Raising and lowering the bound have different effects, because a constraint is only just active."
+        } else {
+            ""
+        };
         let end = |value: Option<f64>| value.map_or_else(|| "any value".to_owned(), figure);
         format!(
             "{} ({quantity}): {change} {stricter} changes the cost of transport by {} and Gait RMSE by {} rad. Active at {}. \

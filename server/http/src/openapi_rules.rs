@@ -80,7 +80,7 @@ pub(super) fn state(document: &mut Value) {
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
         add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
         let people =
-            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers" });
+            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers." });
         schemas.insert("PersonSource".to_owned(), people);
         for component in ["NewPreference", "NewAssessment", "NewSafetyReport", "Suggestion"] {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
@@ -308,7 +308,7 @@ fn state_parameter(parameter: &mut Value) {
             let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
             json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })
         }
-        "right" | "down" => json!({ "enum": TunedBounds::NAMES }),
+        "x" | "y" => json!({ "enum": TunedBounds::NAMES }),
         _ => return,
     };
     if let Some(schema) = parameter.get_mut("schema").and_then(Value::as_object_mut) {
@@ -385,7 +385,10 @@ fn device(name: &str) -> Value {
     properties.insert("name".to_owned(), json!({ "type": "string", "minLength": 1, "maxLength": 80, "pattern": name }));
     properties.insert("carried_limb".to_owned(), json!({ "type": "boolean" }));
     for field in &Device::FIELDS {
-        properties.insert(field.name.to_owned(), number(field.meaning, field.minimum, field.maximum, &json!("number")));
+        properties.insert(
+            field.name.to_owned(),
+            number(&sentence(field.meaning), field.minimum, field.maximum, &json!("number")),
+        );
     }
     let required: Vec<String> = properties.keys().cloned().collect();
     let texts = json!({ "type": "object", "additionalProperties": { "type": "string" } });
@@ -404,12 +407,21 @@ fn muscles() -> Value {
         let Some(muscle) = published.muscle_of_kind(&anybody, kind) else { continue };
         let fields = MuscleOverride::FIELDS.iter().filter(|field| (field.value)(&muscle).is_some());
         let numbers: Map<String, Value> = fields
-            .map(|f| (f.name.to_owned(), number(f.meaning, f.minimum, f.maximum, &json!(["number", "null"]))))
+            .map(|f| {
+                (f.name.to_owned(), number(&sentence(f.meaning), f.minimum, f.maximum, &json!(["number", "null"])))
+            })
             .collect();
         let schema = json!({ "type": "object", "properties": numbers, "additionalProperties": false });
         properties.insert(kind.to_owned(), schema);
     }
     json!({ "type": "object", "properties": properties, "additionalProperties": false })
+}
+
+/// A label as the sentence of a description: `Mass of the adapter.`
+fn sentence(label: &str) -> String {
+    let mut rest = label.chars();
+    let first = rest.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", rest.as_str())
 }
 
 fn number(meaning: &str, minimum: f64, maximum: f64, kind: &Value) -> Value {

@@ -12,7 +12,7 @@ pub(super) struct Config {
 
 #[derive(Debug, Subcommand)]
 enum ConfigCommand {
-    /// Show every setting of `gaitwright serve`, its value and where that comes from.
+    /// Show every setting of `gaitwright serve`, its value and where the value comes from.
     Show {
         #[command(flatten)]
         flags: Box<Flags>,

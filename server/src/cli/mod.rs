@@ -88,7 +88,7 @@ enum Command {
     Sweep(sweep::Sweep),
     /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
     Certify(certify::Certify),
-    /// Simulate walks with a gait on uneven ground, with the controllers of a laboratory.
+    /// Simulate walks with a gait on uneven ground, under laboratory controllers.
     Simulate(simulate::Simulate),
     /// Convert a gait to a table, an OpenSim motion or a picture.
     Convert(convert::Convert),

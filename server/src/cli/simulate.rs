@@ -1,6 +1,6 @@
 //! `gaitwright simulate`: walks with a gait outside the optimiser's model.
 
-use super::flag_numbers::{seed, whole};
+use super::flag_numbers::{number, seed, whole};
 use super::gait_file::read_gait_file;
 use super::output::data;
 use clap::Args;
@@ -17,10 +17,10 @@ pub(super) struct Simulate {
     /// Number of simulated walks on each ground.
     #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().walks, value_parser = walks, allow_negative_numbers = true)]
     walks: u32,
-    /// Largest height and depth of the ground, mm, instead of 0, 5 and 10.
-    #[arg(long, value_name = "MILLIMETRES", allow_negative_numbers = true)]
+    /// Largest height and depth of the uneven ground, 0 to 50 mm (default: 0, 5 and 10 in turn).
+    #[arg(long, value_name = "MILLIMETRES", value_parser = ground, allow_negative_numbers = true)]
     ground: Option<f64>,
-    /// Seed of the disturbances.
+    /// Seed for the disturbances.
     #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().seed, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Print the report as one JSON object.
@@ -30,6 +30,15 @@ pub(super) struct Simulate {
 
 fn walks(text: &str) -> Result<u32, String> {
     whole(text, 1, ExecutionOptions::MOST_WALKS)
+}
+
+/// A height in millimetres, because the error of the library names its own field, in metres.
+fn ground(text: &str) -> Result<f64, String> {
+    let most = 1000.0 * ExecutionOptions::HIGHEST_GROUND_M;
+    match number(text) {
+        Ok(millimetres) if (0.0..=most).contains(&millimetres) => Ok(millimetres),
+        _ => Err(format!("must be a number from 0 to {most}")),
+    }
 }
 
 impl Simulate {
@@ -76,7 +85,9 @@ fn for_people(report: &ExecutionReport) -> String {
         ),
         None => "  pushes: not tried, because the undisturbed walk is not complete".to_owned(),
     });
-    lines.push("  the intact side is a person who tracks the gait; a real person can do better or worse".to_owned());
+    lines.push(
+        "  the intact side is a model of a person who tracks the gait; a real person may do better or worse".to_owned(),
+    );
     lines.join("\n")
 }
 
@@ -85,7 +96,7 @@ fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
     let [low, high] = ground.completed_share_interval;
     let ground_in_words = match 1000.0 * ground.ground_height_m {
         0.0 => "level ground".to_owned(),
-        millimetres => format!("ground of +-{millimetres} mm"),
+        millimetres => format!("uneven ground, ±{millimetres} mm"),
     };
     [
         format!(

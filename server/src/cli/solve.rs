@@ -1,10 +1,11 @@
 //! `gaitwright solve`: optimises one gait.
 
 use super::Ended;
+use super::flag_numbers::basin;
 use super::lineage::{Lineage, LineageStart, basin_of_answer};
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
-use super::output::data;
+use super::output::{data, tell};
 use super::problem_flags::{ProblemFlags, cancelled_by_signal, read_document};
 use super::reference_comparison;
 use super::serve::cores_or;
@@ -53,7 +54,7 @@ pub(super) struct Solve {
     /// Start from another local optimum (basin) in the file given to --warm. Basins are numbered from 1, in the order
     /// in which the initial guesses reached them; `solve` prints the list if there are several (default: the basin of
     /// the gait in that file).
-    #[arg(long, value_name = "NUMBER", requires = "warm")]
+    #[arg(long, value_name = "NUMBER", requires = "warm", value_parser = basin, allow_negative_numbers = true)]
     warm_basin: Option<usize>,
     #[command(flatten)]
     multi_start: MultiStartFlags,
@@ -63,8 +64,8 @@ pub(super) struct Solve {
     /// Print the results as one JSON object.
     #[arg(long)]
     json: bool,
-    /// If no gait is found, explain which bounds conflict and which bound, relaxed alone, gives a gait. Takes up to eight
-    /// solves for each bound.
+    /// If no gait is found, explain which bounds conflict, and which of them gives a gait when relaxed alone. Takes up to
+    /// eight solves for each bound.
     #[arg(long)]
     explain: bool,
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
@@ -137,7 +138,10 @@ impl Solve {
             };
             let outcome = solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)?;
             let explanation = if explain {
-                let mut progress = |question: &str| shown.set_message(question.to_owned());
+                let mut progress = |question: &str| {
+                    shown.suspend(|| tell(question));
+                    shown.set_message(question.to_owned());
+                };
                 explanation::explain(&problem, (&outcome).into(), &options, &mut progress, &cancel)?
             } else {
                 None
@@ -241,7 +245,7 @@ fn for_people(
     lines.extend(lineage_in_words(r, lineage, start));
     lines.extend(basins_in_words(r));
     for violation in outcome.violations.iter().take(10) {
-        lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
+        lines.push(format!("  violated: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
     }
     if let Some(explanation) = explanation {
         lines.extend(explanation.sentences().iter().map(|sentence| format!("  {sentence}")));

@@ -140,7 +140,7 @@ fn certificate_lines(summary: &Summary) -> Vec<String> {
             lines.push(format!("best gait that passed certification: trial {}{rmse}", trial.number));
             lines.push(format!("  action            {}", action_line(&trial.action)));
         }
-        None => lines.push("none of the certified gaits passed".to_owned()),
+        None => lines.push("none of the gaits that were checked passed certification".to_owned()),
     }
     lines.push("a finer mesh often gives a gait that passes: gaitwright solve --mesh 8,8,12,12 --certify".to_owned());
     lines

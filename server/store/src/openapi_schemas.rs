@@ -18,7 +18,7 @@ document! {
     GaitDocument
 }
 document! {
-    /// What `gaitwright solve --problem` reads: subject, device, bounds, settings, reference gait, limits, start.
+    /// Input for `gaitwright solve --problem`: subject, device, bounds, settings, reference gait, limits and warm start.
     SolveProblem
 }
 document! {
@@ -271,9 +271,9 @@ pub struct SolveReport {
     pub unchanged_bounds: Vec<UnchangedBound>,
     /// Wall time, s.
     pub seconds_total: f64,
-    /// Evaluating functions and derivatives, s.
+    /// Time for evaluating functions and derivatives, s.
     pub seconds_evaluation: f64,
-    /// Linear algebra, s.
+    /// Time for linear algebra, s.
     pub seconds_linear_algebra: f64,
     /// Breakdown of the linear algebra. Null if unknown.
     pub linear_algebra: Option<LinearAlgebra>,
@@ -343,17 +343,17 @@ pub struct Optimality {
 /// Operations and times of the linear algebra of a solve.
 #[derive(Debug, ToSchema)]
 pub struct LinearAlgebra {
-    /// Analysing the structure of matrices, s.
+    /// Time for analysing the structure of matrices, s.
     pub seconds_analysis: f64,
-    /// Assembling and factorising, s.
+    /// Time for assembling and factorising matrices, s.
     pub seconds_factorisation: f64,
-    /// Substitutions, residuals and refinement, s.
+    /// Time for substitutions, residuals and refinement, s.
     pub seconds_solves: f64,
-    /// Numerical factorisations.
+    /// Number of numerical factorisations.
     pub factorisations: u64,
-    /// Forward-backward substitutions.
+    /// Number of forward and backward substitutions.
     pub substitutions: u64,
-    /// Number of times that the fallback method was used.
+    /// Number of factorisations that failed and were replaced by a fallback method.
     pub fallbacks: u64,
 }
 
@@ -442,13 +442,13 @@ pub struct ReturnMap {
     pub gait_residual: f64,
     /// Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
     pub fixed_point_residual: f64,
-    /// Largest distance from the gait's first state to the fixed point, rad and rad/s.
+    /// Largest component of the difference between the gait's first state and the fixed point, rad and rad/s.
     pub fixed_point_distance: f64,
-    /// Multipliers from variational equations and saltation, largest first.
+    /// Multipliers from variational equations and saltation matrices, largest first.
     pub multipliers: Vec<Multiplier>,
     /// Largest modulus of the multipliers.
     pub largest: f64,
-    /// Largest modulus of the multipliers from differences of simulated domains.
+    /// Largest modulus of the multipliers, from finite differences of simulated domains.
     pub largest_by_differences: f64,
     /// Resolution of the finite differences.
     pub differences_resolve: f64,

@@ -160,7 +160,7 @@ pub(super) async fn cancel(
 
 /// List workers
 ///
-/// A remote worker is known only while it has a solve.
+/// A remote worker is listed only while it runs a solve.
 #[utoipa::path(
     get,
     path = "/workers",

@@ -47,7 +47,7 @@ impl Settings {
             return Ok(None);
         }
         if !folder.is_dir() {
-            return Err(self.refused("backup_folder", "a folder that exists"));
+            return Err(self.refused("backup_folder", "an existing folder"));
         }
         Ok(Some(BackupPlan { folder, every: Duration::from_secs(3600 * hours), keep }))
     }

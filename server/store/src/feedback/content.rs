@@ -60,7 +60,7 @@ pub enum FeedbackContent {
     Preference {
         /// Better trial.
         winner: TrialId,
-        /// Other trial.
+        /// Worse trial.
         loser: TrialId,
     },
     /// Two trials are equally good.
@@ -75,7 +75,7 @@ pub enum FeedbackContent {
         /// Index of the suggested action.
         #[schema(value_type = u64)]
         suggested: ActionIndex,
-        /// Trial.
+        /// Trial that it would have been better than.
         over: TrialId,
     },
 }

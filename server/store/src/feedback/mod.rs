@@ -23,7 +23,7 @@ pub struct FeedbackRow {
     pub study_id: StudyId,
     /// Content of the entry.
     pub content: FeedbackContent,
-    /// Source.
+    /// Who or what it came from.
     pub source: Source,
     /// Author.
     pub author: String,

@@ -112,8 +112,8 @@ pub struct StudyPlan {
     pub solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.
     pub unchanged_limit: Option<u32>,
-    /// Whether a trial may have an action whose gait is known from another trial, as in the paper. In studies from
-    /// earlier versions, it may.
+    /// Whether a trial may have an action whose gait is known from another trial, as in the paper. Always true for
+    /// studies created by versions without this setting.
     pub repeat_results: bool,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     pub parallel_trials: u32,

@@ -34,7 +34,7 @@ pub struct Trial {
     pub reason: String,
     /// Best trial when this one was proposed.
     pub best_before: Option<TrialId>,
-    /// Trial that gives the warm start. Absent for a cold start.
+    /// Trial whose gait is the warm start. Absent for a cold start.
     pub warm_started_from: Option<TrialId>,
     /// Script that evaluates the trial. Absent if the service does.
     pub asked_by: Option<String>,
@@ -85,7 +85,7 @@ pub struct NewTrial {
     pub reason: String,
     /// Best trial so far.
     pub best_before: Option<TrialId>,
-    /// Trial that gives the warm start.
+    /// Trial whose gait is the warm start.
     pub warm_started_from: Option<TrialId>,
 }
 
