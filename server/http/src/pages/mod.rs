@@ -33,6 +33,7 @@ mod sign_in;
 mod study;
 mod subject;
 mod system;
+mod undo;
 mod unsent_form;
 mod users;
 mod walking_pair;
