@@ -159,12 +159,9 @@ fn sentence_counts_the_complete_walks_of_each_ground() {
 fn body_masses_are_spread_over_the_range_of_the_model() {
     let (lightest, heaviest) = Subject::BODY_MASS_RANGE_KG;
     // In the middle of the range, at its ends, and one percent from an end.
-    for (mass, lowest, highest) in [
-        (70.0, 0.95, 1.05),
-        (lightest, 1.0, 1.05),
-        (heaviest, 0.95, 1.0),
-        (heaviest / 1.01, 0.95, 1.01),
-    ] {
+    for (mass, lowest, highest) in
+        [(70.0, 0.95, 1.05), (lightest, 1.0, 1.05), (heaviest, 0.95, 1.0), (heaviest / 1.01, 0.95, 1.01)]
+    {
         let changes = MassChanges::of(mass);
         let range = changes.range_kg(mass).map(|kg| kg / mass);
         assert!((range[0] - lowest).abs() < 1e-12 && (range[1] - highest).abs() < 1e-12, "{mass} {range:?}");

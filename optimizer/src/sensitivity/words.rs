@@ -22,7 +22,8 @@ impl GaitSensitivities {
     /// One sentence for each bound that matters, and one for the others.
     pub fn sentences(&self) -> Vec<String> {
         let matters = |bound: &&BoundSensitivity| !bound.active.is_empty();
-        let mut sentences: Vec<String> = self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport)).collect();
+        let mut sentences: Vec<String> =
+            self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport)).collect();
         let others: Vec<&str> = self.bounds.iter().filter(|bound| !matters(bound)).map(|bound| bound.bound).collect();
         if !others.is_empty() {
             sentences.push(format!("Small changes of {} change nothing.", others.join(", ")));

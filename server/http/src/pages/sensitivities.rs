@@ -31,10 +31,7 @@ pub(super) struct Row {
 
 impl SensitivityTable {
     /// The reason in words if there are none.
-    pub(super) fn new(
-        solution: Result<PackedSolution, Error>,
-        pool: &OnPool,
-    ) -> Result<Self, String> {
+    pub(super) fn new(solution: Result<PackedSolution, Error>, pool: &OnPool) -> Result<Self, String> {
         let computed = solution.and_then(|solution| solution.sensitivities(pool));
         let StudySensitivities { found, steps } = computed.map_err(|error| error.to_string())?;
         let rows = found.bounds.iter().zip(&steps);
@@ -58,7 +55,9 @@ impl Row {
             beyond: !step.keeps_active,
             interval: match (least, most) {
                 (None, None) => "any value".to_owned(),
-                (Some(least), Some(most)) if end(Some(least)) == end(Some(most)) => format!("about {}", end(Some(least))),
+                (Some(least), Some(most)) if end(Some(least)) == end(Some(most)) => {
+                    format!("about {}", end(Some(least)))
+                }
                 _ => format!("{} to {}", end(least), end(most)),
             },
             active: domains(bound),

@@ -54,10 +54,9 @@ impl JobId {
     pub fn trial(self) -> Option<TrialId> {
         match self {
             Self::Backup(_) => None,
-            Self::Certificate(trial)
-            | Self::ExecutionReport(trial)
-            | Self::Explanation(trial)
-            | Self::Solve(trial) => Some(trial),
+            Self::Certificate(trial) | Self::ExecutionReport(trial) | Self::Explanation(trial) | Self::Solve(trial) => {
+                Some(trial)
+            }
         }
     }
 }

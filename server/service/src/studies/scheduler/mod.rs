@@ -254,9 +254,7 @@ impl Scheduler {
             keep("explaining trials", |scheduler, task| Box::pin(
                 async move { scheduler.keep_explaining(&task).await }
             )),
-            keep("simulating walks", |scheduler, task| Box::pin(
-                async move { scheduler.keep_simulating(&task).await }
-            )),
+            keep("simulating walks", |scheduler, task| Box::pin(async move { scheduler.keep_simulating(&task).await })),
         );
         self.0.tasks.close();
         self.0.tasks.wait().await;
