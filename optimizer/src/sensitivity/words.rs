@@ -22,7 +22,8 @@ impl GaitSensitivities {
     /// One sentence for each bound that matters, and one for the others.
     pub fn sentences(&self) -> Vec<String> {
         let matters = |bound: &&BoundSensitivity| !bound.active.is_empty();
-        let mut sentences: Vec<String> = self.bounds.iter().filter(matters).map(BoundSensitivity::sentence).collect();
+        let mut sentences: Vec<String> =
+            self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport)).collect();
         let others: Vec<&str> = self.bounds.iter().filter(|bound| !matters(bound)).map(|bound| bound.bound).collect();
         if !others.is_empty() {
             sentences.push(format!("Small changes in {} have no effect.", others.join(", ")));
@@ -32,7 +33,7 @@ impl GaitSensitivities {
 }
 
 impl BoundSensitivity {
-    fn sentence(&self) -> String {
+    fn sentence(&self, cost_of_transport: f64) -> String {
         let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound).unwrap_or(0);
         let (change, by) = CHANGES[place];
         // A lower bound is stricter the larger it is.
@@ -52,10 +53,10 @@ impl BoundSensitivity {
         };
         let end = |value: Option<f64>| value.map_or_else(|| "any value".to_owned(), figure);
         format!(
-            "{} ({quantity}): {change} {stricter} changes the cost of transport by {} and Gait RMSE by {} rad. Active at {}. \
+            "{} ({quantity}): {change} {stricter} changes the cost of transport by {} % and Gait RMSE by {} rad. Active at {}. \
              The same constraints stay active from {} to {}.{weak}",
             self.bound,
-            figure(by * derivatives.cost_of_transport),
+            figure(100.0 * by * derivatives.cost_of_transport / cost_of_transport),
             figure(by * derivatives.gait_rmse_rad),
             places.join("; "),
             end(self.interval.0),

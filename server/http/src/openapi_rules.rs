@@ -124,6 +124,7 @@ pub(super) fn state(document: &mut Value) {
             add(schemas, component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
             add(schemas, component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
         }
+        add(schemas, "NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
         add(schemas, "NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
         add(schemas, "NewStudy", "priority", &json!({ "minimum": -10, "maximum": 10 }));
         add(schemas, "NewStudy", "solve_seconds_budget", &json!({ "minimum": 1, "maximum": 1e8 }));

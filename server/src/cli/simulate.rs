@@ -4,10 +4,12 @@ use super::flag_numbers::{number, seed, whole};
 use super::gait_file::read_gait_file;
 use super::output::data;
 use clap::Args;
+use gait_optimizer::CancelToken;
 use gait_optimizer::execution::{ExecutionOptions, ExecutionReport, WalksOnGround, simulate};
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicU32;
 
 #[derive(Debug, Args)]
 pub(super) struct Simulate {
@@ -55,7 +57,9 @@ impl Simulate {
         }
         options.validate()?;
         let gait = read_gait_file(&self.gait)?.gait;
-        let report = Pool::new(1).run(move |_| simulate(&gait, &options)).await??;
+        let (done, cancel) = (AtomicU32::new(0), CancelToken::new());
+        let report = Pool::new(1).run(move |_| simulate(&gait, &options, &done, &cancel)).await??;
+        let report = report.ok_or_else(|| Error::Internal("the simulation ended without a report".to_owned()))?;
         if self.json {
             data(&serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?)
         } else {
@@ -77,6 +81,8 @@ fn for_people(report: &ExecutionReport) -> String {
         .map(|walk| format!("{} at {:.0} mm", walk.strides, 1000.0 * walk.yield_m))
         .collect();
     lines.push(format!("  undisturbed strides on ground that yields under body weight: {}", by_yield.join(", ")));
+    let [lightest, heaviest] = report.body_mass_kg;
+    lines.push(format!("  disturbed walks: bodies of {lightest:.1} to {heaviest:.1} kg"));
     lines.extend(report.grounds.iter().flat_map(ground_for_people));
     lines.push(match report.pushes {
         Some(pushes) => format!(
@@ -94,13 +100,10 @@ fn for_people(report: &ExecutionReport) -> String {
 fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let [low, high] = ground.completed_share_interval;
-    let ground_in_words = match 1000.0 * ground.ground_height_m {
-        0.0 => "level ground".to_owned(),
-        millimetres => format!("uneven ground, ±{millimetres} mm"),
-    };
     [
         format!(
-            "  {ground_in_words}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; {} falls, {} halts",
+            "  {}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; {} falls, {} halts",
+            ground.ground_in_words(),
             ground.completed,
             ground.walks,
             percent(ground.completed_share),

@@ -13,12 +13,13 @@ use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
-use gait_optimizer::sensitivity::{GaitSensitivities, GaitSensitivityError, sensitivities};
+use gait_optimizer::sensitivity::{GaitSensitivities, sensitivities};
 use gait_optimizer::{
     GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, TunedBounds, solve,
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::sensitivities::refusal;
 use gaitwright_service::studies::solve_input::SolveInput;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -193,16 +194,6 @@ impl Solve {
             out.write(&serde_json::to_string(&kept).map_err(|e| Error::Internal(e.to_string()))?)?;
         }
         Ok(Ended::Done)
-    }
-}
-
-/// Why a gait has no sensitivities.
-fn refusal(error: GaitSensitivityError) -> Error {
-    match error {
-        GaitSensitivityError::Solve(error) => error.into(),
-        GaitSensitivityError::Sensitivity(error) => {
-            Error::conflict(format!("The sensitivities of this gait cannot be computed: {error}."))
-        }
     }
 }
 

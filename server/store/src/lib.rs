@@ -30,6 +30,7 @@ pub mod consents;
 pub mod devices;
 mod error;
 pub mod events;
+pub mod execution_reports;
 pub mod explanations;
 pub mod feedback;
 mod free_disk_space;

@@ -570,3 +570,105 @@ pub struct EmgSettings {
     #[schema(required = false)]
     pub order: u64,
 }
+
+/// Simulated walks with a gait, outside the optimiser's model.
+#[derive(Debug, ToSchema)]
+pub struct ExecutionReport {
+    /// Version of this layout and of the simulation.
+    pub format_version: u32,
+    /// SHA-256 of the gait as compact JSON, as in its certificate.
+    pub gait_sha256: String,
+    /// Seed of the disturbances.
+    pub seed: u64,
+    /// Strides of a complete simulated walk.
+    pub strides: u32,
+    /// Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    #[schema(min_items = 2, max_items = 2)]
+    pub body_mass_kg: Vec<f64>,
+    /// Completed strides without any disturbance.
+    pub undisturbed_strides: u32,
+    /// Randomly disturbed walks, for each ground.
+    pub grounds: Vec<WalksOnGround>,
+    /// Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    pub strides_by_yield: Vec<StridesOnYield>,
+    /// Largest pushes survived. Null if the walker does not complete the undisturbed walk.
+    pub pushes: Option<SurvivedPushes>,
+}
+
+/// Simulated walks on one ground.
+#[derive(Debug, ToSchema)]
+pub struct WalksOnGround {
+    /// Largest height and depth of the plateaus of the ground, m.
+    pub ground_height_m: f64,
+    /// Number of simulated walks.
+    pub walks: u32,
+    /// Walks that completed all strides.
+    pub completed: u32,
+    /// Walks that ended with a fall.
+    pub fell: u32,
+    /// Walks that ended without a further step.
+    pub halted: u32,
+    /// Share of completed walks.
+    pub completed_share: f64,
+    /// 95 % confidence interval of this share (Wilson).
+    #[schema(min_items = 2, max_items = 2)]
+    pub completed_share_interval: Vec<f64>,
+    /// Mean number of completed strides.
+    pub mean_strides: f64,
+    /// Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    pub knee_saturated_share: f64,
+    /// The same for its ankle.
+    pub ankle_saturated_share: f64,
+    /// Share of the time in which the knee wanted to change its torque faster than it can.
+    pub knee_rate_limited_share: f64,
+    /// The same for the ankle.
+    pub ankle_rate_limited_share: f64,
+}
+
+/// Undisturbed simulated walk on ground of some stiffness.
+#[derive(Debug, ToSchema)]
+pub struct StridesOnYield {
+    /// Depth of the ground under body weight, m.
+    pub yield_m: f64,
+    /// Completed strides.
+    pub strides: u32,
+}
+
+/// Largest pushes of a fixed ladder that the walker survives, without other disturbances.
+#[derive(Debug, ToSchema)]
+pub struct SurvivedPushes {
+    /// Forwards, N s; 0 if it survives none.
+    pub forwards_n_s: f64,
+    /// Backwards, N s.
+    pub backwards_n_s: f64,
+    /// Largest push of the ladder, N s.
+    pub largest_tried_n_s: f64,
+}
+
+/// Constraint that is active at a node or over the stride.
+#[derive(Debug, ToSchema)]
+pub struct ActiveConstraint {
+    /// Domain, node and quantity.
+    pub place: String,
+    /// Multiplier of the scaled constraint: decrease of the objective per unit that the constraint is relaxed.
+    pub multiplier: f64,
+}
+
+/// Derivatives of figures per unit of a tuned bound.
+#[derive(Debug, ToSchema)]
+pub struct FigureDerivatives {
+    /// Of the objective.
+    pub objective: f64,
+    /// Of the mechanical cost of transport.
+    pub cost_of_transport: f64,
+    /// Of Gait RMSE, rad.
+    pub gait_rmse_rad: f64,
+    /// Of the mean walking speed, m/s.
+    pub speed_m_s: f64,
+    /// Of the largest angle at a node of torso, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, rad.
+    #[schema(min_items = 7, max_items = 7)]
+    pub largest_angles_rad: Vec<f64>,
+    /// Of the smallest angle at a node, rad.
+    #[schema(min_items = 7, max_items = 7)]
+    pub smallest_angles_rad: Vec<f64>,
+}

@@ -49,7 +49,7 @@ GaitDocument = dict[str, Any]
 Instant = str
 
 # Kind of a job.
-JobKind = Literal["backup", "certificate", "explanation", "solve"]
+JobKind = Literal["backup", "certificate", "execution_report", "explanation", "solve"]
 
 # State of a job.
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -181,6 +181,15 @@ class AccessRow(_AccessRowRequired, total=False):
     study_id: Optional[StudyId]
     # Subject of the request, if any.
     subject_id: Optional[SubjectId]
+
+
+class ActiveConstraint(TypedDict):
+    """Constraint that is active at a node or over the stride."""
+
+    # Multiplier of the scaled constraint: decrease of the objective per unit that the constraint is relaxed.
+    multiplier: float
+    # Domain, node and quantity.
+    place: str
 
 
 class Answered(TypedDict):
@@ -751,6 +760,32 @@ class EmgView(TypedDict):
     result: EmgResult
 
 
+class _ExecutionReportRequired(TypedDict):
+    # Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    body_mass_kg: list[float]
+    # Version of this layout and of the simulation.
+    format_version: int
+    # SHA-256 of the gait as compact JSON, as in its certificate.
+    gait_sha256: str
+    # Randomly disturbed walks, for each ground.
+    grounds: list[WalksOnGround]
+    # Seed of the disturbances.
+    seed: int
+    # Strides of a complete simulated walk.
+    strides: int
+    # Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    strides_by_yield: list[StridesOnYield]
+    # Completed strides without any disturbance.
+    undisturbed_strides: int
+
+
+class ExecutionReport(_ExecutionReportRequired, total=False):
+    """Simulated walks with a gait, outside the optimiser's model."""
+
+    # Largest pushes survived. Null if the walker does not complete the undisturbed walk.
+    pushes: Optional[SurvivedPushes]
+
+
 class Extend(TypedDict):
     """A larger trial budget."""
 
@@ -796,6 +831,23 @@ class FeedbackContentSuggestion(TypedDict):
     over: TrialId
     # Index of the suggested action.
     suggested: int
+
+
+class FigureDerivatives(TypedDict):
+    """Derivatives of figures per unit of a tuned bound."""
+
+    # Of the mechanical cost of transport.
+    cost_of_transport: float
+    # Of Gait RMSE, rad.
+    gait_rmse_rad: float
+    # Of the largest angle at a node of torso, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, rad.
+    largest_angles_rad: list[float]
+    # Of the objective.
+    objective: float
+    # Of the smallest angle at a node, rad.
+    smallest_angles_rad: list[float]
+    # Of the mean walking speed, m/s.
+    speed_m_s: float
 
 
 class Fork(TypedDict, total=False):
@@ -923,6 +975,19 @@ class GivenBound(TypedDict):
     value: float
 
 
+class GridStep(TypedDict):
+    """Change of a bound by one step of the grid, and changes of figures to first order."""
+
+    # Change of the mechanical cost of transport.
+    cost_of_transport: float
+    # Change of Gait RMSE, rad.
+    gait_rmse_rad: float
+    # Whether the same constraints stay active up to this value, to first order.
+    keeps_active: bool
+    # The next stricter value, or the next less strict one if there is none.
+    to: float
+
+
 class Health(TypedDict):
     """Health of the service."""
 
@@ -992,6 +1057,8 @@ class _JobRequired(TypedDict):
 class Job(_JobRequired, total=False):
     """Background work of the service."""
 
+    # Share of the work that is done, 0 to 1, where it is known: while walks are simulated. Null otherwise.
+    progress: Optional[float]
     # Reason if it failed. Null otherwise.
     reason: Optional[str]
     # Address of the result. Null until the job is done.
@@ -1478,6 +1545,15 @@ class NewEmg(_NewEmgRequired, total=False):
     reading: EmgReading
 
 
+class NewExecutionReport(TypedDict, total=False):
+    """The simulated walks of a request. There are three grounds: level, ±5 mm and ±10 mm."""
+
+    # Seed of the disturbances. The same seed gives the same report.
+    seed: int
+    # Number of simulated walks on each ground, 1 to 1000.
+    walks: int
+
+
 class _NewLabAnswerRequired(TypedDict):
     # The answer. First is walk 2, second is walk 3. `retracted` is reserved for the service.
     answer: Literal["first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
@@ -1929,6 +2005,8 @@ class _RecommendationRequired(Recommended):
 class Recommendation(_RecommendationRequired, total=False):
     """Best action of a study."""
 
+    # The newest execution report of its gait. Null if nobody requested one.
+    execution_report: Optional[ExecutionReport]
     # If the certificate failed, the best action whose gait passed.
     passing: Optional[Recommended]
 
@@ -2114,6 +2192,29 @@ class SearchSpace(TypedDict):
     dimensions: list[Dimension]
 
 
+class _SensitivityToBoundRequired(TypedDict):
+    # The active constraints that it sets. Empty if small changes of the bound change nothing.
+    active: list[ActiveConstraint]
+    # Name of the bound.
+    bound: str
+    # Derivatives of the figures of the gait.
+    derivatives: FigureDerivatives
+    # Values of the bound between which the active constraints stay the same, to first order. Null: for every value in
+    # that direction.
+    interval: list[Optional[float]]
+    # Whether a constraint is about to become active or inactive, so that the derivatives to both sides differ.
+    is_weakly_active: bool
+    # Its value.
+    value: float
+
+
+class SensitivityToBound(_SensitivityToBoundRequired, total=False):
+    """Sensitivity with respect to one tuned bound. Derivatives are per unit of the bound."""
+
+    # Change of the bound by one step of the study's grid. Null if the study does not tune the bound.
+    grid_step: Optional[GridStep]
+
+
 class _SessionRequired(TypedDict):
     # Whether the user signed in with a one-time link rather than a password.
     by_link: bool
@@ -2238,6 +2339,15 @@ class SolveReport(_SolveReportRequired, total=False):
     linear_algebra: Optional[LinearAlgebra]
     # How well the conditions of a local optimum are met. Null if unknown.
     optimality: Optional[Optimality]
+
+
+class StridesOnYield(TypedDict):
+    """Undisturbed simulated walk on ground of some stiffness."""
+
+    # Completed strides.
+    strides: int
+    # Depth of the ground under body weight, m.
+    yield_m: float
 
 
 class _StudyPlanRequired(TypedDict):
@@ -2397,6 +2507,17 @@ class Suggestion(_SuggestionRequired, total=False):
     source: Optional[PersonSource]
 
 
+class SurvivedPushes(TypedDict):
+    """Largest pushes of a fixed ladder that the walker survives, without other disturbances."""
+
+    # Backwards, N s.
+    backwards_n_s: float
+    # Forwards, N s; 0 if it survives none.
+    forwards_n_s: float
+    # Largest push of the ladder, N s.
+    largest_tried_n_s: float
+
+
 class _TellRequired(TypedDict):
     # Whether the evaluation found a gait.
     outcome: Outcome
@@ -2482,6 +2603,19 @@ class TrialCounts(TypedDict):
     without_result: int
 
 
+class TrialExecutionReport(TypedDict):
+    """Execution report of a gait."""
+
+    created_at: Instant
+    # Version of the program that made it.
+    program: str
+    # The report, as `gaitwright simulate --json` prints it.
+    report: ExecutionReport
+    # How many walks were complete, as a sentence.
+    sentence: str
+    trial_id: TrialId
+
+
 class TrialExplanation(TypedDict):
     """Infeasibility explanation of a trial."""
 
@@ -2508,6 +2642,18 @@ class TrialExplanation(TypedDict):
     trial_id: TrialId
     # Violations of the last iterate, worst first.
     violations: list[Violation]
+
+
+class TrialSensitivities(TypedDict):
+    """Sensitivities of a gait with respect to the tuned bounds."""
+
+    # Each tuned bound, in the order of an action.
+    bounds: list[SensitivityToBound]
+    # Mechanical cost of transport of the gait.
+    cost_of_transport: float
+    # The sensitivities in sentences.
+    sentences: list[str]
+    trial_id: TrialId
 
 
 class Unblind(TypedDict):
@@ -2620,6 +2766,35 @@ class WalkView(_WalkViewRequired, total=False):
     condition: Optional[Condition]
     # Who recorded the walk, and when.
     recorded: Optional[LabSessionStep]
+
+
+class WalksOnGround(TypedDict):
+    """Simulated walks on one ground."""
+
+    # The same for the ankle.
+    ankle_rate_limited_share: float
+    # The same for its ankle.
+    ankle_saturated_share: float
+    # Walks that completed all strides.
+    completed: int
+    # Share of completed walks.
+    completed_share: float
+    # 95 % confidence interval of this share (Wilson).
+    completed_share_interval: list[float]
+    # Walks that ended with a fall.
+    fell: int
+    # Largest height and depth of the plateaus of the ground, m.
+    ground_height_m: float
+    # Walks that ended without a further step.
+    halted: int
+    # Share of the time in which the knee wanted to change its torque faster than it can.
+    knee_rate_limited_share: float
+    # Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    knee_saturated_share: float
+    # Mean number of completed strides.
+    mean_strides: float
+    # Number of simulated walks.
+    walks: int
 
 
 class Withdrawal(TypedDict):
