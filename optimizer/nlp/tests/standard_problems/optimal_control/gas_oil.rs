@@ -10,6 +10,7 @@ const TIMES: [f64; 21] = [
     0.75, 0.85, 0.95,
 ];
 /// Measured concentrations of both substances.
+#[allow(clippy::approx_constant, reason = "measurements")]
 const MEASURED: [[f64; 21]; 2] = [
     [
         1.0, 0.8105, 0.6208, 0.5258, 0.4345, 0.3903, 0.3342, 0.3034, 0.2735, 0.2405, 0.2283, 0.2071, 0.1669, 0.1530,
