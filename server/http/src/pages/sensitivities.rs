@@ -1,6 +1,7 @@
 //! Sensitivities on the page of a gait.
 
 use crate::format;
+use gait_optimizer::TunedBounds;
 use gait_optimizer::sensitivity::BoundSensitivity;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
@@ -42,8 +43,6 @@ impl SensitivityTable {
 
 impl Row {
     fn new(bound: &BoundSensitivity, step: &BoundStep, cost_of_transport: f64) -> Self {
-        let end = |end: Option<f64>| end.map_or_else(|| "any value".to_owned(), format::number);
-        let (least, most) = bound.interval;
         let is_active = !bound.active.is_empty();
         let changes = |text: String| if is_active { text } else { "no change".to_owned() };
         let unit = format::meaning(bound.bound).rsplit_once(", ").map_or("", |(_, unit)| unit);
@@ -53,13 +52,7 @@ impl Row {
             cost: changes(change(100.0 * step.cost_of_transport / cost_of_transport)),
             rmse: changes(change(step.gait_rmse_rad)),
             beyond: !step.keeps_active,
-            interval: match (least, most) {
-                (None, None) => "any value".to_owned(),
-                (Some(least), Some(most)) if end(Some(least)) == end(Some(most)) => {
-                    format!("about {}", end(Some(least)))
-                }
-                _ => format!("{} to {}", end(least), end(most)),
-            },
+            interval: interval(bound),
             active: domains(bound),
         }
     }
@@ -71,11 +64,28 @@ fn change(value: f64) -> String {
     format!("{sign}{}", format::number(value))
 }
 
+/// The values of a bound with the same active constraints, as far as the bound has them at all.
+fn interval(bound: &BoundSensitivity) -> String {
+    let range = TunedBounds::NAMES.iter().zip(TunedBounds::RANGES).find(|(name, _)| **name == bound.bound);
+    let (lowest, highest) = range.map_or((f64::NEG_INFINITY, f64::INFINITY), |(_, range)| range);
+    let (least, most) = bound.interval;
+    match (least.filter(|least| *least > lowest), most.filter(|most| *most < highest)) {
+        (None, None) => "any value".to_owned(),
+        (Some(least), None) => format!("{} or more", format::number(least)),
+        (None, Some(most)) => format!("{} or less", format::number(most)),
+        (Some(least), Some(most)) if format::number(least) == format::number(most) => {
+            format!("about {}", format::number(least))
+        }
+        (Some(least), Some(most)) => format!("{} to {}", format::number(least), format::number(most)),
+    }
+}
+
 /// `SS1_R (12), DS3_L (2)`, in the order of multipliers; a dash if nothing is active.
 fn domains(bound: &BoundSensitivity) -> String {
     let mut counts: Vec<(&str, usize)> = Vec::new();
     for place in bound.active.iter().map(|active| active.place.as_str()) {
-        let domain = place.split([',', ' ']).next().unwrap_or(place);
+        let point = place.split(", ").next().unwrap_or(place);
+        let domain = point.split(" node ").next().unwrap_or(point);
         match counts.iter_mut().find(|(known, _)| *known == domain) {
             Some((_, count)) => *count += 1,
             None => counts.push((domain, 1)),

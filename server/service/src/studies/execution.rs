@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// Largest number of simulated walks on a ground: about two minutes of processor time.
+/// Largest number of simulated walks on a ground: some minutes of processor time.
 pub const MOST_WALKS: u32 = 1000;
 
 /// The simulated walks of a request. There are three grounds: level, ±5 mm and ±10 mm.
