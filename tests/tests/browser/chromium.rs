@@ -78,9 +78,12 @@ impl Chromium {
                 "--disable-background-networking",
                 "--disable-component-update",
                 "--disable-sync",
-                // A mouse, which a machine without a screen does not have: 2 is a device that hovers, 4 a fine pointer.
-                "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4",
             ])
+            // A mouse, which a machine without a screen does not have: 2 is a device that hovers, 4 a fine pointer.
+            .arg((
+                "blink-settings",
+                "primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4",
+            ))
             .build()
             .unwrap();
         let (browser, mut handler) = Browser::launch(config).await.unwrap();

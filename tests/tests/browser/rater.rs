@@ -150,14 +150,17 @@ async fn browser_rater_answers_with_one_key() {
     let said = [("ArrowLeft", "the first gait"), ("3", "the second gait"), ("2", "no difference")];
     for (place, (key, words)) in said.into_iter().enumerate() {
         page.answer("first").await;
-        let seen =
-            "[...document.querySelectorAll('[data-key], [data-keys]')].filter(e => e.getClientRects().length).length";
-        assert_eq!(page.value(seen).await, "4", "the keys are named");
+        assert_eq!(page.count("[data-key]:not([hidden]), [data-keys]:not([hidden])").await, 4, "the keys are named");
         page.press(key).await;
         page.wait_for(".notice.good").await;
         assert!(page.text(".notice.good").await.contains(words), "{key}");
         assert_eq!(answers(&site, study).await.len(), place + 1);
     }
+    page.wait_until("document.querySelector('[data-left]').textContent !== ''").await;
+    let undo = "new KeyboardEvent('keydown', { key: 'z', ctrlKey: true, bubbles: true, cancelable: true })";
+    page.run(&format!("document.body.dispatchEvent({undo})")).await;
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('retracted') ?? false").await;
+    assert!(answers(&site, study).await[2].retraction.is_some());
     page.is_clean(&site.origin).await;
     browser.close().await;
 }
@@ -379,14 +382,14 @@ async fn browser_keys_of_other_fields_answer_nothing_and_can_be_turned_off() {
         page.run(&format!("document.body.dispatchEvent({event})")).await;
         assert_eq!(page.value(same).await, "true", "{held}");
     }
-    page.click("[data-keys] input").await;
+    page.run("document.querySelector('[data-keys] input').click()").await;
     page.reload().await;
     page.answer("first").await;
     page.press("3").await;
     assert_eq!(page.value("document.querySelector('[data-key]').hidden").await, "true", "turned off, also later");
     assert_eq!(page.value(same).await, "true");
     assert!(answers(&site, study).await.is_empty());
-    page.click("[data-keys] input").await;
+    page.run("document.querySelector('[data-keys] input').click()").await;
     page.run("document.activeElement.blur()").await;
     page.press("ArrowRight").await;
     page.wait_for(".notice.good").await;
