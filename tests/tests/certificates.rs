@@ -317,7 +317,7 @@ async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
             let reasons = ["was evaluated by a script", "is not converged"];
             assert!(reasons.iter().any(|reason| refused.text.contains(reason)), "{}", refused.text);
         }
-        let page = service.fetch(&format!("/trials/{trial}")).await.text;
+        let page = service.fetch(&format!("/trials/{trial}?sensitivities=true")).await.text;
         assert_eq!(page.contains("gives no solution to compute sensitivities from"), outcome["outcome"] == "converged");
     }
     service.stop().await;
@@ -354,7 +354,7 @@ async fn service_has_the_sensitivities_that_the_command_line_prints() {
     assert_eq!(steps, 8);
     assert!(bounds.iter().any(|bound| bound["active"].as_array().unwrap().is_empty()));
     assert!(bounds.iter().any(|bound| bound["derivatives"]["cost_of_transport"].as_f64().unwrap() != 0.0));
-    let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    let page = service.fetch(&format!("/trials/{}?sensitivities=true", trial.id)).await.text;
     let sentences = found["sentences"].as_array().unwrap();
     assert!(sentences.len() > 1);
     for sentence in sentences {

@@ -10,6 +10,7 @@ use super::sensitivities::SensitivityTable;
 use super::simulated_walks::SimulatedWalks;
 use crate::AppState;
 use crate::authorization::Authorized;
+use crate::extractors::Params;
 use crate::format::{self, words};
 use crate::page_error::{Page, page};
 use crate::visible::Visible;
@@ -28,6 +29,7 @@ use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{TrialId, certificates, events, gaits, reference_gaits, studies, trials};
+use serde::Deserialize;
 
 #[derive(Template)]
 #[template(path = "gait.html")]
@@ -49,7 +51,9 @@ struct GaitPage {
     certificate: Option<certificate::InWords>,
     /// Walks outside the optimiser's model, for a converged gait.
     walks: Option<SimulatedWalks>,
-    /// Sensitivities of a converged gait, or why it has none.
+    /// Whether the page offers the sensitivities of a converged gait, which take a second.
+    offers_sensitivities: bool,
+    /// The sensitivities, or why there are none.
     sensitivities: Option<Result<SensitivityTable, String>>,
     groups: Vec<Group>,
     solve: Option<Drawn>,
@@ -83,11 +87,20 @@ impl GaitPage {
     }
 }
 
+/// What the page shows beyond what it always shows.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Shown {
+    #[serde(default)]
+    sensitivities: bool,
+}
+
 /// `GET /trials/{id}`.
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
+    Params(shown): Params<Shown>,
 ) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
@@ -116,7 +129,8 @@ pub(super) async fn get(
     } else {
         None
     };
-    let solution = if converged { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
+    let solution =
+        if converged && shown.sensitivities { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
     let last_event = events::last(&mut reader, study.id).await?;
     let explained = explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await?;
     let may_run = authorized.caller.may(Run::NEEDED);
@@ -154,6 +168,7 @@ pub(super) async fn get(
         may_run,
         certificate,
         walks,
+        offers_sensitivities: converged && sensitivities.is_none(),
         sensitivities,
         groups: drawn.groups,
         solve: drawn.solve,

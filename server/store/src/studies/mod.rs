@@ -12,7 +12,7 @@ pub use plan::{Evaluation, FeedbackMode, StudyPlan};
 pub use state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
-use gait_optimizer::{GaitSettings, Subject as Body};
+use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body};
 use serde::Serialize;
 use serde_json::Value;
 use sqlx::Row;
@@ -49,6 +49,42 @@ fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
         weights.entry("activation_bend").or_insert_with(|| 0.0.into());
     }
     serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "gait_settings", reason: e.to_string() })
+}
+
+/// Solver settings of earlier versions whose value is now part of the method.
+const FORMER_SOLVER_SETTINGS: [&str; 23] = [
+    "dual_tolerance",
+    "divergence_limit",
+    "mu_warm",
+    "kappa_epsilon",
+    "kappa_mu",
+    "theta_mu",
+    "tau_min",
+    "bound_fraction",
+    "warm_bound_fraction",
+    "warm_multiplier_push",
+    "multiplier_limit",
+    "hessian_regularisation_min",
+    "hessian_regularisation_max",
+    "dual_regularisation",
+    "dual_regularisation_value",
+    "residual_target",
+    "residual_limit",
+    "max_refinements",
+    "watchdog_trigger",
+    "watchdog_trials",
+    "max_soft_steps",
+    "elastic_weight",
+    "max_restoration_phases",
+];
+
+/// Reads stored options of solves, without settings that the solver no longer has.
+fn recorded_options(text: &str) -> StoreResult<SolveOptions> {
+    let mut document: Value = json_columns::from_text("solve_options", text)?;
+    if let Some(solver) = document.get_mut("solver").and_then(Value::as_object_mut) {
+        solver.retain(|name, _| !FORMER_SOLVER_SETTINGS.contains(&name.as_str()));
+    }
+    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "solve_options", reason: e.to_string() })
 }
 
 /// Adds a study.
@@ -186,7 +222,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             reference_gait_id: row.try_get("reference_gait_id")?,
             muscles: row.try_get("muscles")?,
             gait_settings: Box::new(recorded_settings(row.try_get("gait_settings")?)?),
-            solve_options: json_columns::column(row, "solve_options")?,
+            solve_options: recorded_options(row.try_get("solve_options")?)?,
             base_bounds: json_columns::column(row, "base_bounds")?,
             search_space: json_columns::column(row, "search_space")?,
             learner: json_columns::column(row, "learner")?,
@@ -212,6 +248,16 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn former_solver_settings_are_skipped_and_unknown_ones_are_damage() {
+        let with =
+            |solver: &str| recorded_options(&format!(r#"{{"solver": {{"required_reduction": 0.5, {solver}}}}}"#));
+        let mut kept = SolveOptions::default();
+        kept.solver.required_reduction = 0.5;
+        assert_eq!(with(r#""watchdog_trials": 4, "dual_regularisation": "adaptive""#).unwrap(), kept);
+        assert!(matches!(with(r#""watchdog": 4"#), Err(StoreError::Damaged { .. })));
+    }
 
     #[test]
     fn older_settings_without_curvature_weight_mean_zero() {
