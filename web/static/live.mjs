@@ -35,6 +35,16 @@ function replace(part, next) {
 }
 
 /**
+ * Removes the walker of a gait that is no longer the recommended one.
+ * @param {HTMLElement} shown
+ */
+function removeFormerWalker(shown) {
+  const walker = /** @type {HTMLElement | null} */ (shown.querySelector("[data-shown]"));
+  const best = /** @type {HTMLElement | null} */ (shown.querySelector("[data-best]"));
+  if (walker && walker.dataset.shown !== best?.dataset.best) walker.remove();
+}
+
+/**
  * Replaces the parts that changed and keeps focus and scroll position.
  * @param {HTMLElement} shown
  * @param {Document} fresh
@@ -78,7 +88,10 @@ if (live) {
     pending = true;
     try {
       const answer = await fetch(`/studies/${study}/live${location.search}`);
-      if (answer.ok) update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
+      if (answer.ok) {
+        update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
+        removeFormerWalker(live);
+      }
       if (state() !== last) {
         last = state();
         announced.textContent = `The study is now: ${last}.`;

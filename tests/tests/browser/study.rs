@@ -37,6 +37,35 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_the_fold() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.trial_budget = 6).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let best = site.service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
+    let address = site.at(&format!("/studies/{study}"));
+    let page = browser.open(&address).await;
+    page.resize(1280, 800).await;
+    page.wait_for(".outcome [data-phase]").await;
+    assert_eq!(page.value("document.querySelector('.outcome [data-trial]').dataset.trial").await, best["trial_id"]);
+    let (bottom, _, height) = page.lowest(".outcome svg.gait-figure").await;
+    assert!(bottom <= 800.0 && height >= 300.0, "{bottom} {height}");
+    let (bottom, ..) = page.lowest(".outcome [data-part=best] a").await;
+    assert!(bottom <= 800.0, "{bottom}");
+    let phase = "document.querySelector('.outcome [data-phase]').textContent";
+    let before = page.value(phase).await;
+    page.wait_until(&format!("{phase} !== {before:?}")).await;
+    // Another gait is recommended once this one is reported as unsafe.
+    let report = format!("/api/v1/trials/{}/safety-reports", best["trial_id"].as_str().unwrap());
+    assert!(site.service.post(&report, &serde_json::json!({"note": "fell"})).await.status.is_success());
+    page.wait_until("!document.querySelector('.outcome .walker')").await;
+    page.is_clean(&site.origin).await;
+    let plain = browser.open_without_scripts(&address).await;
+    assert_eq!(plain.count(".outcome svg.gait-figure").await, 1);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn browser_follows_a_running_solve() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(400))).await;
@@ -307,6 +336,8 @@ async fn browser_shows_the_values_at_the_pointer() {
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     let history = site.service.fetch(&format!("/api/v1/studies/{study}/history")).await.items();
     let last = history.as_array().unwrap().last().unwrap();
+    // The walker above the chart has its controls, so that the chart stays in its place.
+    page.wait_for(".outcome fieldset:enabled [data-phase]").await;
     page.point_at("[data-part=history] svg circle.dot.c0:last-of-type").await;
     page.wait_for(".readout:not([hidden])").await;
     let said = page.text(".readout").await;

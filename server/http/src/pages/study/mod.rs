@@ -1,11 +1,13 @@
 //! The study page, kept current by events.
 
 mod answers;
+mod recommended_walker;
 mod trials_table;
 mod without_gait;
 
 use self::answers::{AnswerRow, answers};
 pub(super) use self::answers::{answer_in_words, assessment_in_words};
+use self::recommended_walker::RecommendedWalker;
 use self::trials_table::{Choice, TrialRow, TrialsTable};
 use self::without_gait::WithoutGait;
 use super::page_chart::Drawn;
@@ -58,6 +60,8 @@ struct StudyPage {
     device: Device,
     reference: String,
     live: String,
+    /// Whether the recommended gait is shown walking.
+    walks: bool,
     last_event: i64,
     variant: &'static str,
     answers_by: &'static str,
@@ -98,6 +102,8 @@ struct Live {
     pace: String,
     running: Vec<RunningRow>,
     best: Option<Best>,
+    /// The recommended gait of a study that has ended.
+    walker: Option<RecommendedWalker>,
     unanswered: bool,
     /// Whether only people answer comparisons.
     people_answer: bool,
@@ -114,6 +120,11 @@ struct Live {
 impl Live {
     fn is_best(&self, row: &TrialRow) -> bool {
         self.best.as_ref().is_some_and(|best| best.id == row.id)
+    }
+
+    /// Whether nothing waits for a person, so that the recommended gait comes before the state.
+    fn leads_with_outcome(&self) -> bool {
+        self.unsafe_gaits.is_empty() && !self.question
     }
 
     /// Whether answers are missing from the list.
@@ -209,10 +220,12 @@ pub(super) async fn get(
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     let imports = imports::of_study(&mut reader, id).await?;
     drop(reader);
-    let live = read_live(&mut app, &authorized.caller, id, choice)
-        .await?
-        .render()
-        .map_err(|e| Error::Internal(e.to_string()))?;
+    let mut live = read_live(&mut app, &authorized.caller, id, choice).await?;
+    if let Some(best) = live.best.as_ref().filter(|best| best.has_gait && study.state.has_ended()) {
+        live.walker = RecommendedWalker::read(&mut app, &study, best.id).await?;
+    }
+    let walks = live.walker.is_some();
+    let live = live.render().map_err(|e| Error::Internal(e.to_string()))?;
     let may_administer = authorized.caller.may(Administer::NEEDED);
     let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
     page(&StudyPage {
@@ -221,6 +234,7 @@ pub(super) async fn get(
         device,
         reference,
         live,
+        walks,
         last_event,
         variant,
         answers_by,
@@ -446,6 +460,7 @@ fn view(
         counts,
         running,
         best,
+        walker: None,
         unanswered: outcome.unanswered,
         people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
         chart: course(&[(&snapshot, &outcome)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),

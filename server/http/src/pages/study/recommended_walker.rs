@@ -1,0 +1,33 @@
+//! The recommended gait, walking, with the reference gait behind it.
+
+use crate::AppState;
+use gait_optimizer::Gait;
+use gaitwright_charts::{Ghost, WalkerFigure};
+use gaitwright_compute::OnPool;
+use gaitwright_service::error::Error;
+use gaitwright_store::studies::Study;
+use gaitwright_store::{TrialId, gaits, reference_gaits};
+
+/// The walker of a trial, which a script moves.
+pub(super) struct RecommendedWalker {
+    pub(super) trial: TrialId,
+    pub(super) svg: String,
+}
+
+impl RecommendedWalker {
+    /// `None` if the gait is not stored, or too malformed to draw.
+    pub(super) async fn read(app: &mut AppState, study: &Study, trial: TrialId) -> Result<Option<Self>, Error> {
+        let mut reader = app.read().await?;
+        let Some(gait) = gaits::find(&mut reader, trial).await? else { return Ok(None) };
+        let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
+        drop(reader);
+        let draw = move |pool: &OnPool| {
+            let gait: Gait = gait.unpack(pool)?;
+            let ghost = Ghost::of_reference(&gait, &reference);
+            let figure = WalkerFigure::new(&gait).and_then(|figure| Ok(figure.with_ghost(ghost?)));
+            Ok::<_, Error>(figure.ok().map(|figure| figure.svg("The recommended gait")))
+        };
+        let svg = app.compute(draw).await.map_err(Error::from)??;
+        Ok(svg.map(|svg| Self { trial, svg }))
+    }
+}
