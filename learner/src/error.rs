@@ -106,7 +106,7 @@ pub enum LearnerError {
         reason: String,
     },
     /// No action is left to propose: each has been visited or is pending. If actions may be repeated, each is pending.
-    #[error("no action is left to propose: all {actions} have been visited or are pending")]
+    #[error("no action is left to propose: all {actions} have been tried or are pending")]
     Exhausted {
         /// Number of actions in the space.
         actions: u64,

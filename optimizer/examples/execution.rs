@@ -23,6 +23,7 @@ use golden_gaits::golden_gait;
 use splitmix::SplitMix;
 use std::error::Error;
 use std::path::Path;
+use std::sync::atomic::AtomicU32;
 use std::time::Instant;
 use tuned_actions::LEVELS;
 
@@ -103,7 +104,7 @@ fn row(name: &str, gait: Option<&Gait>) -> Result<(), Box<dyn Error>> {
         ..ExecutionOptions::default()
     };
     let started = Instant::now();
-    let report = simulate(gait, &options)?;
+    let report = simulate(gait, &options, &AtomicU32::new(0), &CancelToken::new())?.ok_or("cancelled")?;
     let grounds: Vec<String> = report.grounds.iter().map(ground).collect();
     let pushes = report.pushes.map_or("-         -".to_owned(), |pushes| {
         format!("{:<6.0} {:<4.0}", pushes.forwards_n_s, pushes.backwards_n_s)

@@ -2,7 +2,7 @@
 //! `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1] [--guess
-//! 1] [--mesh 4,4,6,6] [--bounds a4=0.5,a7=5] [--solver '{"tau_min": 0.995}'] [--trace]`. `--trace` prints every
+//! 1] [--mesh 4,4,6,6] [--bounds a4=0.5,a7=5] [--solver '{"bound_push": 0.01}'] [--trace]`. `--trace` prints every
 //! iteration to stderr. `report` has the measured parts of the time, `seconds_other` the rest (initial guess, line
 //! search, barrier update). `peak_resident_mb` is the peak memory of the process.
 

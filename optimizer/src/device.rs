@@ -41,9 +41,9 @@ pub struct Device {
     pub foot_inertia_kg_m2: f64,
     /// Height of the ankle above the sole, m.
     pub ankle_height_m: f64,
-    /// Distance of the distance of the heel contact behind the ankle, m.
+    /// Distance of the heel contact behind the ankle, m.
     pub heel_behind_m: f64,
-    /// Distance of the distance of the toe contact ahead of the ankle, m.
+    /// Distance of the toe contact ahead of the ankle, m.
     pub toe_ahead_m: f64,
     /// Largest magnitude of the knee torque, N m.
     pub knee_torque_limit_n_m: f64,

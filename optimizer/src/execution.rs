@@ -1,4 +1,4 @@
-//! Execution of a gait outside the optimiser's model: simulated walks with the controllers of a laboratory.
+//! Execution of a gait outside the optimiser's model: simulated walks under laboratory controllers.
 //!
 //! The plant has a floating base, compliant ground under heel and toe of both feet, Coulomb friction, joint stops, and
 //! drives with limited torque and torque rate (`plant`, `ground`, `actuator`). The prosthesis tracks the gait with what
@@ -23,6 +23,7 @@ mod sensors;
 mod simulated_walk;
 mod stride_clock;
 mod terrain;
+mod words;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
@@ -32,8 +33,9 @@ pub use report::{ExecutionReport, StridesOnYield, SurvivedPushes, WalksOnGround}
 
 use crate::certificate::CertifiedGait;
 use crate::gait::Gait;
+use crate::solve::CancelToken;
 use crate::subject::ModelError;
-use disturbance::{Disturbance, LADDER_N_S, Push, YIELD_LADDER_M};
+use disturbance::{Disturbance, LADDER_N_S, MassChanges, Push, YIELD_LADDER_M};
 use serde::{Deserialize, Serialize};
 use simulated_walk::{End, WalkOutcome, Walker};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -41,7 +43,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Period of the controllers, s.
 const CONTROL_PERIOD_S: f64 = 1e-3;
 /// Version of the layout of [`ExecutionReport`] and of the simulation.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 /// Strides before the push of the ladder, which comes in mid-stance of the prosthesis.
 const STRIDES_BEFORE_PUSH: f64 = 3.2;
 
@@ -53,7 +55,7 @@ pub struct ExecutionOptions {
     pub walks: u32,
     /// Strides of a complete walk, 1 to 1000.
     pub strides: u32,
-    /// Largest height and depth of the plateaus of each ground, m; 0 to 0.05.
+    /// Largest height and depth of the plateaus of each ground, m; 0 to [`Self::HIGHEST_GROUND_M`].
     pub ground_heights_m: Vec<f64>,
     /// Seed of the disturbances.
     pub seed: u64,
@@ -70,6 +72,14 @@ impl Default for ExecutionOptions {
 impl ExecutionOptions {
     /// Largest number of simulated walks on a ground.
     pub const MOST_WALKS: u32 = 100_000;
+    /// Largest height and depth of the ground, m.
+    pub const HIGHEST_GROUND_M: f64 = 0.05;
+
+    /// Number of walks with random disturbances, over all grounds.
+    pub fn random_walks(&self) -> u32 {
+        let grounds = u32::try_from(self.ground_heights_m.len()).unwrap_or(u32::MAX);
+        self.walks.saturating_mul(grounds)
+    }
 
     /// Checks each option.
     ///
@@ -80,35 +90,45 @@ impl ExecutionOptions {
         ModelError::check_range("strides", f64::from(self.strides), 1.0, 1e3)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 64.0)?;
         for height in &self.ground_heights_m {
-            ModelError::check_range("ground_heights_m", *height, 0.0, 0.05)?;
+            ModelError::check_range("ground_heights_m", *height, 0.0, Self::HIGHEST_GROUND_M)?;
         }
         Ok(())
     }
 }
 
-/// Simulates walks with a gait. A walk takes some hundredths of a second.
+/// Simulates walks with a gait. A walk takes some hundredths of a second. `done` counts those with random disturbances.
+/// `None` if cancelled, within one walk.
 ///
 /// # Errors
 /// [`ModelError`] if the gait is malformed or an option is out of range.
-pub fn simulate(gait: &Gait, options: &ExecutionOptions) -> Result<ExecutionReport, ModelError> {
+pub fn simulate(
+    gait: &Gait,
+    options: &ExecutionOptions,
+    done: &AtomicU32,
+    cancel: &CancelToken,
+) -> Result<Option<ExecutionReport>, ModelError> {
     options.validate()?;
     let gait_sha256 = CertifiedGait::of(gait)?.gait_sha256;
     let walker = Walker::new(gait)?;
     let strides = options.strides;
     let undisturbed = walker.walk(&Disturbance::none(), strides)?;
     let pushed_within_s = 0.5 * f64::from(strides) * walker.stride_s();
+    let mass_changes = MassChanges::of(gait.subject.body_mass_kg);
     let walk = |ground_m: f64, number: u32| {
-        let disturbance = Disturbance::random(options.seed, number, ground_m, walker.step_m(), pushed_within_s);
-        walker.walk(&disturbance, strides)
+        let disturbance =
+            Disturbance::random(options.seed, number, mass_changes, ground_m, walker.step_m(), pushed_within_s);
+        let outcome = walker.walk(&disturbance, strides);
+        done.fetch_add(1, Ordering::Relaxed);
+        outcome
     };
-    let grounds = options
-        .ground_heights_m
-        .iter()
-        .map(|&ground_m| {
-            let outcomes = in_parallel(options.walks, options.threads, &|number| walk(ground_m, number))?;
-            Ok(WalksOnGround::of(ground_m, &outcomes))
-        })
-        .collect::<Result<_, ModelError>>()?;
+    let mut grounds = Vec::new();
+    for &ground_m in &options.ground_heights_m {
+        let outcomes = in_parallel(options.walks, options.threads, cancel, &|number| walk(ground_m, number))?;
+        if cancel.is_cancelled() {
+            return Ok(None);
+        }
+        grounds.push(WalksOnGround::of(ground_m, &outcomes));
+    }
     let strides_by_yield = YIELD_LADDER_M
         .into_iter()
         .map(|yield_m| {
@@ -117,16 +137,17 @@ pub fn simulate(gait: &Gait, options: &ExecutionOptions) -> Result<ExecutionRepo
         })
         .collect::<Result<_, ModelError>>()?;
     let pushes = if undisturbed.end == End::Completed { Some(survived_pushes(&walker, strides)?) } else { None };
-    Ok(ExecutionReport {
+    Ok(Some(ExecutionReport {
         format_version: FORMAT_VERSION,
         gait_sha256,
         seed: options.seed,
         strides,
+        body_mass_kg: mass_changes.range_kg(gait.subject.body_mass_kg),
         undisturbed_strides: undisturbed.strides,
         grounds,
         strides_by_yield,
         pushes,
-    })
+    }))
 }
 
 fn survived_pushes(walker: &Walker<'_>, strides: u32) -> Result<SurvivedPushes, ModelError> {
@@ -148,10 +169,11 @@ fn survived_pushes(walker: &Walker<'_>, strides: u32) -> Result<SurvivedPushes, 
     })
 }
 
-/// The walks 0 to `count`, in order.
+/// The walks 0 to `count`, in order; fewer if cancelled.
 fn in_parallel(
     count: u32,
     threads: usize,
+    cancel: &CancelToken,
     walk: &(dyn Fn(u32) -> Result<WalkOutcome, ModelError> + Sync),
 ) -> Result<Vec<WalkOutcome>, ModelError> {
     let next = AtomicU32::new(0);
@@ -159,7 +181,7 @@ fn in_parallel(
         let mut done = Vec::new();
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
-            if number >= count {
+            if number >= count || cancel.is_cancelled() {
                 return done;
             }
             done.push((number, walk(number)));

@@ -23,6 +23,8 @@ use thiserror::Error;
 /// The sensitivities of a gait with respect to every tuned bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GaitSensitivities {
+    /// Mechanical cost of transport of the gait.
+    pub cost_of_transport: f64,
     /// One for each tuned bound, in the order of an action.
     pub bounds: Vec<BoundSensitivity>,
 }
@@ -67,5 +69,5 @@ pub fn sensitivities(
 ) -> Result<GaitSensitivities, GaitSensitivityError> {
     let points = parameter::PointSensitivities::new(problem, solution, &final_settings(options))?;
     let bounds = (0..TunedBounds::COUNT).map(|bound| points.of_bound(problem, solution, bound));
-    Ok(GaitSensitivities { bounds: bounds.collect() })
+    Ok(GaitSensitivities { cost_of_transport: points.cost_of_transport(problem, solution), bounds: bounds.collect() })
 }

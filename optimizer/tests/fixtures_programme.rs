@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
-use gait_optimizer::gait_problem::rows::RowPlace;
+use gait_optimizer::gait_problem::row_names::RowPlace;
 use gait_optimizer::gait_problem::{GaitProgramme, RowKind, RowName};
 use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
 use interior_point::NonlinearProgram;

@@ -56,7 +56,6 @@ fn from_a_golden_gait() -> NlpSettings {
         tolerance: 1e-6,
         mu_initial: 1e-6 / 11.0,
         bound_push: 1e-9,
-        bound_fraction: 1e-9,
         bound_multiplier_start: BoundMultiplierStart::Centred,
         ..NlpSettings::default()
     }

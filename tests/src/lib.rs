@@ -21,6 +21,7 @@ pub mod measured;
 pub mod read_allocations;
 pub mod scripted;
 pub mod service;
+pub mod simulated;
 pub mod skipped;
 pub mod sources;
 pub mod well_formed;

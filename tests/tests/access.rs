@@ -74,7 +74,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
 }
 
 /// The pages, as in the router. A page that is not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 72] = [
+const PAGES: [(&str, Option<Right>); 73] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -105,6 +105,7 @@ const PAGES: [(&str, Option<Right>); 72] = [
     ("get /trials/{id}/running", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),
     ("post /trials/{id}/explain", Some(Right::Run)),
+    ("post /trials/{id}/simulate", Some(Right::Run)),
     ("post /trials/{id}/safety-review", Some(Right::Answer)),
     ("get /reference-gaits", Some(Right::Read)),
     ("post /reference-gaits", Some(Right::Run)),

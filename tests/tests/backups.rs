@@ -206,5 +206,8 @@ async fn full_backup_disk_is_not_reported_as_a_full_record_disk() {
     }
     let refused = unshare(&script).unwrap();
     let text = String::from_utf8_lossy(&refused.stderr);
-    assert!(!refused.status.success() && text.contains("There is no space left on the disk for full/copy.db"), "{text}");
+    assert!(
+        !refused.status.success() && text.contains("There is no space left on the disk for full/copy.db"),
+        "{text}"
+    );
 }

@@ -7,7 +7,9 @@ use axum::http::StatusCode;
 use gait_optimizer::Mesh;
 use gait_optimizer::export::ControllerFile;
 use gaitwright_service::workers::{GaitCertifier, GaitSolver};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{StudyId, events};
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
@@ -165,6 +167,201 @@ async fn trial_is_certified_once() {
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     let word = if certificate["passed"] == true { ">passed<" } else { ">failed<" };
     assert!(page.contains(word) && page.contains("Largest Poincaré multiplier"), "{page}");
+    service.stop().await;
+}
+
+/// A study of one trial on a coarse mesh, with the real optimizer, and its trial.
+async fn one_trial(service: &Service) -> (StudyId, Trial) {
+    let study = service
+        .study(|new| {
+            (new.muscles, new.trial_budget) = (false, 1);
+            new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    (study, service.trials(study).await.remove(0))
+}
+
+/// Requests a report and waits for it.
+async fn simulated(service: &Service, address: &str, asked: &Value) -> Value {
+    let answer = service.post(address, asked).await;
+    assert_eq!(answer.status, StatusCode::ACCEPTED, "{}", answer.text);
+    let job = answer.headers["location"].to_str().unwrap().to_owned();
+    while service.fetch(&job).await.json()["state"] != "done" {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    assert_eq!(service.fetch(&job).await.json()["result"], address);
+    service.fetch(address).await.json()
+}
+
+#[tokio::test]
+async fn service_simulates_the_walks_that_the_command_line_simulates() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
+    let (study, trial) = one_trial(&service).await;
+    let address = format!("/api/v1/trials/{}/execution-report", trial.id);
+    let page = async || service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    // There is a recommendation as soon as the gait has a certificate.
+    let recommended = async || loop {
+        let found = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
+        if found.status == StatusCode::OK {
+            return found.json();
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    };
+    assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
+    let unknown = recommended().await;
+    assert!(unknown["trial_id"] == json!(trial.id) && unknown["execution_report"].is_null(), "{unknown}");
+    let before = page().await;
+    assert!(before.contains("No walks with this gait have been simulated yet."), "{before}");
+    for (wrong, field) in
+        [(json!({"walks": 0}), "walks"), (json!({"walks": 1001}), "walks"), (json!({"seed": -1}), "seed")]
+    {
+        let refused = service.post(&address, &wrong).await;
+        assert!(refused.status.is_client_error() && refused.text.contains(field), "{}", refused.text);
+    }
+
+    let found = simulated(&service, &address, &json!({"walks": 4, "seed": 3})).await;
+    let report = &found["report"];
+    let gait = service.fetch(&format!("/api/v1/trials/{}/gait", trial.id)).await.text;
+    std::fs::write(folder.path().join("gait.json"), gait).unwrap();
+    let printed = done(folder.path(), &["simulate", "gait.json", "--walks", "4", "--seed", "3", "--json"]);
+    assert_eq!(*report, serde_json::from_str::<Value>(&printed).unwrap());
+    let walks: Vec<&Value> = report["grounds"].as_array().unwrap().iter().map(|on| &on["walks"]).collect();
+    assert_eq!(walks, [4, 4, 4]);
+
+    // The page has the same without scripts, and the study page and the recommendation follow it.
+    let shown = page().await;
+    let level = format!("{} of 4 simulated walks on level ground", report["grounds"][0]["completed"]);
+    assert!(found["sentence"].as_str().unwrap().starts_with(&level), "{}", found["sentence"]);
+    let strides = format!("{} of 20", report["undisturbed_strides"]);
+    for text in [found["sentence"].as_str().unwrap(), "ground of ±10 mm", "seed 3", &strides, "/help/method#execution"]
+    {
+        assert!(shown.contains(text), "{text}: {shown}");
+    }
+    let of_study = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(of_study.contains(&level) && of_study.contains("#simulated-walks"), "{of_study}");
+    assert_eq!(recommended().await["execution_report"], *report);
+
+    // The same walks exist; other walks replace them as the newest report, and the record keeps both.
+    let again = service.post(&address, &json!({"walks": 4, "seed": 3})).await;
+    assert_eq!((again.status, &again.json()["state"]), (StatusCode::OK, &json!("done")));
+    let other = simulated(&service, &address, &json!({"walks": 4, "seed": 4})).await;
+    assert_eq!((&other["report"]["seed"], other["report"]["grounds"] == report["grounds"]), (&json!(4), false));
+    let audit = service.fetch("/api/v1/audit").await.text;
+    assert_eq!(["ask_execution_report", "trial.simulate"].map(|act| audit.matches(act).count()), [2, 2], "{audit}");
+    let events = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
+    let events: Vec<_> = events.iter().filter(|event| event.kind == "gait_simulated").collect();
+    assert_eq!((events.len(), &events[0].payload["report"]), (2, report));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
+    let (_, trial) = one_trial(&service).await;
+    let address = format!("/api/v1/trials/{}/execution-report", trial.id);
+    let job = format!("/api/v1/jobs/execution_report-{}", trial.id);
+    let until = async |service: &Service, state: &str| {
+        while service.fetch(&job).await.json()["state"] != state {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    let long = json!({"walks": 1000, "seed": 1});
+    assert_eq!(service.post(&address, &long).await.status, StatusCode::ACCEPTED);
+    until(&service, "running").await;
+    let listed = service.fetch("/api/v1/jobs?kind=execution_report").await.items();
+    assert_eq!((&listed[0]["trial_id"], listed[0]["progress"].is_number()), (&json!(trial.id), true), "{listed}");
+    let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    assert!(page.contains("1000 walks on each ground with seed 1 are being simulated") && page.contains("<progress"));
+    assert!(page.contains("simulated_walks.mjs") && !page.contains("/simulate\""), "{page}");
+    let other = service.post(&address, &json!({"walks": 2})).await;
+    assert_eq!(other.status, StatusCode::CONFLICT, "{}", other.text);
+    assert!(other.text.contains("1000 walks with seed 1 are already queued or running"), "{}", other.text);
+    assert_eq!(service.post(&address, &long).await.status, StatusCode::ACCEPTED, "the same walks are the same job");
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.json()["state"], "cancelled");
+    until(&service, "cancelled").await;
+    assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
+
+    assert_eq!(service.post(&address, &json!({"walks": 1000, "seed": 2})).await.status, StatusCode::ACCEPTED);
+    until(&service, "running").await;
+    service.stop().await;
+    let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
+    until(&service, "running").await;
+    let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    assert!(page.contains("1000 walks on each ground with seed 2"), "{page}");
+    service.post(&format!("{job}/cancel"), &json!({})).await;
+    service.stop().await;
+    let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
+    assert_eq!(service.fetch(&job).await.status, StatusCode::NOT_FOUND, "cancelled");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
+    let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 2)).await;
+    for outcome in
+        [json!({"outcome": "converged", "gait_rmse_rad": 0.2}), json!({"outcome": "not_converged", "reason": "r"})]
+    {
+        let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
+        let trial = asked["id"].as_str().unwrap();
+        service.post(&format!("/api/v1/trials/{trial}/tell"), &outcome).await;
+        let walks = service.post(&format!("/api/v1/trials/{trial}/execution-report"), &json!({})).await;
+        let sensitivities = service.fetch(&format!("/api/v1/trials/{trial}/sensitivities")).await;
+        for refused in [walks, sensitivities] {
+            assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
+            let reasons = ["was evaluated by a script", "is not converged"];
+            assert!(reasons.iter().any(|reason| refused.text.contains(reason)), "{}", refused.text);
+        }
+        let page = service.fetch(&format!("/trials/{trial}?sensitivities=true")).await.text;
+        assert_eq!(page.contains("gives no solution to compute sensitivities from"), outcome["outcome"] == "converged");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn service_has_the_sensitivities_that_the_command_line_prints() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
+    let (_, trial) = one_trial(&service).await;
+    let found = service.fetch(&format!("/api/v1/trials/{}/sensitivities", trial.id)).await;
+    assert_eq!(found.status, StatusCode::OK, "{}", found.text);
+    let problem = service.fetch(&format!("/api/v1/trials/{}/problem.json", trial.id)).await.text;
+    std::fs::write(folder.path().join("problem.json"), problem).unwrap();
+    let solve = ["solve", "--problem", "problem.json", "--sensitivities"];
+    let text = done(folder.path(), &solve);
+    let printed: Value = serde_json::from_str(&done(folder.path(), &[&solve[..], &["--json"]].concat())).unwrap();
+
+    let found = found.json();
+    let bounds = found["bounds"].as_array().unwrap();
+    assert_eq!(found["cost_of_transport"], printed["sensitivities"]["cost_of_transport"]);
+    assert_eq!(found["cost_of_transport"], printed["cost_of_transport"]);
+    let mut steps = 0;
+    for (bound, printed) in bounds.iter().zip(printed["sensitivities"]["bounds"].as_array().unwrap()) {
+        for (field, value) in printed.as_object().unwrap() {
+            assert_eq!(bound[field], *value, "{field} of {}", bound["bound"]);
+        }
+        let step = &bound["grid_step"];
+        let change = step["to"].as_f64().unwrap() - bound["value"].as_f64().unwrap();
+        let expected = change * bound["derivatives"]["gait_rmse_rad"].as_f64().unwrap();
+        assert_eq!(step["gait_rmse_rad"].as_f64().unwrap(), expected);
+        steps += 1;
+    }
+    assert_eq!(steps, 8);
+    assert!(bounds.iter().any(|bound| bound["active"].as_array().unwrap().is_empty()));
+    assert!(bounds.iter().any(|bound| bound["derivatives"]["cost_of_transport"].as_f64().unwrap() != 0.0));
+    let page = service.fetch(&format!("/trials/{}?sensitivities=true", trial.id)).await.text;
+    let sentences = found["sentences"].as_array().unwrap();
+    assert!(sentences.len() > 1);
+    for sentence in sentences {
+        let sentence = sentence.as_str().unwrap();
+        assert!(text.contains(sentence), "{sentence}: {text}");
+        assert!(page.contains(sentence), "{sentence}: {page}");
+    }
     service.stop().await;
 }
 

@@ -236,8 +236,9 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let explain = format!("{api}/trials/{}/explanation", service.trials(no_gait).await[0].id);
     scene.one(done, "post /trials/{id}/explanation", &explain, json!({})).await;
 
-    // Certifies a real gait only; tests/certificates.rs counts its row.
+    // Certifies and walks with a real gait only; tests/certificates.rs counts these rows.
     done.insert("post /trials/{id}/certificate".to_owned());
+    done.insert("post /trials/{id}/execution-report".to_owned());
 
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut described = BTreeSet::new();

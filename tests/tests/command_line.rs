@@ -78,7 +78,12 @@ fn other_invalid_arguments_are_refused() {
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
     refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["simulate", "nowhere.json", "--walks", "0"], "must be a whole number from 1 to 100000");
-    refused(&["simulate", "nowhere.json", "--ground", "-5"], "ground_heights_m is -0.005; it must be 0 to 0.05.");
+    refused(&["simulate", "nowhere.json", "--ground", "-5"], "'--ground <MILLIMETRES>': must be a number from 0 to 50");
+    refused(&["solve", "--height-m", "tall", "--mass-kg", "65"], "'--height-m <METRES>': must be a number");
+    refused(&["emg", "nowhere.csv", "--order", "high"], "must be 2, 4, 6 or 8");
+    refused(&["solve", "--warm", "nowhere.json", "--warm-basin", "first"], "must be a whole number");
+    refused(&["prune", "--older-than-days", "0"], "must be a whole number from 1 to 36500");
+    refused(&["export", "first", "study.gait"], "must be the identifier of a study");
 }
 
 #[test]
@@ -272,11 +277,11 @@ fn solver_settings_are_refused_with_field_value_and_range() {
     let commands = [&["solve"][..], &["tune"], &["sweep", "--actions", "actions.csv", "--out", "out.csv"]];
     for (settings, expected) in [
         (
-            r#"{"tau_min": 1.5}"#,
-            "solver.json is not a file of solver settings: solver: setting tau_min is 1.5; it must be 0.1",
+            r#"{"required_reduction": 1.5}"#,
+            "solver.json is not a file of solver settings: solver: setting required_reduction is 1.5; it must be 0",
         ),
-        (r#"{"tau_mni": 0.9}"#, "field tau_mni is unknown (line 1, column 10). Known fields: tolerance, "),
-        (r#"{"tau_min": "high"}"#, "field tau_min is \"high\" (line 1, column 18); it must be a number"),
+        (r#"{"bound_psuh": 0.1}"#, "field bound_psuh is unknown (line 1, column 13). Known fields: tolerance, "),
+        (r#"{"bound_push": "high"}"#, "field bound_push is \"high\" (line 1, column 21); it must be a number"),
         (r#"{"linear_solver": "ma57"}"#, "field linear_solver is \"ma57\""),
         (
             r#"{"max_iterations": 5}"#,

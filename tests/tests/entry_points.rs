@@ -73,7 +73,7 @@ const RULES: [Rule; 6] =
 
 const READS: EntryPoint = EntryPoint::None("shows or exports recorded data; no walk or answer follows from it");
 const RETRACTS: EntryPoint = EntryPoint::None("retracts an answer");
-const RUNS: EntryPoint = EntryPoint::None("runs solves or certifications; no person answers");
+const RUNS: EntryPoint = EntryPoint::None("runs solves, certifications or simulations; no person answers");
 const SETS_UP: EntryPoint = EntryPoint::None("sets up subjects, devices, references, users or the service");
 
 /// What an operation does with a gait; `None` if neither this function nor a file classifies it.
@@ -112,6 +112,8 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
             "/certif",
             "/explain",
             "/explanation",
+            "/execution-report",
+            "/simulate",
             "/cancel",
             "/retry",
             "/emg-results",

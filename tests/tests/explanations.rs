@@ -274,6 +274,8 @@ async fn service_and_command_line_give_the_same_explanation() {
     let solve = ["solve", "--problem", "problem.json", "--explain"];
     let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &solve);
     let there = String::from_utf8(output.stdout).unwrap();
+    let progress = String::from_utf8(output.stderr).unwrap();
+    assert!(progress.contains("searching for conflicting bounds"), "{progress}");
 
     while service.fetch(&address(trial.id)).await.status != StatusCode::OK {
         tokio::time::sleep(Duration::from_millis(100)).await;

@@ -220,7 +220,11 @@ async fn form_sent_twice_with_another_answer_shows_the_recorded_one() {
     let other = send("b", "K").await;
     is_page(&other, StatusCode::CONFLICT, "this one was not saved");
     assert!(other.text.contains("Saved") && other.text.contains(" is better than "), "the stored answer is shown");
-    assert!(other.text.contains("value=\"b\" checked") && other.text.contains("firm</textarea>"), "{}", other.text);
+    assert!(
+        other.text.contains("value=\"b\" aria-current=\"true\"") && other.text.contains("firm</textarea>"),
+        "{}",
+        other.text
+    );
     assert_eq!(service.feedback(study).await.len(), before + 1);
     service.stop().await;
 }
@@ -294,7 +298,7 @@ async fn comparison_page_shows_both_gaits_and_keeps_the_input() {
     let nobody = format!("a={a}&b={b}&answer=b&source=clinician&author=+&note=both+limp&key={UNKNOWN}");
     let refused = service.post_text(&path, FORM, &nobody).await;
     is_page(&refused, unprocessable, "1 to 80 printable characters");
-    for kept in ["value=\"b\" checked", "value=\"clinician\" selected", "both limp</textarea>"] {
+    for kept in ["value=\"b\" aria-current=\"true\"", "value=\"clinician\" selected", "both limp</textarea>"] {
         assert!(refused.text.contains(kept), "{kept}");
     }
     let none = format!("a={a}&b={b}&source=clinician&author=K&note=&key={UNKNOWN}");

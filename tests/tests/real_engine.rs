@@ -168,7 +168,7 @@ fn gait_file_lists_its_ancestors() {
 fn solver_settings_are_read_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    std::fs::write(folder.join("solver.json"), r#"{"bound_push": 0.01, "bound_fraction": 0.01}"#).unwrap();
+    std::fs::write(folder.join("solver.json"), r#"{"bound_push": 0.01}"#).unwrap();
     let solve = ["solve", "--json", "--initial-guesses", "1"];
     let gait = |flags: &[&str]| {
         let figures = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));

@@ -1,10 +1,12 @@
 // @ts-check
-// Keys 1, 2 and 3 choose the answers in their order. The user can turn them off (WCAG 2.1.4), and the browser remembers that.
-// Without this script the page does not mention the keys.
+// The left arrow or 1, 2, and the right arrow or 3 answer. The user can turn the keys off (WCAG 2.1.4), and the browser remembers
+// that. Without this script the page does not mention the keys; on touch screens the styles hide them.
 
 const OFF = "answer keys off";
+/** Where a key has another meaning. */
+const OTHERS = "input, select, textarea, [tabindex]";
 const form = /** @type {HTMLFormElement | null} */ (document.querySelector("form[data-answer]"));
-const choice = /** @type {HTMLElement | null} */ (form?.querySelector("[data-keys]") ?? null);
+const choice = /** @type {HTMLElement | null} */ (document.querySelector("[data-keys]"));
 const box = /** @type {HTMLInputElement | null} */ (choice?.querySelector("input") ?? null);
 
 if (form && choice && box) {
@@ -21,13 +23,13 @@ if (form && choice && box) {
   });
 
   document.addEventListener("keydown", (event) => {
-    const place = ["1", "2", "3"].indexOf(event.key);
-    if (place < 0 || !box.checked || event.ctrlKey || event.altKey || event.metaKey) return;
-    // A focused field keeps its keys, except the choice of an answer.
-    const field = /** @type {Element} */ (event.target).closest("input, select, textarea, button");
-    if (field && field.getAttribute("name") !== "answer") return;
-    const answer = /** @type {HTMLInputElement} */ (form.querySelectorAll(".answer-option input")[place]);
+    // A key that is held down answers once.
+    if (!box.checked || event.repeat || event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
+    if (/** @type {Element} */ (event.target).closest(OTHERS)) return;
+    const buttons = /** @type {HTMLButtonElement[]} */ ([...form.querySelectorAll("button[aria-keyshortcuts]")]);
+    const answer = buttons.find((button) => button.getAttribute("aria-keyshortcuts")?.split(" ").includes(event.key));
+    if (!answer) return;
+    event.preventDefault();
     answer.click();
-    answer.focus();
   });
 }

@@ -143,7 +143,7 @@ function addControls(box, isPair) {
     <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
     <label><input type="checkbox" data-overlay autocomplete="off"> ${isPair ? "Overlay the gaits" : "Reference gait"}</label>
     <output data-phase>0 %</output>`;
-  box.append(controls);
+  (document.querySelector("[data-controls]") ?? box).append(controls);
   return controls;
 }
 
@@ -236,16 +236,15 @@ const load = async (trial) => {
   return answer.json();
 };
 
-for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker"))) {
+for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker:not([data-controls])"))) {
   const figures = /** @type {NodeListOf<SVGSVGElement>} */ (box.querySelectorAll("[data-trial] svg.gait-figure"));
   const controls = addControls(box, figures.length > 1);
   for (const hint of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-drag]"))) hint.hidden = false;
-  if (!mayMove()) showStrips(box);
+  if (!mayMove()) showStrips(box.querySelector("noscript") ? box : document);
   const trial = (/** @type {Element} */ svg) => /** @type {HTMLElement} */ (svg.closest("[data-trial]")).dataset.trial;
   Promise.all([...figures].map(async (svg) => new Scene(svg, await load(trial(svg)))))
     .then((scenes) => new Player(controls, scenes))
     .catch((error) => {
-      box.style.minHeight = `${box.offsetHeight}px`;
-      box.textContent = `The animation cannot be loaded (${error.message}). Reload the page to try again.`;
+      controls.textContent = `The animation cannot be loaded (${error.message}). Reload the page to try again.`;
     });
 }

@@ -1,14 +1,19 @@
 // @ts-check
 // After an answer: reloads the page when the study changes, to show the next comparison. If the user is typing, it offers a link
-// instead.
+// instead. It never reloads while an answer can still be undone, or while a form is being sent.
 
 import { holdsEdits } from "./edited_fields.mjs";
+import { over } from "./undo.mjs";
 
 const place = /** @type {HTMLElement | null} */ (document.querySelector("[data-going-on]"));
 
 if (place) {
   const source = new EventSource(`/api/v1/studies/${place.dataset.study}/events?after=${place.dataset.after}`);
-  source.addEventListener("study_changed", () => {
+  let leaving = false;
+  document.addEventListener("submit", () => (leaving = true));
+  source.addEventListener("study_changed", async () => {
+    await over;
+    if (leaving) return;
     if (!holdsEdits(document.body)) {
       location.reload();
       return;

@@ -22,11 +22,11 @@ if (box) {
   const scrub = /** @type {HTMLInputElement} */ (document.querySelector("[data-scrub]"));
   const pace = /** @type {HTMLSelectElement} */ (document.querySelector("[data-pace]"));
   const form = /** @type {HTMLFormElement} */ (document.querySelector("[data-answer]"));
-  const save = /** @type {HTMLButtonElement} */ (form.querySelector("[type=submit]"));
+  const answers = /** @type {NodeListOf<HTMLButtonElement>} */ (form.querySelectorAll("[type=submit]"));
   const drawings = /** @type {SVGSVGElement[]} */ ([...box.querySelectorAll("svg[data-side]")]);
   const speed = /** @type {HTMLSelectElement} */ (document.querySelector("[data-speed]"));
   const clocks = new Clocks(drawings.map((svg) => Number(svg.dataset.seconds) || STRIDE_S), STRIDE_S);
-  save.disabled = true;
+  for (const answer of answers) answer.disabled = true;
   let playing = mayMove();
   const strips = new DOMParser().parseFromString(document.querySelector("[data-strips]")?.textContent ?? "", "text/html");
   const pictures = strips.querySelectorAll("svg.tiles");
@@ -97,7 +97,7 @@ if (box) {
     const took = /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms"));
     // Runs before the form data are collected.
     form.addEventListener("submit", () => (took.value = String(Math.round(performance.now() - begun))), { capture: true });
-    save.disabled = false;
+    for (const answer of answers) answer.disabled = false;
     state.textContent = "";
   } catch (error) {
     state.textContent = "The gaits cannot be loaded. Reload the page before you answer.";

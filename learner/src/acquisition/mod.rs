@@ -3,6 +3,7 @@
 pub(crate) mod avoidance;
 mod candidates;
 pub(crate) mod eubo;
+mod eubo_bounds;
 pub(crate) mod information_gain;
 pub(crate) mod line;
 pub(crate) mod line_cospar;

@@ -73,7 +73,7 @@ impl Approximate for ExpectationPropagation {
                 working.refresh(prior, sites)?;
             }
         }
-        Err(LearnerError::Numerical(format!("expectation propagation did not settle in {} sweeps", self.sweeps)))
+        Err(LearnerError::Numerical(format!("expectation propagation did not converge in {} sweeps", self.sweeps)))
     }
 
     fn log_evidence(&self, observed: &ObservedPoints, _link: Link, approximation: &Approximation) -> Result<f64> {
@@ -161,6 +161,6 @@ mod tests {
         let belief = posterior(&space, &log, &LearnerSettings::published(Method::Eubo)).unwrap();
         let stopped = ExpectationPropagation { sweeps: 2, ..ExpectationPropagation::default() };
         let fitted = stopped.approximate(belief.utility.observed(), Link::Probit);
-        assert!(fitted.is_err_and(|error| error.to_string().contains("did not settle in 2 sweeps")));
+        assert!(fitted.is_err_and(|error| error.to_string().contains("did not converge in 2 sweeps")));
     }
 }

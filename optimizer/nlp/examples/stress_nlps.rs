@@ -8,9 +8,7 @@ mod standard_problems;
 
 use std::collections::BTreeMap;
 
-use interior_point::{
-    BarrierStrategy, BoundMultiplierStart, DualRegularisation, NlpSettings, NlpStatus, StartPoint, solve,
-};
+use interior_point::{BarrierStrategy, BoundMultiplierStart, NlpSettings, NlpStatus, StartPoint, solve};
 
 fn main() {
     let starts: u64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(10);
@@ -23,9 +21,6 @@ fn main() {
             NlpSettings { mu_initial: 1e-4, bound_multiplier_start: BoundMultiplierStart::Centred, ..d() },
         ),
         ("mu 1e-4, one", NlpSettings { mu_initial: 1e-4, ..d() }),
-        ("dc when singular", NlpSettings { dual_regularisation: DualRegularisation::WhenSingular, ..d() }),
-        ("no short-step rule", NlpSettings { short_step_limit: 0, ..d() }),
-        ("no soft steps", NlpSettings { max_soft_steps: 0, ..d() }),
         ("gradient scaling", NlpSettings { gradient_scaling: Some(100.0), ..d() }),
     ];
     for (label, settings) in &variants {

@@ -6,9 +6,6 @@ use crate::formulation::Formulation;
 use crate::primal_dual::{Linearisation, PrimalDual};
 use crate::settings::NlpSettings;
 
-/// Linear damping of variables with one bound (WB06 kappa_d).
-pub(crate) const DAMPING: f64 = 1e-5;
-
 /// phi_mu - F at w; NaN or infinite outside the bounds.
 pub(crate) fn barrier_term(form: &Formulation, w: &[f64], mu: f64) -> f64 {
     let mut logs = 0.0;
@@ -28,7 +25,7 @@ pub(crate) fn barrier_term(form: &Formulation, w: &[f64], mu: f64) -> f64 {
             damping += u - w[j];
         }
     }
-    mu * (DAMPING * damping - logs)
+    mu * (form.constants.damping * damping - logs)
 }
 
 /// Fraction-to-the-boundary rule: the largest alpha in (0, 1] for which w + alpha d keeps (1 - tau) of every slack
@@ -53,17 +50,17 @@ pub(crate) fn fraction_to_zero(z: &[f64], d: &[f64], tau: f64) -> f64 {
 /// Smallest barrier parameter that the tolerances require; multipliers are scaled with the objective.
 pub(crate) fn smallest_mu(settings: &NlpSettings, objective_scale: f64) -> f64 {
     let complementarity = settings.complementarity_tolerance * objective_scale;
-    settings.tolerance.min(complementarity) / (settings.kappa_epsilon + 1.0)
+    settings.tolerance.min(complementarity) / (settings.constants.kappa_epsilon + 1.0)
 }
 
 /// max(mu_min, min(kappa_mu mu, mu^theta_mu)) (WB06 eq. 7).
 pub(crate) fn reduced_mu(settings: &NlpSettings, mu: f64, smallest: f64) -> f64 {
-    (settings.kappa_mu * mu).min(mu.powf(settings.theta_mu)).max(smallest)
+    (settings.constants.kappa_mu * mu).min(mu.powf(settings.constants.theta_mu)).max(smallest)
 }
 
 /// tau = max(tau_min, 1 - mu) (WB06 eq. 8).
 pub(crate) fn boundary_fraction(settings: &NlpSettings, mu: f64) -> f64 {
-    settings.tau_min.max(1.0 - mu)
+    settings.constants.tau_min.max(1.0 - mu)
 }
 
 /// LOQO rule (Nocedal & Wright eqs. 19.20, 19.21): mu = 0.1 min(0.05 (1 - xi) / xi, 2)^3 * average, xi = min /
@@ -84,12 +81,11 @@ pub(crate) fn loqo_mu(point: &PrimalDual, at: &Linearisation) -> Option<f64> {
     Some(0.1 * (0.05 * (1.0 - xi) / xi).min(2.0).powi(3) * average)
 }
 
-/// Keeps z within a factor kappa_Sigma = 1e10 of mu / slack (WB06 eq. 16).
-pub(crate) fn keep_near_centre(point: &mut PrimalDual, at: &Linearisation, mu: f64) {
-    const KAPPA_SIGMA: f64 = 1e10;
+/// Keeps z within a factor kappa_Sigma of mu / slack (WB06 eq. 16).
+pub(crate) fn keep_near_centre(point: &mut PrimalDual, at: &Linearisation, mu: f64, kappa_sigma: f64) {
     for (z, slack) in [(&mut point.zl, &at.slack_lower), (&mut point.zu, &at.slack_upper)] {
         for (z, s) in z.iter_mut().zip(slack).filter(|(_, s)| s.is_finite()) {
-            *z = z.clamp(mu / (KAPPA_SIGMA * s), KAPPA_SIGMA * mu / s);
+            *z = z.clamp(mu / (kappa_sigma * s), kappa_sigma * mu / s);
         }
     }
 }

@@ -44,7 +44,9 @@ impl Iterate<'_> {
                 self.set_mu((0.8 * average).clamp(smallest, 1e5));
             }
         }
-        while self.mu > smallest && (force || self.optimality(self.mu).error() <= settings.kappa_epsilon * self.mu) {
+        while self.mu > smallest
+            && (force || self.optimality(self.mu).error() <= settings.constants.kappa_epsilon * self.mu)
+        {
             self.set_mu(barrier::reduced_mu(settings, self.mu, smallest));
             force = false;
         }

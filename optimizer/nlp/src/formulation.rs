@@ -13,6 +13,7 @@
 
 use std::time::Instant;
 
+use crate::method_constants::MethodConstants;
 use crate::nonlinear_program::{NonlinearProgram, SparsityPattern};
 use crate::program_checks::{check_bounds, check_pattern};
 use crate::settings::NlpSettings;
@@ -70,6 +71,7 @@ pub(crate) struct Formulation<'p> {
     pub row_scale: Vec<f64>,
     pub objective: Objective,
     pub tally: EvaluationTally,
+    pub constants: MethodConstants,
     jacobian_zeros: Vec<usize>,
     hessian_zeros: Vec<usize>,
     scaled_multipliers: Vec<f64>,
@@ -131,6 +133,7 @@ impl<'p> Formulation<'p> {
             row_scale: vec![1.0; m],
             objective: Objective::Program,
             tally: EvaluationTally::default(),
+            constants: settings.constants,
             jacobian_zeros,
             hessian_zeros,
             scaled_multipliers: vec![0.0; m],

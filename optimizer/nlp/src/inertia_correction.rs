@@ -1,6 +1,7 @@
-//! Inertia correction: regularisation until the KKT matrix has the inertia (n, m, 0) (WB06 algorithm IC).
+//! Inertia correction: regularisation until the KKT matrix has the inertia (n, m, 0) (WB06 algorithm IC). Rows
+//! are always regularised, so that redundant rows need no second factorisation.
 
-use crate::settings::{DualRegularisation, NlpSettings};
+use crate::settings::NlpSettings;
 
 /// The last nonzero delta_w, and the current regularisation.
 #[derive(Debug, Clone, Copy, Default)]
@@ -26,14 +27,11 @@ impl InertiaCorrection {
         self.delta_w = self.proximal;
         if self.skip > 0 {
             self.skip -= 1;
-            let fading = (self.last * DECREASE).max(settings.hessian_regularisation_min);
+            let fading = (self.last * DECREASE).max(settings.constants.hessian_regularisation_min);
             self.delta_w = self.delta_w.max(fading);
         }
         self.bare = self.delta_w == 0.0;
-        self.delta_c = match settings.dual_regularisation {
-            DualRegularisation::Always => Self::dual(settings, mu),
-            DualRegularisation::WhenSingular => 0.0,
-        };
+        self.delta_c = settings.constants.dual_regularisation_value * mu.powf(0.25);
     }
 
     /// Adapts the proximal term to the line search: after a step that was shortened often, a proximal term shortens
@@ -64,33 +62,21 @@ impl InertiaCorrection {
         }
     }
 
-    /// The next regularisation after a singular matrix or an inaccurate solution; false when out of range.
-    pub(crate) fn singular(&mut self, settings: &NlpSettings, mu: f64) -> bool {
-        if self.delta_c == 0.0 {
-            self.delta_c = Self::dual(settings, mu);
-            return true;
-        }
-        self.increase(settings)
-    }
-
-    /// The next regularisation after too many negative eigenvalues; false when out of range.
+    /// The next regularisation after a wrong inertia, a singular matrix or an inaccurate solution; false when out of
+    /// range.
     pub(crate) fn increase(&mut self, settings: &NlpSettings) -> bool {
         self.delta_w = if self.delta_w == 0.0 {
             if self.last == 0.0 {
                 settings.hessian_regularisation_first
             } else {
-                (self.last * DECREASE).max(settings.hessian_regularisation_min)
+                (self.last * DECREASE).max(settings.constants.hessian_regularisation_min)
             }
         } else if self.last == 0.0 || 1e5 * self.last < self.delta_w {
             self.delta_w * FIRST_INCREASE
         } else {
             self.delta_w * INCREASE
         };
-        self.delta_w <= settings.hessian_regularisation_max
-    }
-
-    fn dual(settings: &NlpSettings, mu: f64) -> f64 {
-        settings.dual_regularisation_value * mu.powf(0.25)
+        self.delta_w <= settings.constants.hessian_regularisation_max
     }
 }
 

@@ -21,7 +21,7 @@ impl Iterate<'_> {
         let scale = self.form.objective_scale;
         now.error() <= settings.tolerance
             && self.largest_violation() <= settings.violation_tolerance
-            && now.dual / scale <= settings.dual_tolerance
+            && now.dual / scale <= settings.constants.dual_tolerance
             && now.complementarity / scale <= settings.complementarity_tolerance
     }
 
@@ -61,7 +61,7 @@ impl Iterate<'_> {
             let mut leave = restoration::may_leave(self, session.settings, theta);
             phase.iterate(session, Some(&mut leave))
         };
-        restoration::finish(self, session, &phase, theta, ending)
+        restoration::finish(self, session, &phase, ending)
     }
 
     /// Iterates until an ending. `leave` is called after each step of a restoration phase.
@@ -69,10 +69,8 @@ impl Iterate<'_> {
         session.newton.fit(&self.form);
         let settings = session.settings;
         let mut tiny_steps = 0usize;
-        let mut rescues = 0usize;
         let mut short_steps = 0usize;
-        let mut soft_steps = 0usize;
-        let mut elastic_resets = 0usize;
+        let mut recentred = 0usize;
         loop {
             let now = self.current_optimality();
             self.report(session, &now);
@@ -88,7 +86,7 @@ impl Iterate<'_> {
             if session.started.elapsed().as_secs_f64() >= settings.max_seconds {
                 return Ending::TimeLimit;
             }
-            if largest(&self.point.w[..self.form.n]) > settings.divergence_limit {
+            if largest(&self.point.w[..self.form.n]) > settings.constants.divergence_limit {
                 return Ending::Unbounded;
             }
             if tiny_steps > 1 && self.mu <= barrier::smallest_mu(settings, self.form.objective_scale) {
@@ -104,10 +102,8 @@ impl Iterate<'_> {
             let found = self.compute_direction(session);
             let tiny = found && self.relative_step() < 10.0 * f64::EPSILON && self.theta() < 1e-4;
             tiny_steps = if tiny { tiny_steps + 1 } else { 0 };
-            if found && self.line_search(session, tiny) {
-                rescues = 0;
-                elastic_resets = 0;
-                soft_steps = 0;
+            if found && self.line_search(session) {
+                recentred = 0;
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
                     return Ending::Left;
                 }
@@ -116,37 +112,29 @@ impl Iterate<'_> {
                     && short_steps >= settings.short_step_limit
                     && self.phase() == NlpPhase::Regular
                     && largest(&self.c) > settings.tolerance
-                    && session.counts.restoration_phases < settings.max_restoration_phases;
+                    && session.counts.restoration_phases < settings.constants.max_restoration_phases;
                 if !crawls {
                     continue;
                 }
-            } else if found && soft_steps < settings.max_soft_steps && self.soft_step(session) {
-                soft_steps += 1;
-                continue;
             }
             short_steps = 0;
-            soft_steps = 0;
             self.search.end_watch();
             session.last_step = StepRecord::default();
             match self.phase() {
                 NlpPhase::Restoration => {
-                    elastic_resets += 1;
-                    if elastic_resets > 2 {
+                    recentred += 1;
+                    if recentred > 2 {
                         return Ending::Stalled;
                     }
-                    if elastic_resets > 1 || !restoration::reset_elastics(self) {
-                        self.recentre(session);
-                    }
+                    self.recentre(session);
                 }
                 NlpPhase::Regular => {
                     let nearly_feasible = largest(&self.c) <= 1e-2 * settings.tolerance;
-                    if nearly_feasible || session.counts.restoration_phases >= settings.max_restoration_phases {
-                        rescues += 1;
-                        if rescues > 1 {
-                            return Ending::Stalled;
-                        }
-                        self.recentre(session);
-                    } else if let Some(ending) = self.restore(session) {
+                    if nearly_feasible || session.counts.restoration_phases >= settings.constants.max_restoration_phases
+                    {
+                        return Ending::Stalled;
+                    }
+                    if let Some(ending) = self.restore(session) {
                         return ending;
                     }
                 }

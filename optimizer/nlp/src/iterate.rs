@@ -121,11 +121,12 @@ impl<'p> Iterate<'p> {
     pub(crate) fn measure_slacks(&mut self) {
         let smallest = f64::EPSILON * self.mu.min(1.0);
         let movement = f64::EPSILON.powf(0.75);
+        let moves = self.form.constants.moves_bounds;
         for j in 0..self.form.length() {
             let (l, u, w) = (self.form.lower[j], self.form.upper[j], self.point.w[j]);
             if l.is_finite() {
                 self.at.slack_lower[j] = w - l;
-                if w - l < smallest {
+                if w - l < smallest && moves {
                     let slack = (self.mu / self.point.zl[j]).max(smallest).min(movement * l.abs().max(1.0));
                     self.form.lower[j] = w - slack;
                     self.at.slack_lower[j] = (w - self.form.lower[j]).max(f64::MIN_POSITIVE);
@@ -133,7 +134,7 @@ impl<'p> Iterate<'p> {
             }
             if u.is_finite() {
                 self.at.slack_upper[j] = u - w;
-                if u - w < smallest {
+                if u - w < smallest && moves {
                     let slack = (self.mu / self.point.zu[j]).max(smallest).min(movement * u.abs().max(1.0));
                     self.form.upper[j] = w + slack;
                     self.at.slack_upper[j] = (self.form.upper[j] - w).max(f64::MIN_POSITIVE);
@@ -209,13 +210,6 @@ impl<'p> Iterate<'p> {
     pub(crate) fn current_optimality(&mut self) -> OptimalityError {
         self.update_lagrangian();
         self.optimality(0.0)
-    }
-
-    /// Sum of the parts of the primal-dual error at the current mu.
-    pub(crate) fn primal_dual_error(&mut self) -> f64 {
-        self.update_lagrangian();
-        let now = self.optimality(self.mu);
-        now.violation + now.dual + now.complementarity
     }
 
     pub(crate) fn phase(&self) -> NlpPhase {

@@ -104,6 +104,7 @@ mod kkt;
 mod line_search;
 mod line_search_filter;
 mod line_search_state;
+mod method_constants;
 mod newton_system;
 mod nonlinear_program;
 mod optimality;
@@ -118,9 +119,11 @@ mod starting_point;
 mod status;
 mod vector_instructions;
 
+#[doc(hidden)]
+pub use method_constants::MethodConstants;
 pub use nonlinear_program::{EliminationBlocks, NonlinearProgram, SparsityPattern};
 pub use sensitivity::{ParameterDerivative, Sensitivity, SensitivityError, sensitivities};
-pub use settings::{BarrierStrategy, BoundMultiplierStart, DualRegularisation, LinearSolver, NlpSettings};
+pub use settings::{BarrierStrategy, BoundMultiplierStart, LinearSolver, NlpSettings};
 pub use solve::solve;
 pub use starting_point::{StartPoint, WarmPoint};
 pub use status::{NlpCounts, NlpError, NlpIteration, NlpPhase, NlpResult, NlpStatus, Residuals, Timing};

@@ -1,6 +1,6 @@
 //! Backtracking filter line search with second-order corrections (WB06 sections 2.3, 2.4).
 
-use crate::barrier::{self, DAMPING};
+use crate::barrier;
 use crate::iterate::{Iterate, SolveSession, StepRecord};
 use crate::line_search_filter::{GAMMA_PHI, GAMMA_THETA, not_above};
 use crate::line_search_state::{MeritReference, Watch};
@@ -20,10 +20,6 @@ const S_PHI: f64 = 2.3;
 const ETA: f64 = 1e-8;
 const GAMMA_ALPHA: f64 = 0.05;
 const KAPPA_SOC: f64 = 0.99;
-/// Required decrease of a soft step (IPOPT `soft_resto_pderror_reduction_factor`).
-const SOFT_REDUCTION: f64 = 0.9999;
-/// Largest increase of phi, in powers of ten (IPOPT `obj_max_inc`).
-const MAX_PHI_INCREASE: f64 = 5.0;
 
 impl MeritReference {
     /// m(alpha) < 0 and alpha (-slope)^s_phi > delta theta^s_theta (WB06 eq. 19).
@@ -50,21 +46,14 @@ impl MeritReference {
 
 impl Iterate<'_> {
     /// Searches along the direction and moves to the accepted point; false when the step becomes too small.
-    pub(crate) fn line_search(&mut self, session: &mut SolveSession, tiny: bool) -> bool {
+    pub(crate) fn line_search(&mut self, session: &mut SolveSession) -> bool {
         let settings = session.settings;
         let tau = barrier::boundary_fraction(settings, self.mu);
         let mut reference = MeritReference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
         let mut alpha =
             barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
         let mut corrects = true;
-        if tiny {
-            let (_, _, finite) = self.try_step(alpha, false);
-            if finite {
-                self.accept(session, alpha, tau, 1);
-                return true;
-            }
-        }
-        if settings.watchdog_trigger > 0 && self.search.shortened >= 2 * settings.watchdog_trigger {
+        if settings.constants.watchdog_trigger > 0 && self.search.shortened >= 2 * settings.constants.watchdog_trigger {
             self.search.shortened = 0;
             self.search.watched_point.copy_from(&self.point);
             self.search.watched_direction.copy_from(&self.direction);
@@ -77,7 +66,7 @@ impl Iterate<'_> {
                 return true;
             }
             watch.trials += 1;
-            if finite && watch.trials <= settings.watchdog_trials {
+            if finite && watch.trials <= settings.constants.watchdog_trials {
                 self.search.watch = Some(watch);
                 self.accept(session, alpha, tau, 1);
                 return true;
@@ -118,47 +107,14 @@ impl Iterate<'_> {
         false
     }
 
-    /// Soft restoration phase of IPOPT, after a failed search: takes the longest step within the bounds if it reduces
-    /// the primal-dual error of the barrier problem. Near a solution phi is dominated by rounding errors, this error
-    /// is not.
-    pub(crate) fn soft_step(&mut self, session: &mut SolveSession) -> bool {
-        let tau = barrier::boundary_fraction(session.settings, self.mu);
-        let before = self.primal_dual_error();
-        let alpha = barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau)
-            .min(barrier::fraction_to_zero(&self.point.zl, &self.direction.zl, tau))
-            .min(barrier::fraction_to_zero(&self.point.zu, &self.direction.zu, tau));
-        let (theta, phi) = (self.theta(), self.phi());
-        let (_, _, finite) = self.try_step(alpha, false);
-        if !finite {
-            return false;
-        }
-        self.search.before.copy_from(&self.point);
-        self.accept(session, alpha, tau, 1);
-        if self.is_finite() && self.primal_dual_error() <= SOFT_REDUCTION * before {
-            self.filter.add(theta, phi);
-            return true;
-        }
-        self.point.copy_from(&self.search.before);
-        self.evaluate();
-        false
-    }
-
     /// grad phi^T dw.
     fn slope(&self) -> f64 {
-        self.slope_and_size().0
-    }
-
-    /// grad phi^T dw, and the sum of the magnitudes of its terms, which bounds its rounding error.
-    pub(crate) fn slope_and_size(&self) -> (f64, f64) {
-        let (mut slope, mut size) = (0.0, 0.0);
-        for j in 0..self.form.length() {
+        let of = |j: usize| {
             let barrier = self.mu / self.at.slack_upper[j] - self.mu / self.at.slack_lower[j];
-            let damping = DAMPING * self.mu * self.form.single_side(j);
-            let term = (self.gradient[j] + barrier + damping) * self.direction.w[j];
-            slope += term;
-            size += term.abs();
-        }
-        (slope, size)
+            let damping = self.form.constants.damping * self.mu * self.form.single_side(j);
+            (self.gradient[j] + barrier + damping) * self.direction.w[j]
+        };
+        (0..self.form.length()).map(of).sum()
     }
 
     /// Evaluates theta and phi at w + alpha dw, with dw of the second-order correction if `corrected`.
@@ -181,12 +137,6 @@ impl Iterate<'_> {
     fn judge(&self, reference: &MeritReference, alpha: f64, theta: f64, phi: f64) -> Option<Accepted> {
         if !self.filter.accepts(theta, phi) {
             return None;
-        }
-        if phi > reference.phi {
-            let base = if reference.phi.abs() > 10.0 { reference.phi.abs().log10() } else { 1.0 };
-            if (phi - reference.phi).log10() > MAX_PHI_INCREASE + base {
-                return None;
-            }
         }
         if reference.theta <= self.theta_min && reference.switches(alpha) {
             return reference.armijo(alpha, phi).then_some(Accepted::Objective);
@@ -230,7 +180,7 @@ impl Iterate<'_> {
                 &mut self.search.correction,
             );
             std::mem::swap(&mut self.rhs.y, &mut self.search.corrected_rhs);
-            if solved.refined > settings.residual_limit {
+            if solved.refined > settings.constants.residual_limit {
                 return None;
             }
             step = barrier::fraction_to_boundary(
@@ -295,6 +245,6 @@ impl Iterate<'_> {
         self.objective = self.search.trial_objective;
         self.measure_slacks();
         self.linearise();
-        barrier::keep_near_centre(&mut self.point, &self.at, self.mu);
+        barrier::keep_near_centre(&mut self.point, &self.at, self.mu, session.settings.constants.kappa_sigma);
     }
 }

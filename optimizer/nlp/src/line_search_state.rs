@@ -12,8 +12,6 @@ pub(crate) struct LineSearchState {
     pub corrected_c: Vec<f64>,
     pub corrected_rhs: Vec<f64>,
     pub correction: PrimalDual,
-    /// The point before a soft step.
-    pub before: PrimalDual,
     /// Counts shortened steps: each adds two, each full step subtracts one, so that alternating steps trigger the
     /// watchdog too.
     pub shortened: usize,
@@ -40,7 +38,6 @@ impl LineSearchState {
             corrected_c: vec![0.0; form.m],
             corrected_rhs: vec![0.0; form.m],
             correction: PrimalDual::zeros(form),
-            before: PrimalDual::zeros(form),
             shortened: 0,
             watch: None,
             watched_point: PrimalDual::zeros(form),

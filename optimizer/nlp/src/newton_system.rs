@@ -92,11 +92,6 @@ impl NewtonSystem {
         self.solver.fallbacks()
     }
 
-    /// delta_c of a row in the last factorisation.
-    pub(crate) fn row_regularisation(&self, form: &Formulation, row: usize) -> f64 {
-        if self.unregularised[form.n + row] { 0.0 } else { self.delta_c }
-    }
-
     /// See [`KktSolver::distrust`].
     pub(crate) fn distrust(&mut self) -> bool {
         self.solver.distrust()
@@ -162,7 +157,7 @@ impl NewtonSystem {
     ) -> Option<Vec<f64>> {
         self.diagonal.fill(1.0);
         self.delta_w = 0.0;
-        self.delta_c = settings.dual_regularisation_value;
+        self.delta_c = settings.constants.dual_regularisation_value;
         let b: Vec<f64> = (0..form.length()).map(|j| -(gradient[j] - point.zl[j] + point.zu[j])).collect();
         let zero = vec![0.0; form.m];
         let (mut dw, mut y) = (vec![0.0; form.length()], vec![0.0; form.m]);
@@ -175,8 +170,8 @@ impl NewtonSystem {
                 self.reduced_solve(form, &b, &zero, &mut dw, &mut y);
                 let residual = self.least_squares_residual(form, jacobian, &b, &dw, &y);
                 self.tally.solve_seconds += clock.elapsed().as_secs_f64();
-                if residual <= settings.residual_limit {
-                    return (largest(&y) <= settings.multiplier_limit).then_some(y);
+                if residual <= settings.constants.residual_limit {
+                    return (largest(&y) <= settings.constants.multiplier_limit).then_some(y);
                 }
             }
             if !self.solver.distrust() {
@@ -375,10 +370,10 @@ impl NewtonSystem {
             }
             let stagnates = refinements > 0 && ratio > 0.5 * best;
             best = ratio;
-            if ratio <= settings.residual_target || !ratio.is_finite() || stagnates {
+            if ratio <= settings.constants.residual_target || !ratio.is_finite() || stagnates {
                 return best;
             }
-            if refinements == settings.max_refinements {
+            if refinements == settings.constants.max_refinements {
                 return best;
             }
             let residual = std::mem::take(&mut self.residual);

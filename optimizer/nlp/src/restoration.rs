@@ -11,9 +11,6 @@ use crate::iterate::{Ending, Iterate, SolveSession};
 use crate::primal_dual::{PrimalDual, largest};
 use crate::settings::{BoundMultiplierStart, NlpSettings};
 
-/// Bound multipliers above this are reset after the phase (IPOPT `bound_mult_reset_threshold`).
-const MULTIPLIER_RESET: f64 = 1e3;
-
 /// Up to a hundred times the tolerance a violation can be a remainder of the termination of the phase itself, so the
 /// point counts as feasible. Larger tolerances than this do not extend that range.
 const NEAR_TOLERANCE: f64 = 1e-4;
@@ -51,28 +48,6 @@ fn elastic_formulation<'p>(base: &Formulation<'p>, w: &[f64], mu: f64, rho: f64)
     form
 }
 
-/// Sets p and n to their optimal values for the current x and slacks; false when that changes nothing.
-pub(crate) fn reset_elastics(run: &mut Iterate) -> bool {
-    let Objective::Restoration { first, rho, .. } = run.form.objective else { return false };
-    let (n, mu) = (run.form.n, run.mu);
-    if run.theta() <= 10.0 * f64::EPSILON {
-        return false;
-    }
-    let mut own = run.c.clone();
-    for (a, t) in run.form.row_variables.iter().zip(&run.point.w[n..]).skip(first) {
-        own[a.row] -= a.sign * t;
-    }
-    for k in first..run.form.row_variables.len() {
-        let a = run.form.row_variables[k];
-        let (p, q) = best_elastics(own[a.row], mu, rho);
-        run.point.w[n + k] = if a.sign < 0.0 { p } else { q };
-        run.point.zl[n + k] = mu / run.point.w[n + k];
-    }
-    run.filter.clear();
-    run.evaluate();
-    run.is_finite()
-}
-
 /// Adds the current point to the filter and builds the first iterate of the restoration phase; `None` where it cannot
 /// be evaluated.
 pub(crate) fn begin<'p>(run: &mut Iterate<'p>, session: &mut SolveSession) -> Option<Iterate<'p>> {
@@ -81,7 +56,7 @@ pub(crate) fn begin<'p>(run: &mut Iterate<'p>, session: &mut SolveSession) -> Op
     let (theta, phi) = (run.theta(), run.phi());
     run.filter.add(theta, phi);
 
-    let rho = settings.elastic_weight;
+    let rho = settings.constants.elastic_weight;
     let mu = run.mu.max(largest(&run.c));
     let form = elastic_formulation(&run.form, &run.point.w, mu, rho);
     let length = run.form.length();
@@ -125,15 +100,9 @@ pub(crate) fn may_leave(run: &mut Iterate, settings: &NlpSettings, theta: f64) -
     }
 }
 
-/// Returns from the restoration phase to the problem, whose violation was `theta` before. `None` if the solve
-/// continues from the point of the phase; otherwise the ending of the solve at that point.
-pub(crate) fn finish(
-    run: &mut Iterate,
-    session: &mut SolveSession,
-    phase: &Iterate,
-    theta: f64,
-    ending: Ending,
-) -> Option<Ending> {
+/// Returns from the restoration phase to the problem. `None` if the solve continues from the point of the phase;
+/// otherwise the ending of the solve at that point.
+pub(crate) fn finish(run: &mut Iterate, session: &mut SolveSession, phase: &Iterate, ending: Ending) -> Option<Ending> {
     let settings = session.settings;
     let length = run.form.length();
     run.form.tally.seconds += phase.form.tally.seconds;
@@ -154,11 +123,8 @@ pub(crate) fn finish(
 
     let near = 100.0 * settings.tolerance.min(NEAR_TOLERANCE);
     let feasible = run.program_violation() <= settings.violation_tolerance.max(near);
-    let progress = run.theta() <= settings.required_reduction * theta;
     match ending {
         Ending::Left => {}
-        // A feasible point that the filter rejects because of entries from before the phase.
-        Ending::Converged | Ending::Stalled if feasible && progress => run.filter.clear(),
         Ending::Converged if !feasible || run.program_violation() > LEFT_OVER * settings.violation_tolerance => {
             // The multipliers of the phase belong to an objective without scale.
             for (y, of_phase) in run.point.y.iter_mut().zip(&phase.point.y) {
@@ -187,11 +153,12 @@ pub(crate) fn finish(
         &step.zu,
         tau,
     ));
+    let alpha = if settings.constants.steps_multipliers { alpha } else { 0.0 };
     for j in 0..length {
         run.point.zl[j] += alpha * step.zl[j];
         run.point.zu[j] += alpha * step.zu[j];
     }
-    if largest(&run.point.zl).max(largest(&run.point.zu)) > MULTIPLIER_RESET {
+    if largest(&run.point.zl).max(largest(&run.point.zu)) > settings.constants.multiplier_reset {
         let mu = run.mu;
         let first = |slack: f64| match (slack.is_finite(), settings.bound_multiplier_start) {
             (false, _) => 0.0,
@@ -203,7 +170,7 @@ pub(crate) fn finish(
             run.point.zu[j] = first(run.at.slack_upper[j]);
         }
     }
-    barrier::keep_near_centre(&mut run.point, &run.at, run.mu);
+    barrier::keep_near_centre(&mut run.point, &run.at, run.mu, settings.constants.kappa_sigma);
     run.estimate_multipliers(session);
     None
 }

@@ -1,20 +1,8 @@
 //! The search direction: Newton steps with inertia correction, and least-squares multipliers.
 
-use crate::barrier::DAMPING;
 use crate::factorisation::MatrixChange;
 use crate::iterate::{Iterate, SolveSession};
-use crate::newton_system::NewtonSystem;
 use crate::status::NlpPhase;
-
-/// In an iteration, the wrong inertia at which the factorisation itself is checked. The first one is usually right,
-/// and a false one costs only an unneeded regularisation.
-const DOUBTED_REFUSAL: usize = 2;
-/// Fraction of an ascent that the rows may explain (see [`Iterate::curves_downwards`]).
-const ROWS_SHARE: f64 = 0.1;
-/// Regularisation that stands in for that of unregularised rows there.
-const LITTLE_REGULARISATION: f64 = 1e-9;
-/// An ascent below this fraction of the sum of the magnitudes of its terms is a rounding error.
-const CANCELLATION: f64 = 1e-8;
 
 impl Iterate<'_> {
     /// Computes the Newton direction with inertia correction; false when no regularisation gives one.
@@ -28,7 +16,7 @@ impl Iterate<'_> {
         self.form.hessian(&self.point.w, multipliers, &mut self.at.hessian);
         for j in 0..self.form.length() {
             let (sl, su) = (self.at.slack_lower[j], self.at.slack_upper[j]);
-            self.rhs.w[j] = -(self.lagrangian[j] + DAMPING * self.mu * self.form.single_side(j));
+            self.rhs.w[j] = -(self.lagrangian[j] + settings.constants.damping * self.mu * self.form.single_side(j));
             self.rhs.zl[j] = if sl.is_finite() { self.mu - sl * self.point.zl[j] } else { 0.0 };
             self.rhs.zu[j] = if su.is_finite() { self.mu - su * self.point.zu[j] } else { 0.0 };
         }
@@ -37,7 +25,6 @@ impl Iterate<'_> {
         }
         self.correction.begin(settings, self.mu);
         let mut change = MatrixChange::Any;
-        let mut refusals = 0;
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, (dw, dc), change);
@@ -54,59 +41,21 @@ impl Iterate<'_> {
                         &self.rhs,
                         &mut self.direction,
                     );
-                    let distrusts = solved.unrefined > settings.residual_limit && session.newton.distrust();
-                    let solves = !distrusts && solved.refined <= settings.residual_limit;
-                    if solves && self.curves_downwards(&session.newton) {
-                        session.newton.distrust() || self.correction.increase(settings)
-                    } else if solves {
+                    let distrusts = settings.constants.distrusts_unrefined
+                        && solved.unrefined > settings.constants.residual_limit
+                        && session.newton.distrust();
+                    let solves = !distrusts && solved.refined <= settings.constants.residual_limit;
+                    if solves {
                         self.correction.accept(settings);
                         return true;
-                    } else {
-                        distrusts || self.correction.singular(settings, self.mu)
                     }
-                }
-                Some(i) if i.zero == 0 && i.negative > self.form.m => {
-                    // Element growth that spoils solutions spoils the inertia as well, and regularisation would only
-                    // hide it.
-                    refusals += 1;
-                    let distrusts = refusals == DOUBTED_REFUSAL
-                        && session.newton.unrefined_residual(
-                            &self.form,
-                            &self.point,
-                            &self.at,
-                            &self.rhs,
-                            &mut self.direction,
-                        ) > settings.residual_limit
-                        && session.newton.distrust();
                     distrusts || self.correction.increase(settings)
                 }
-                _ => self.correction.singular(settings, self.mu),
+                _ => self.correction.increase(settings),
             };
             if !go_on {
                 return false;
             }
-        }
-    }
-
-    /// Whether the direction d shows that the inertia is wrong. With the right inertia and regularised rows the
-    /// matrix K + A^T A / `delta_c` with K = W + Sigma + `delta_w` I is positive definite. From A d = `delta_c` dy -
-    /// c and d^T K d = (c - `delta_c` dy)^T (y + dy) - grad phi^T d follows that its quadratic form along d is the
-    /// sum over the rows below minus the slope. For rows without regularisation A d = -c, and K only has to be
-    /// positive definite in their null space; they get a small regularisation, so that their violation explains any
-    /// curvature.
-    fn curves_downwards(&self, newton: &NewtonSystem) -> bool {
-        let (slope, size) = self.slope_and_size();
-        slope > CANCELLATION * size && {
-            let of_row = |i: usize| {
-                let (c, y, dy) = (self.c[i], self.point.y[i], self.direction.y[i]);
-                let delta_c = newton.row_regularisation(&self.form, i);
-                if delta_c > 0.0 {
-                    c * (y - dy) - delta_c * dy * y + c * c / delta_c
-                } else {
-                    c * (y + dy) + c * c / LITTLE_REGULARISATION
-                }
-            };
-            (0..self.form.m).map(of_row).sum::<f64>() < ROWS_SHARE * slope
         }
     }
 

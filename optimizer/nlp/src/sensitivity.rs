@@ -117,7 +117,7 @@ pub fn sensitivities(
         check_lengths(&form, parameter)?;
     }
     // The point is used as it is.
-    let pushes = Pushes { bound: 0.0, fraction: 0.0, multiplier: f64::MIN_POSITIVE };
+    let pushes = Pushes { bound: 0.0, multiplier: f64::MIN_POSITIVE };
     let at = place(&mut form, &start, settings, pushes);
     let mu = smallest_mu(settings, form.objective_scale);
     let mut iterate = Iterate::new(form, at, mu);
@@ -178,7 +178,7 @@ fn sensitivity(
     let rhs = right_hand_side(iterate, parameter);
     let mut direction = PrimalDual::zeros(form);
     let solved = system.solve(form, settings, &iterate.point, &iterate.at, &rhs, &mut direction);
-    if solved.refined > settings.residual_limit {
+    if solved.refined > settings.constants.residual_limit {
         return Err(SensitivityError::Inaccurate(solved.refined));
     }
     let along: f64 = iterate.gradient.iter().zip(&direction.w).map(|(gradient, dw)| gradient * dw).sum();

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::method_constants::MethodConstants;
 use crate::status::NlpError;
 
 /// How the barrier parameter mu is driven to zero.
@@ -29,18 +30,6 @@ pub enum BoundMultiplierStart {
     One,
     /// z = mu / slack, so that complementarity holds at the start. Better when `mu_initial` is small.
     Centred,
-}
-
-/// When the constraint block of the KKT matrix is regularised by -delta_c.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum DualRegularisation {
-    /// Only after a numerically singular factorisation (WB06 algorithm IC). Problems whose rows become dependent may
-    /// stall.
-    WhenSingular,
-    /// Always, so that redundant rows need no second factorisation.
-    #[default]
-    Always,
 }
 
 /// Factorisation of the KKT systems.
@@ -69,8 +58,6 @@ pub struct NlpSettings {
     pub tolerance: f64,
     /// Largest unscaled |g - bounds| and |x - bounds| of a converged point. Default 1e-6 (tighter than IPOPT's 1e-4).
     pub violation_tolerance: f64,
-    /// Largest unscaled gradient of the Lagrangian of a converged point. Default 1 (IPOPT `dual_inf_tol`).
-    pub dual_tolerance: f64,
     /// Largest unscaled complementarity product of a converged point. Default 1e-4 (IPOPT `compl_inf_tol`).
     pub complementarity_tolerance: f64,
     /// Iterations (restoration phase included) before [`NlpStatus::IterationLimit`](crate::NlpStatus). Default 1000.
@@ -79,44 +66,23 @@ pub struct NlpSettings {
     /// With a finite limit, equal inputs give equal bits only if the solve ends before it.
     #[serde(with = "infinite_as_null")]
     pub max_seconds: f64,
-    /// |x| beyond which the problem is called unbounded. Default 1e20 (IPOPT `diverging_iterates_tol`).
-    pub divergence_limit: f64,
 
     /// Barrier strategy. Default monotone.
     pub barrier_strategy: BarrierStrategy,
     /// Initial barrier parameter of a cold start. Default 0.1 (WB06 mu_0). Small values preserve a good starting point.
+    /// A warm start begins with the average complementarity of its point, at most this.
     pub mu_initial: f64,
-    /// Initial barrier parameter of a warm start; `None`: the average complementarity of the start, at most
-    /// `mu_initial`. Default none.
-    pub mu_warm: Option<f64>,
-    /// Error tolerance of a barrier problem, in units of mu. Default 10 (WB06 kappa_epsilon).
-    pub kappa_epsilon: f64,
-    /// Linear decrease of mu. Default 0.2 (WB06 kappa_mu). 1e-6 to 0.999.
-    pub kappa_mu: f64,
-    /// Superlinear decrease mu^theta_mu. Default 1.5 (WB06 theta_mu). 1 to 1.999.
-    pub theta_mu: f64,
-    /// Smallest fraction to the boundary. Default 0.99 (WB06 tau_min). 0.1 to 0.999999.
-    pub tau_min: f64,
 
     /// Relaxation of every bound, relative to max(1, |bound|). Default 1e-8 (WB06 section 3.5).
     /// 0 to `violation_tolerance`.
     pub bound_relaxation: f64,
-    /// Smallest distance of a cold start from its bounds, relative to max(1, |bound|). Default 0.01 (WB06 kappa_1).
-    /// Up to 1e10.
+    /// Smallest distance of a cold start from its bounds, relative to max(1, |bound|) and to the distance between two
+    /// bounds, whichever is smaller. Default 0.01 (WB06 kappa_1, kappa_2). Up to 0.5.
     pub bound_push: f64,
-    /// The same relative to the distance between two bounds. Default 0.01 (WB06 kappa_2). Up to 0.5.
-    pub bound_fraction: f64,
-    /// [`bound_push`](Self::bound_push) of a warm start. Default 1e-6. Up to 1e10.
+    /// [`bound_push`](Self::bound_push) of a warm start. Default 1e-6. Up to 0.5.
     pub warm_bound_push: f64,
-    /// [`bound_fraction`](Self::bound_fraction) of a warm start. Default 1e-6. Up to 0.5.
-    pub warm_bound_fraction: f64,
-    /// Smallest bound multiplier of a warm start. Default 1e-9. Up to 1e10.
-    pub warm_multiplier_push: f64,
     /// Initial bound multipliers of a cold start. Default one.
     pub bound_multiplier_start: BoundMultiplierStart,
-    /// Least-squares row multipliers larger than this are replaced by zero, as are those whose system is not solved to
-    /// `residual_limit`. Default 1000 (WB06 lambda_max). From 0.
-    pub multiplier_limit: f64,
 
     /// Gradient-based scaling at the start: objective and rows are scaled down until their largest derivative is
     /// this. `None`: no scaling (the problem is scaled by hand). Default none. IPOPT uses 100.
@@ -129,10 +95,6 @@ pub struct NlpSettings {
     pub curvature_from_violation: f64,
     /// First regularisation of the Hessian. Default 1e-4 (WB06 delta_w^0).
     pub hessian_regularisation_first: f64,
-    /// Smallest regularisation of the Hessian. Default 1e-20 (WB06 delta_w^min). At most the first.
-    pub hessian_regularisation_min: f64,
-    /// Regularisation of the Hessian that counts as failure. Default 1e20. At least the first.
-    pub hessian_regularisation_max: f64,
     /// After two consecutive iterations in which the unregularised matrix had the wrong inertia, this many iterations
     /// at most start with a decreasing regularisation instead of the unregularised matrix, one more for each further
     /// time. Default 0 (WB06: start without).
@@ -140,47 +102,26 @@ pub struct NlpSettings {
     /// Initial weight of the proximal term after steps that the line search shortened often; 0: none. Default 1e-4. 0
     /// to 1e4.
     pub proximal_first: f64,
-    /// When delta_c > 0. Default always.
-    pub dual_regularisation: DualRegularisation,
-    /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c). 1e-20 to 1.
-    pub dual_regularisation_value: f64,
-
-    /// Relative residual of the full KKT system at which iterative refinement stops. Default 1e-7. 1e-16 to 1.
-    pub residual_target: f64,
-    /// Relative residual above which a step is rejected and the matrix treated as singular. Above it before
-    /// refinement, the matrix is factorised with delayed pivots. Default 1e-5. From `residual_target` to 1.
-    pub residual_limit: f64,
-    /// Refinement steps per system. Default 10.
-    pub max_refinements: usize,
 
     /// Second-order corrections per iteration. Default 4 (WB06 p^max).
     pub max_second_order_corrections: usize,
-    /// Shortened steps that start the watchdog, which takes full steps without testing them and returns if none
-    /// becomes acceptable. A full step cancels half a shortened one. Default 10 (IPOPT
-    /// `watchdog_shortened_iter_trigger`); 0: never.
-    pub watchdog_trigger: usize,
-    /// Full steps of the watchdog. Default 3 (IPOPT `watchdog_trial_iter_max`).
-    pub watchdog_trials: usize,
-    /// Consecutive steps of the soft restoration phase, which reduce the primal-dual error when the line search
-    /// fails. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
-    pub max_soft_steps: usize,
 
-    /// Weight of the l1 violation in the restoration phase. Default 1000 (WB06 rho). 1 to 1e12.
-    pub elastic_weight: f64,
     /// The restoration phase ends when the violation is reduced to this fraction and the filter accepts the point.
     /// Default 0.9 (WB06 kappa_resto). 0 to 0.999999.
     pub required_reduction: f64,
     /// Consecutive steps below 0.05 after which the restoration phase starts without a failed line search: iterates
     /// close to their bounds with growing multipliers rarely recover. Default 5; 0: never.
     pub short_step_limit: usize,
-    /// Largest number of restoration phases, after which the solve is stalled. Default 50.
-    pub max_restoration_phases: usize,
 
     /// Factorisation. Default auto.
     pub linear_solver: LinearSolver,
     /// Threads of the multifrontal factorisation, 1 to 16. The result does not depend on it; small matrices use one
     /// thread. Default 1.
     pub threads: usize,
+
+    #[doc(hidden)]
+    #[serde(skip)]
+    pub constants: MethodConstants,
 }
 
 impl Default for NlpSettings {
@@ -188,48 +129,26 @@ impl Default for NlpSettings {
         Self {
             tolerance: 1e-8,
             violation_tolerance: 1e-6,
-            dual_tolerance: 1.0,
             complementarity_tolerance: 1e-4,
             max_iterations: 1000,
             max_seconds: f64::INFINITY,
-            divergence_limit: 1e20,
             barrier_strategy: BarrierStrategy::default(),
             mu_initial: 0.1,
-            mu_warm: None,
-            kappa_epsilon: 10.0,
-            kappa_mu: 0.2,
-            theta_mu: 1.5,
-            tau_min: 0.99,
             bound_relaxation: 1e-8,
             bound_push: 0.01,
-            bound_fraction: 0.01,
             warm_bound_push: 1e-6,
-            warm_bound_fraction: 1e-6,
-            warm_multiplier_push: 1e-9,
             bound_multiplier_start: BoundMultiplierStart::default(),
-            multiplier_limit: 1000.0,
             gradient_scaling: None,
             curvature_from_violation: f64::INFINITY,
             hessian_regularisation_first: 1e-4,
-            hessian_regularisation_min: 1e-20,
-            hessian_regularisation_max: 1e20,
             regularisation_memory: 0,
             proximal_first: 1e-4,
-            dual_regularisation: DualRegularisation::default(),
-            dual_regularisation_value: 1e-8,
-            residual_target: 1e-7,
-            residual_limit: 1e-5,
-            max_refinements: 10,
             max_second_order_corrections: 4,
-            watchdog_trigger: 10,
-            watchdog_trials: 3,
-            max_soft_steps: 10,
-            elastic_weight: 1000.0,
             required_reduction: 0.9,
             short_step_limit: 5,
-            max_restoration_phases: 50,
             linear_solver: LinearSolver::default(),
             threads: 1,
+            constants: MethodConstants::default(),
         }
     }
 }
@@ -243,39 +162,18 @@ impl NlpSettings {
         let positive = |field: &'static str, value: f64| in_range(field, value, f64::MIN_POSITIVE, f64::MAX);
         positive("tolerance", self.tolerance)?;
         positive("violation_tolerance", self.violation_tolerance)?;
-        positive("dual_tolerance", self.dual_tolerance)?;
         positive("complementarity_tolerance", self.complementarity_tolerance)?;
         in_range("max_seconds", self.max_seconds, 0.0, f64::INFINITY)?;
-        positive("divergence_limit", self.divergence_limit)?;
         positive("mu_initial", self.mu_initial)?;
-        if let Some(mu) = self.mu_warm {
-            positive("mu_warm", mu)?;
-        }
-        positive("kappa_epsilon", self.kappa_epsilon)?;
-        in_range("kappa_mu", self.kappa_mu, 1e-6, 0.999)?;
-        in_range("theta_mu", self.theta_mu, 1.0, 1.999)?;
-        in_range("tau_min", self.tau_min, 0.1, 0.999_999)?;
         in_range("bound_relaxation", self.bound_relaxation, 0.0, self.violation_tolerance)?;
-        in_range("bound_push", self.bound_push, f64::MIN_POSITIVE, 1e10)?;
-        in_range("bound_fraction", self.bound_fraction, f64::MIN_POSITIVE, 0.5)?;
-        in_range("warm_bound_push", self.warm_bound_push, f64::MIN_POSITIVE, 1e10)?;
-        in_range("warm_bound_fraction", self.warm_bound_fraction, f64::MIN_POSITIVE, 0.5)?;
-        in_range("warm_multiplier_push", self.warm_multiplier_push, f64::MIN_POSITIVE, 1e10)?;
-        in_range("multiplier_limit", self.multiplier_limit, 0.0, f64::MAX)?;
+        in_range("bound_push", self.bound_push, f64::MIN_POSITIVE, 0.5)?;
+        in_range("warm_bound_push", self.warm_bound_push, f64::MIN_POSITIVE, 0.5)?;
         if let Some(limit) = self.gradient_scaling {
             positive("gradient_scaling", limit)?;
         }
         in_range("curvature_from_violation", self.curvature_from_violation, 0.0, f64::INFINITY)?;
         positive("hessian_regularisation_first", self.hessian_regularisation_first)?;
-        let first = self.hessian_regularisation_first;
-        in_range("hessian_regularisation_min", self.hessian_regularisation_min, f64::MIN_POSITIVE, first)?;
-        in_range("hessian_regularisation_max", self.hessian_regularisation_max, first, f64::MAX)?;
         in_range("proximal_first", self.proximal_first, 0.0, 1e4)?;
-        in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
-        in_range("residual_target", self.residual_target, 1e-16, 1.0)?;
-        in_range("residual_limit", self.residual_limit, self.residual_target, 1.0)?;
-        // With a weight near the tolerance every point would be stationary, hence infeasible.
-        in_range("elastic_weight", self.elastic_weight, 1.0, 1e12)?;
         in_range("required_reduction", self.required_reduction, 0.0, 0.999_999)?;
         in_range("threads", self.threads as f64, 1.0, 16.0)
     }

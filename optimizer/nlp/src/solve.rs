@@ -36,18 +36,13 @@ pub fn solve(
     }
     check_start(&form, start)?;
 
-    let multiplier = settings.warm_multiplier_push;
-    let (pushes, mu) = match start {
-        StartPoint::Cold(_) => {
-            let (bound, fraction) = (settings.bound_push, settings.bound_fraction);
-            (Pushes { bound, fraction, multiplier }, settings.mu_initial)
-        }
-        StartPoint::Warm(_) => {
-            let (bound, fraction) = (settings.warm_bound_push, settings.warm_bound_fraction);
-            (Pushes { bound, fraction, multiplier }, settings.mu_warm.unwrap_or(settings.mu_initial))
-        }
+    let multiplier = settings.constants.warm_multiplier_push;
+    let mu = settings.mu_initial;
+    let bound = match start {
+        StartPoint::Cold(_) => settings.bound_push,
+        StartPoint::Warm(_) => settings.warm_bound_push,
     };
-    let point = place(&mut form, start, settings, pushes);
+    let point = place(&mut form, start, settings, Pushes { bound, multiplier });
     let mut run = Iterate::new(form, point, mu);
     run.evaluate();
     check_evaluations(&run)?;
@@ -80,10 +75,8 @@ pub fn solve(
             run.estimate_multipliers(&mut session);
         }
         StartPoint::Warm(_) => {
-            if settings.mu_warm.is_none() {
-                let average = barrier::average_complementarity(&run.point, &run.at).unwrap_or(settings.mu_initial);
-                run.mu = average.clamp(barrier::smallest_mu(settings, run.form.objective_scale), settings.mu_initial);
-            }
+            let average = barrier::average_complementarity(&run.point, &run.at).unwrap_or(mu);
+            run.mu = average.clamp(barrier::smallest_mu(settings, run.form.objective_scale), mu);
         }
     }
     run.begin_filter();
@@ -94,10 +87,8 @@ pub fn solve(
 /// Least distances of a start from the boundary of the feasible set.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pushes {
-    /// Relative distance from a bound.
+    /// Distance from a bound, relative to its magnitude and to the distance between two bounds.
     pub bound: f64,
-    /// The same as a fraction of the distance between two bounds.
-    pub fraction: f64,
     /// Smallest bound multiplier of a warm point.
     pub multiplier: f64,
 }
@@ -108,7 +99,7 @@ pub(crate) fn place(form: &mut Formulation, start: &StartPoint, settings: &NlpSe
         StartPoint::Cold(x) => x,
         StartPoint::Warm(warm) => &warm.x,
     };
-    let within = |value: f64, lower: f64, upper: f64| pushed(value, lower, upper, pushes.bound, pushes.fraction);
+    let within = |value: f64, lower: f64, upper: f64| pushed(value, lower, upper, pushes.bound);
     let mut point = PrimalDual::zeros(form);
     for j in 0..form.n {
         point.w[j] = form.fixed[j].unwrap_or_else(|| within(x[j], form.lower[j], form.upper[j]));
@@ -135,9 +126,9 @@ pub(crate) fn place(form: &mut Formulation, start: &StartPoint, settings: &NlpSe
     point
 }
 
-/// `value`, moved to at least min(push max(1, |bound|), fraction (u - l)) from its bounds (WB06 section 3.6).
-fn pushed(value: f64, lower: f64, upper: f64, push: f64, fraction: f64) -> f64 {
-    let width = fraction * (upper - lower);
+/// `value`, moved to at least min(push max(1, |bound|), push (u - l)) from its bounds (WB06 section 3.6).
+fn pushed(value: f64, lower: f64, upper: f64, push: f64) -> f64 {
+    let width = push * (upper - lower);
     let mut value = value;
     if lower.is_finite() {
         value = value.max(lower + (push * lower.abs().max(1.0)).min(width));

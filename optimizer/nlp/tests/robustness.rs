@@ -6,8 +6,8 @@ mod standard_problems;
 use std::cell::Cell;
 
 use interior_point::{
-    BarrierStrategy, BoundMultiplierStart, DualRegularisation, LinearSolver, NlpError, NlpPhase, NlpResult,
-    NlpSettings, NlpStatus, NonlinearProgram, StartPoint, WarmPoint, solve,
+    BarrierStrategy, BoundMultiplierStart, LinearSolver, NlpError, NlpPhase, NlpResult, NlpSettings, NlpStatus,
+    NonlinearProgram, StartPoint, WarmPoint, solve,
 };
 use standard_problems::sparse::{Sparse, Term, cart_pole};
 use standard_problems::{Dual, INF, Small};
@@ -75,7 +75,7 @@ fn restoration_phase_ignores_the_scale_of_the_objective() {
         assert_eq!(r.status, NlpStatus::Infeasible, "{r:?}");
         // The multiplier of a violated row is the weight of its violation, in the units of the scaled row.
         let weight = r.row_multipliers[0].abs();
-        assert!((weight - settings.elastic_weight / 4.0).abs() < 1.0, "{weight}");
+        assert!((weight - settings.constants.elastic_weight / 4.0).abs() < 1.0, "{weight}");
     }
     assert!(steep.iterations <= plain.iterations + 3, "{} {}", steep.iterations, plain.iterations);
 }
@@ -125,17 +125,15 @@ fn complementarity_constraints_and_dependent_gradients_are_solved() {
 }
 
 #[test]
-fn redundant_equalities_are_solved_with_either_regularisation() {
+fn redundant_equalities_are_solved() {
     let problem = Small::new("redundant", &[1.0, 1.0, 1.0], &[EQ; 4], &[0.0], |x| {
         let plane = x[0] + x[1] + x[2] - 3.0;
         (square(x[0] - 1.0) + square(x[1] - x[2]), vec![plane, 2.0 * plane, x[0] - x[1], x[1] + x[2] + x[0] - 3.0])
     });
-    for dual_regularisation in [DualRegularisation::Always, DualRegularisation::WhenSingular] {
-        let r = run(&problem, &[5.0, -2.0, 0.0], &NlpSettings { dual_regularisation, ..NlpSettings::default() });
-        assert_eq!(r.status, NlpStatus::Converged, "{dual_regularisation:?} {r:?}");
-        assert!(r.objective.abs() < 1e-8);
-        assert!(r.iterations <= 12, "{}", r.iterations);
-    }
+    let r = run(&problem, &[5.0, -2.0, 0.0], &NlpSettings::default());
+    assert_eq!(r.status, NlpStatus::Converged, "{r:?}");
+    assert!(r.objective.abs() < 1e-8);
+    assert!(r.iterations <= 12, "{}", r.iterations);
     let once = cart_pole(60, 20.0, 1);
     let twice = cart_pole(60, 20.0, 2);
     for linear_solver in [LinearSolver::Supernodal, LinearSolver::Multifrontal] {
@@ -214,8 +212,8 @@ fn invalid_input_is_reported_by_name() {
     let settings = NlpSettings::default();
     assert!(matches!(go(&problem, vec![0.0; 2], &settings), Err(NlpError::InvalidStart(_))));
     assert!(matches!(go(&problem, vec![f64::NAN], &settings), Err(NlpError::InvalidStart(_))));
-    let bad = NlpSettings { kappa_mu: 1.5, ..settings };
-    assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "kappa_mu", .. })));
+    let bad = NlpSettings { required_reduction: 1.5, ..settings };
+    assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "required_reduction", .. })));
     let bad = NlpSettings { tolerance: f64::NAN, ..settings };
     assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "tolerance", .. })));
     let crossed = Small::new("p", &[0.0], &[(1.0, -1.0)], &[], |x| (x[0], vec![x[0]]));
@@ -360,11 +358,9 @@ fn sparse_problem_without_elimination_blocks_is_solved() {
     let mut problem = cart_pole(60, 20.0, 1);
     let with = run(&problem, &problem.start, &NlpSettings::default());
     problem.blocks = None;
-    for dual_regularisation in [DualRegularisation::Always, DualRegularisation::WhenSingular] {
-        let without = run(&problem, &problem.start, &NlpSettings { dual_regularisation, ..NlpSettings::default() });
-        assert_eq!(without.status, NlpStatus::Converged, "{:?}", without.counts);
-        assert!((with.objective - without.objective).abs() < 1e-6);
-    }
+    let without = run(&problem, &problem.start, &NlpSettings::default());
+    assert_eq!(without.status, NlpStatus::Converged, "{:?}", without.counts);
+    assert!((with.objective - without.objective).abs() < 1e-6);
 }
 
 #[test]
@@ -411,12 +407,11 @@ fn wrong_multiplier_does_not_trigger_inertia_correction() {
         upper_multipliers: vec![0.0],
         ..WarmPoint::default()
     };
-    let settings = NlpSettings { dual_regularisation: DualRegularisation::Always, ..NlpSettings::default() };
     let mut regularised = 0.0_f64;
     let result = solve(
         &problem,
         &StartPoint::Warm(warm),
-        &settings,
+        &NlpSettings::default(),
         &mut |record| regularised = regularised.max(record.delta_w),
         &|| false,
     )
@@ -431,18 +426,15 @@ fn wrong_multiplier_does_not_trigger_inertia_correction() {
 #[test]
 fn ascent_towards_a_violated_row_does_not_trigger_inertia_correction() {
     let problem = Small::new("hill through a point", &[1.0], &[EQ], &[], |x| (-0.5 * square(x[0]), vec![x[0]]));
-    for dual_regularisation in [DualRegularisation::Always, DualRegularisation::WhenSingular] {
-        let settings = NlpSettings { dual_regularisation, ..NlpSettings::default() };
-        let mut regularised = 0.0_f64;
-        let result = solve(
-            &problem,
-            &StartPoint::Cold(vec![1.0]),
-            &settings,
-            &mut |record| regularised = regularised.max(record.delta_w),
-            &|| false,
-        )
-        .unwrap();
-        assert_eq!((result.status, result.counts.solver_fallbacks, regularised), (NlpStatus::Converged, 0, 0.0));
-        assert!(result.x[0].abs() < 1e-6 && result.iterations <= 2, "{} {}", result.x[0], result.iterations);
-    }
+    let mut regularised = 0.0_f64;
+    let result = solve(
+        &problem,
+        &StartPoint::Cold(vec![1.0]),
+        &NlpSettings::default(),
+        &mut |record| regularised = regularised.max(record.delta_w),
+        &|| false,
+    )
+    .unwrap();
+    assert_eq!((result.status, result.counts.solver_fallbacks, regularised), (NlpStatus::Converged, 0, 0.0));
+    assert!(result.x[0].abs() < 1e-6 && result.iterations <= 2, "{} {}", result.x[0], result.iterations);
 }

@@ -3,9 +3,10 @@
 use super::ground::YIELD_M;
 use super::random::Random;
 use super::terrain::Terrain;
+use crate::subject::Subject;
 
-/// Largest relative change of the body mass.
-pub(super) const MASS_CHANGE: f64 = 0.05;
+/// Largest relative change of the body mass, unless the model ends before.
+const MASS_CHANGE: f64 = 0.05;
 /// Largest relative change of the speed at the start.
 pub(super) const SPEED_CHANGE: f64 = 0.05;
 /// Largest push of a random walk, N s: 0.07 m/s for a walker of 75 kg.
@@ -26,6 +27,35 @@ pub(super) struct Push {
     pub(super) start_s: f64,
     /// Negative backwards.
     pub(super) impulse_n_s: f64,
+}
+
+/// Largest relative decrease and increase of the body mass. Each is 5 %, less where the model has no such body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MassChanges {
+    decrease: f64,
+    increase: f64,
+}
+
+impl MassChanges {
+    /// Those of a subject.
+    pub(super) fn of(body_mass_kg: f64) -> Self {
+        let (lightest, heaviest) = Subject::BODY_MASS_RANGE_KG;
+        Self {
+            decrease: MASS_CHANGE.min(1.0 - lightest / body_mass_kg),
+            increase: MASS_CHANGE.min(heaviest / body_mass_kg - 1.0),
+        }
+    }
+
+    /// The range of body masses, kg.
+    pub(super) fn range_kg(self, body_mass_kg: f64) -> [f64; 2] {
+        [body_mass_kg * (1.0 - self.decrease), body_mass_kg * (1.0 + self.increase)]
+    }
+
+    /// A factor, uniform on either side of 1.
+    fn draw(self, random: &mut Random) -> f64 {
+        let change = random.within(1.0);
+        1.0 + change * if change < 0.0 { self.decrease } else { self.increase }
+    }
 }
 
 /// Everything that is random in a simulated walk.
@@ -62,9 +92,16 @@ impl Disturbance {
     }
 
     /// The disturbances of a walk. Walks with the same seed and number share all draws on every ground: heights scale.
-    pub(super) fn random(seed: u64, walk: u32, ground_m: f64, step_m: f64, pushed_within_s: f64) -> Self {
+    pub(super) fn random(
+        seed: u64,
+        walk: u32,
+        mass_changes: MassChanges,
+        ground_m: f64,
+        step_m: f64,
+        pushed_within_s: f64,
+    ) -> Self {
         let mut random = Random::new(seed, u64::from(walk));
-        let mass_factor = 1.0 + random.within(MASS_CHANGE);
+        let mass_factor = mass_changes.draw(&mut random);
         let speed_factor = 1.0 + random.within(SPEED_CHANGE);
         let push = Push { start_s: pushed_within_s * random.uniform(), impulse_n_s: random.within(PUSH_N_S) };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 to 10

@@ -69,6 +69,8 @@ pub struct ExecutionReport {
     pub seed: u64,
     /// Strides of a complete simulated walk.
     pub strides: u32,
+    /// Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    pub body_mass_kg: [f64; 2],
     /// Completed strides without any disturbance.
     pub undisturbed_strides: u32,
     /// Randomly disturbed walks, for each ground.

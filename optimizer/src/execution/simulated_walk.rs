@@ -92,6 +92,7 @@ impl<'a> Walker<'a> {
     /// Walks `strides` strides.
     pub(super) fn walk(&self, disturbance: &Disturbance, strides: u32) -> Result<WalkOutcome, ModelError> {
         let Gait { subject, device, settings, domains, .. } = self.gait;
+        // The factor keeps the mass in the range of the model, except for rounding.
         let (lightest, heaviest) = Subject::BODY_MASS_RANGE_KG;
         let body_mass_kg = (subject.body_mass_kg * disturbance.mass_factor).clamp(lightest, heaviest);
         let model = WalkerModel::new(&Subject { body_mass_kg, ..*subject }, device)?;

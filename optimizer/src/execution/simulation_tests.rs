@@ -1,6 +1,6 @@
 //! The plant against mechanics, and simulated walks against their contract.
 
-use super::disturbance::{Disturbance, Push};
+use super::disturbance::{Disturbance, MassChanges, Push};
 use super::ground::YIELD_M;
 use super::plant::{Effort, Motion, Plant};
 use super::random::Random;
@@ -10,6 +10,7 @@ use super::{ExecutionOptions, simulate};
 use crate::body::{FootPoint, GRAVITY, Side, WalkerModel};
 use crate::walking::kinetic_energy;
 use crate::{CancelToken, Device, Gait, GaitProblem, SolveOptions, Subject, TunedBounds, solve};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 const ANKLE_RANGE_RAD: (f64, f64) = (-0.4, 0.3);
 /// Bent knees, away from the joint stops.
@@ -119,15 +120,67 @@ fn report_does_not_depend_on_threads_and_depends_on_the_seed() {
     let gait = walkable_gait();
     let report = |threads: usize, seed: u64| {
         let options = ExecutionOptions { walks: 6, strides: 4, seed, threads, ..ExecutionOptions::default() };
-        simulate(&gait, &options).unwrap()
+        let done = AtomicU32::new(0);
+        let report = simulate(&gait, &options, &done, &CancelToken::new()).unwrap().unwrap();
+        assert_eq!((done.into_inner(), options.random_walks()), (18, 18));
+        report
     };
     let one = report(1, 1);
+    assert_eq!(one.body_mass_kg, [0.95 * 65.7, 1.05 * 65.7]);
     assert_eq!(one, report(2, 1));
     assert_ne!(one.grounds, report(1, 2).grounds);
     let all = |count: u32| one.grounds.iter().all(|g| g.completed + g.fell + g.halted == count);
     assert!(all(6));
     let text = serde_json::to_string(&one).unwrap();
     assert_eq!(one, serde_json::from_str(&text).unwrap());
+}
+
+#[test]
+fn cancelled_simulation_has_no_report() {
+    let (gait, done, cancel) = (walkable_gait(), AtomicU32::new(0), CancelToken::new());
+    cancel.cancel();
+    assert_eq!(simulate(&gait, &ExecutionOptions::default(), &done, &cancel).unwrap(), None);
+    assert_eq!(done.load(Ordering::Relaxed), 0);
+}
+
+#[test]
+fn sentence_counts_the_complete_walks_of_each_ground() {
+    let options = ExecutionOptions { walks: 2, strides: 1, ..ExecutionOptions::default() };
+    let report = simulate(&walkable_gait(), &options, &AtomicU32::new(0), &CancelToken::new()).unwrap().unwrap();
+    let [level, low, high] = [0, 1, 2].map(|ground| report.grounds[ground].completed);
+    let expected = format!(
+        "{level} of 2 simulated walks on level ground, {low} of 2 simulated walks on ground of ±5 mm and {high} of 2 simulated \
+         walks on ground of ±10 mm lasted 1 stride."
+    );
+    assert_eq!(report.sentence(), expected);
+}
+
+#[test]
+fn body_masses_are_spread_over_the_range_of_the_model() {
+    let (lightest, heaviest) = Subject::BODY_MASS_RANGE_KG;
+    // In the middle of the range, at its ends, and one percent from an end.
+    for (mass, lowest, highest) in
+        [(70.0, 0.95, 1.05), (lightest, 1.0, 1.05), (heaviest, 0.95, 1.0), (heaviest / 1.01, 0.95, 1.01)]
+    {
+        let changes = MassChanges::of(mass);
+        let range = changes.range_kg(mass).map(|kg| kg / mass);
+        assert!((range[0] - lowest).abs() < 1e-12 && (range[1] - highest).abs() < 1e-12, "{mass} {range:?}");
+        let factors: Vec<f64> =
+            (0..400).map(|walk| Disturbance::random(1, walk, changes, 0.0, 0.7, 1.0).mass_factor).collect();
+        assert!(factors.iter().all(|factor| (lowest - 1e-12..=highest + 1e-12).contains(factor)), "{mass}");
+        for (side, largest) in [(-1.0, 1.0 - lowest), (1.0, highest - 1.0)] {
+            let sizes = || factors.iter().map(|factor| side * (factor - 1.0)).filter(|size| *size > 0.0);
+            if largest < 1e-12 {
+                assert!(sizes().all(|size| size < 1e-12));
+                continue;
+            }
+            // Half of the walks are on either side, and not at its end.
+            assert!((160..240).contains(&sizes().count()), "{mass} {}", sizes().count());
+            let far = sizes().filter(|size| *size > 0.5 * largest).count();
+            assert!((60..140).contains(&far), "{mass} {far}");
+            assert!(sizes().filter(|size| *size > 0.99 * largest).count() < 10, "{mass}");
+        }
+    }
 }
 
 #[test]

@@ -11,11 +11,11 @@ pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
     match status {
         SolveStatus::Converged => None,
         SolveStatus::Infeasible => Some(
-            "No motion near the last one satisfies every constraint: tuned bounds conflict with each other or with another constraint.",
+            "No motion near the last iterate satisfies every constraint: tuned bounds conflict with each other or with another constraint.",
         ),
         SolveStatus::Cancelled => Some("The solve was cancelled."),
         SolveStatus::Stalled | SolveStatus::IterationLimit | SolveStatus::TimeLimit => Some(
-            "The optimiser stopped before every constraint was satisfied. This does not prove that these bounds have no gait.",
+            "The optimiser stopped before every constraint was satisfied. A gait with these bounds may still exist.",
         ),
     }
 }
@@ -290,7 +290,7 @@ mod tests {
     #[test]
     fn sentences_of_an_explanation_come_in_order() {
         let sentences = explanation().sentences();
-        assert!(sentences[0].starts_with("No motion near the last one"));
+        assert!(sentences[0].starts_with("No motion near the last iterate"));
         assert_eq!(
             sentences[1..],
             [
@@ -391,7 +391,7 @@ mod tests {
             assert!(words.contains("so a gait may exist"), "{words}");
         }
         for status in [SolveStatus::Stalled, SolveStatus::IterationLimit, SolveStatus::TimeLimit] {
-            assert!(status_in_words(status).unwrap().contains("does not prove"), "{status:?}");
+            assert!(status_in_words(status).unwrap().contains("may still exist"), "{status:?}");
         }
         assert_eq!(status_in_words(SolveStatus::Converged), None);
     }

@@ -12,7 +12,8 @@
 //! * the root: durations, hip velocities, lengths and the transition that closes the stride.
 
 use super::layout::{Layout, QD, QDD};
-use super::rows::{RowKind, RowPlace, RowTable};
+use super::row_names::{RowKind, RowPlace};
+use super::rows::RowTable;
 use crate::muscle::MUSCLE_COUNT;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE};
 use interior_point::EliminationBlocks;

@@ -7,7 +7,7 @@
 
 use super::layout::DomainLayout;
 use super::program_data::GaitProgramme;
-use super::rows::{RowKind, RowName, RowPlace};
+use super::row_names::{RowKind, RowName, RowPlace};
 use interior_point::WarmPoint;
 use std::collections::HashMap;
 

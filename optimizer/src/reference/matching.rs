@@ -9,7 +9,7 @@ const HEIGHT_UNIT_M: f64 = 0.10;
 const MASS_UNIT_KG: f64 = 15.0;
 
 /// Distance from a subject to a reference gait: `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. `None` if the height or mass
-/// of the recorded person is unknown.
+/// of the measured person is unknown.
 pub fn distance(subject: &Subject, reference: &ReferenceGait) -> Option<f64> {
     let height = (reference.height_m? - subject.height_m) / HEIGHT_UNIT_M;
     let mass = (reference.body_mass_kg? - subject.body_mass_kg) / MASS_UNIT_KG;

@@ -172,7 +172,7 @@ impl ReferenceGait {
     }
 }
 
-/// Height and mass of the recorded person, if known.
+/// Height and mass of the measured person, if known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Walker {
     /// Body height, m.

@@ -3,8 +3,8 @@
 use super::active::{self, ActiveSet};
 use super::figures::FigureDerivatives;
 use super::{BoundSensitivity, GaitSensitivityError};
-use crate::gait_problem::{GaitProblem, GaitProgramme};
-use crate::solve::{SolveError, WarmStart, check_shape};
+use crate::gait_problem::{GaitProblem, GaitProgramme, gait_of};
+use crate::solve::{GaitFigures, SolveError, WarmStart, check_shape};
 use crate::subject::ModelError;
 use crate::tuned_bounds::TunedBounds;
 use interior_point::{NlpSettings, NonlinearProgram, ParameterDerivative, Sensitivity};
@@ -37,6 +37,12 @@ impl PointSensitivities {
         let parameters = parameters.map_err(SolveError::from)?;
         let sensitivities = interior_point::sensitivities(&programme, &solution.point, settings, &parameters)?;
         Ok(Self { programme, parameters, sensitivities })
+    }
+
+    /// Mechanical cost of transport of the solution.
+    pub(super) fn cost_of_transport(&self, problem: &GaitProblem, solution: &WarmStart) -> f64 {
+        let gait = gait_of(problem, &self.programme, &solution.point.x);
+        GaitFigures::of_well_formed(&gait, &self.programme.model, &problem.reference).cost_of_transport
     }
 
     pub(super) fn of_bound(&self, problem: &GaitProblem, solution: &WarmStart, bound: usize) -> BoundSensitivity {

@@ -22,17 +22,18 @@ impl GaitSensitivities {
     /// One sentence for each bound that matters, and one for the others.
     pub fn sentences(&self) -> Vec<String> {
         let matters = |bound: &&BoundSensitivity| !bound.active.is_empty();
-        let mut sentences: Vec<String> = self.bounds.iter().filter(matters).map(BoundSensitivity::sentence).collect();
+        let mut sentences: Vec<String> =
+            self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport)).collect();
         let others: Vec<&str> = self.bounds.iter().filter(|bound| !matters(bound)).map(|bound| bound.bound).collect();
         if !others.is_empty() {
-            sentences.push(format!("Small changes of {} change nothing.", others.join(", ")));
+            sentences.push(format!("Small changes in {} have no effect.", others.join(", ")));
         }
         sentences
     }
 }
 
 impl BoundSensitivity {
-    fn sentence(&self) -> String {
+    fn sentence(&self, cost_of_transport: f64) -> String {
         let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound).unwrap_or(0);
         let (change, by) = CHANGES[place];
         // A lower bound is stricter the larger it is.
@@ -45,14 +46,17 @@ impl BoundSensitivity {
         if more > 0 {
             places.push(&rest);
         }
-        let weak =
-            if self.is_weakly_active { " The two sides differ, because a constraint is only just active." } else { "" };
+        let weak = if self.is_weakly_active {
+            " Raising and lowering the bound have different effects, because a constraint is only just active."
+        } else {
+            ""
+        };
         let end = |value: Option<f64>| value.map_or_else(|| "any value".to_owned(), figure);
         format!(
-            "{} ({quantity}): {change} {stricter} changes the cost of transport by {} and Gait RMSE by {} rad. Active at {}. \
+            "{} ({quantity}): {change} {stricter} changes the cost of transport by {} % and Gait RMSE by {} rad. Active at {}. \
              The same constraints stay active from {} to {}.{weak}",
             self.bound,
-            figure(by * derivatives.cost_of_transport),
+            figure(100.0 * by * derivatives.cost_of_transport / cost_of_transport),
             figure(by * derivatives.gait_rmse_rad),
             places.join("; "),
             end(self.interval.0),

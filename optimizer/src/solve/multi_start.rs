@@ -80,7 +80,6 @@ impl CostStrategy {
             Self::AdaptiveBarrier => NlpSettings { barrier_strategy: BarrierStrategy::Adaptive, ..*usual },
             Self::MoreRegularisation => NlpSettings {
                 hessian_regularisation_first: 100.0 * usual.hessian_regularisation_first,
-                hessian_regularisation_max: 100.0 * usual.hessian_regularisation_max,
                 proximal_first: 100.0 * usual.proximal_first,
                 ..*usual
             },

@@ -196,7 +196,7 @@ impl<'a> AttemptRun<'a> {
         if tracked.status != NlpStatus::Converged {
             // Keep the nearly feasible point: a larger distance from its bounds would increase the violation up to a
             // million times in short domains.
-            (usual.bound_push, usual.bound_fraction) = (WARM_PUSH, WARM_PUSH);
+            usual.bound_push = WARM_PUSH;
         }
         self.phase(SolvePhase::Cost, programme, &StartPoint::Cold(tracked.x), &guess.strategy.applied(&usual))
     }
@@ -216,7 +216,6 @@ impl<'a> AttemptRun<'a> {
             &NlpSettings {
                 mu_initial: MU_COST,
                 warm_bound_push: WARM_PUSH,
-                warm_bound_fraction: WARM_PUSH,
                 ..self.last_phase(&self.context.options.solver)
             },
         )

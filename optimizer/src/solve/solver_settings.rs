@@ -11,18 +11,15 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 /// Fields that the phases determine.
-const DECIDED_BY_PHASES: [&str; 14] = [
+const DECIDED_BY_PHASES: [&str; 11] = [
     "tolerance",
     "violation_tolerance",
-    "dual_tolerance",
     "complementarity_tolerance",
     "max_iterations",
     "max_seconds",
     "barrier_strategy",
     "mu_initial",
-    "mu_warm",
     "warm_bound_push",
-    "warm_bound_fraction",
     "gradient_scaling",
     "curvature_from_violation",
     "threads",
@@ -34,7 +31,6 @@ const DECIDED_BY_PHASES: [&str; 14] = [
 pub(super) fn default() -> NlpSettings {
     NlpSettings {
         bound_push: 0.1,
-        bound_fraction: 0.1,
         bound_multiplier_start: BoundMultiplierStart::Centred,
         regularisation_memory: 4,
         max_second_order_corrections: 1,
@@ -106,9 +102,9 @@ mod tests {
 
     #[test]
     fn missing_fields_have_the_defaults_for_gait_problems() {
-        let given = options(r#"{"solver": {"tau_min": 0.995}}"#).unwrap();
+        let given = options(r#"{"solver": {"required_reduction": 0.8}}"#).unwrap();
         let mut expected = SolveOptions::default();
-        expected.solver.tau_min = 0.995;
+        expected.solver.required_reduction = 0.8;
         assert_eq!(given, expected);
         let written = serde_json::to_string(&given).unwrap();
         assert_eq!(options(&written).unwrap(), given);
@@ -122,13 +118,13 @@ mod tests {
     #[test]
     fn invalid_settings_are_rejected_by_name() {
         for (text, expected) in [
-            (r#"{"solver": {"tau_min": 1.5}}"#, "tau_min"),
-            (r#"{"solver": {"tau_mni": 0.9}}"#, "unknown field `tau_mni`"),
-            (r#"{"solver": {"tau_min": "high"}}"#, "solver.tau_min: invalid type: string"),
-            (r#"{"solver": {"kappa_epsilon": 5, "linear_solver": "ma57"}}"#, "solver.linear_solver: unknown variant"),
+            (r#"{"solver": {"required_reduction": 1.5}}"#, "required_reduction"),
+            (r#"{"solver": {"bound_psuh": 0.1}}"#, "unknown field `bound_psuh`"),
+            (r#"{"solver": {"bound_push": "high"}}"#, "solver.bound_push: invalid type: string"),
+            (r#"{"solver": {"bound_push": 0.2, "linear_solver": "ma57"}}"#, "solver.linear_solver: unknown variant"),
             (r#"{"solver": {"bound_relaxation": 1e-3}}"#, "bound_relaxation is 0.001; it must be 0 to 0.000001"),
-            (r#"{"solver": {"hessian_regularisation_min": 1}}"#, "it must be more than 0 and at most 0.0001"),
-            (r#"{"solver": {"kappa_epsilon": 0}}"#, "kappa_epsilon is 0; it must be any positive number"),
+            (r#"{"solver": {"bound_push": 1}}"#, "bound_push is 1; it must be more than 0 and at most 0.5"),
+            (r#"{"solver": {"hessian_regularisation_first": 0}}"#, "first is 0; it must be any positive number"),
             (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial cannot be set here"),
             (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial cannot be set here"),
             (r#"{"solver": {"threads": 2}}"#, "threads cannot be set here"),

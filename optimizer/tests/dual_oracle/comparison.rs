@@ -6,7 +6,7 @@ use crate::random::Random;
 use crate::rows::{self, Problem};
 use crate::walker::Walker;
 use crate::{Scalar, domains, muscles, variables};
-use gait_optimizer::gait_problem::rows::RowPlace;
+use gait_optimizer::gait_problem::row_names::RowPlace;
 use gait_optimizer::gait_problem::{GaitProgramme, RowKind, RowName};
 use gait_optimizer::settings::Regularisation;
 use gait_optimizer::{Device, GaitSettings, Mesh, ReferenceGait, Subject, TunedBounds};

@@ -3,7 +3,7 @@
 use crate::random::Random;
 use crate::walker::{GRAVITY, State, Walker};
 use gait_optimizer::body::{InverseDynamics, PointState, WalkerModel};
-use gait_optimizer::gait_problem::rows::RowPlace;
+use gait_optimizer::gait_problem::row_names::RowPlace;
 use gait_optimizer::gait_problem::{GaitProgramme, PointVariables, RowKind};
 use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
 use interior_point::NonlinearProgram;

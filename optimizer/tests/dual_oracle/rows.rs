@@ -5,7 +5,7 @@ use crate::muscles::{self, Muscle};
 use crate::variables::{DomainVariables, GaitVariables, Point};
 use crate::walker::{GRAVITY, State, Walker};
 use crate::{Scalar, constant};
-use gait_optimizer::gait_problem::rows::RowPlace;
+use gait_optimizer::gait_problem::row_names::RowPlace;
 use gait_optimizer::gait_problem::{RowKind, RowName};
 
 /// Parameters of the rows.

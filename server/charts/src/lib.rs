@@ -18,6 +18,7 @@ mod heat_map;
 #[cfg(feature = "png")]
 mod png;
 mod reference_band;
+mod series;
 mod simplified;
 mod sparkline;
 mod standalone;
@@ -25,7 +26,7 @@ mod tree;
 mod walker;
 
 pub use axis::power_of_ten;
-pub use chart::{Band, Chart, LegCycle, Series, Span, Stroke};
+pub use chart::{Chart, LegCycle, Span};
 pub use figure::{Drawing, Figure};
 pub use gait_tiles::gait_tiles;
 pub use heat_map::{Cell, HeatMap};
@@ -33,6 +34,7 @@ pub use heat_map::{Cell, HeatMap};
 pub use png::PngError;
 pub(crate) use reference_band::over_reference_of_leg;
 pub use reference_band::{band_in_words, over_reference};
+pub use series::{Band, Series, Stroke};
 pub use sparkline::sparkline;
 pub use standalone::STYLE_SHEET;
 pub use tree::{Node, Tree};

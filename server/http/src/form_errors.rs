@@ -31,6 +31,8 @@ const LABELS: &[(&str, &str)] = &[
     ("band_high_hz", "Band-pass to, Hz"),
     ("envelope_hz", "Low-pass cut-off, Hz"),
     ("order", "Filter order"),
+    ("walks", "Number of walks on each ground"),
+    ("seed", "Seed"),
 ];
 
 /// A text in quotation marks.

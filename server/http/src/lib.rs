@@ -22,10 +22,12 @@ mod forwarded;
 mod host_header;
 mod idempotent;
 pub mod metrics;
+mod network;
 pub mod openapi;
 mod openapi_binary;
 mod openapi_dependent_rules;
 mod openapi_rules;
+mod openapi_settings;
 pub mod page_error;
 pub mod pages;
 mod paging;
@@ -46,8 +48,9 @@ mod visible;
 mod workers;
 
 pub use client_address::ClientAddress;
-pub use forwarded::{NETWORKS, Network, Proxies, ProxyHeaders};
+pub use forwarded::{Proxies, ProxyHeaders};
 pub use host_header::{Hosts, is_loopback_name};
+pub use network::{NETWORKS, Network};
 pub use router::{router, with_layers};
 pub use shared_state::{AccessState, AppState};
 

@@ -19,7 +19,7 @@ use utoipa_axum::router::OpenApiRouter;
         title = "Gaitwright",
         description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
                        not a medical device.\n\nLengths are in metres, masses in kilograms and angles in radians, unless \
-                       a name says otherwise. Times are RFC 3339 in UTC. Whole numbers are written without a fraction: 10, \
+                       a name or a description says otherwise. Times are RFC 3339 in UTC. Whole numbers are written without a fraction: 10, \
                        not 10.0.\n\nLists come in pages: `items` has the entries, and `next` is the `cursor` of the next page.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
@@ -154,7 +154,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
         problems.push(("507", "The disk is full"));
     }
     if if_match {
-        problems.push(("412", "Changed by someone else"));
+        problems.push(("412", "Changed since it was read"));
     }
     if has_body {
         problems.push(("413", "The body is too large"));

@@ -5,17 +5,15 @@
 //! of their own checks.
 
 use super::openapi_dependent_rules;
+use super::openapi_settings::settings;
 use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
 use gait_optimizer::{BasinChoice, Device, GaitSettings, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
-use gaitwright_service::json_document;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
 use gaitwright_store::trials_table::SORTS;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
 /// Control characters other than tab and line breaks, and characters that change the direction of text.
@@ -82,7 +80,7 @@ pub(super) fn state(document: &mut Value) {
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
         add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
         let people =
-            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers" });
+            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers." });
         schemas.insert("PersonSource".to_owned(), people);
         for component in ["NewPreference", "NewAssessment", "NewSafetyReport", "Suggestion"] {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
@@ -126,6 +124,7 @@ pub(super) fn state(document: &mut Value) {
             add(schemas, component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
             add(schemas, component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
         }
+        add(schemas, "NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
         add(schemas, "NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
         add(schemas, "NewStudy", "priority", &json!({ "minimum": -10, "maximum": 10 }));
         add(schemas, "NewStudy", "solve_seconds_budget", &json!({ "minimum": 1, "maximum": 1e8 }));
@@ -310,7 +309,7 @@ fn state_parameter(parameter: &mut Value) {
             let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
             json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })
         }
-        "right" | "down" => json!({ "enum": TunedBounds::NAMES }),
+        "x" | "y" => json!({ "enum": TunedBounds::NAMES }),
         _ => return,
     };
     if let Some(schema) = parameter.get_mut("schema").and_then(Value::as_object_mut) {
@@ -387,7 +386,10 @@ fn device(name: &str) -> Value {
     properties.insert("name".to_owned(), json!({ "type": "string", "minLength": 1, "maxLength": 80, "pattern": name }));
     properties.insert("carried_limb".to_owned(), json!({ "type": "boolean" }));
     for field in &Device::FIELDS {
-        properties.insert(field.name.to_owned(), number(field.meaning, field.minimum, field.maximum, &json!("number")));
+        properties.insert(
+            field.name.to_owned(),
+            number(&sentence(field.meaning), field.minimum, field.maximum, &json!("number")),
+        );
     }
     let required: Vec<String> = properties.keys().cloned().collect();
     let texts = json!({ "type": "object", "additionalProperties": { "type": "string" } });
@@ -406,7 +408,9 @@ fn muscles() -> Value {
         let Some(muscle) = published.muscle_of_kind(&anybody, kind) else { continue };
         let fields = MuscleOverride::FIELDS.iter().filter(|field| (field.value)(&muscle).is_some());
         let numbers: Map<String, Value> = fields
-            .map(|f| (f.name.to_owned(), number(f.meaning, f.minimum, f.maximum, &json!(["number", "null"]))))
+            .map(|f| {
+                (f.name.to_owned(), number(&sentence(f.meaning), f.minimum, f.maximum, &json!(["number", "null"])))
+            })
             .collect();
         let schema = json!({ "type": "object", "properties": numbers, "additionalProperties": false });
         properties.insert(kind.to_owned(), schema);
@@ -414,105 +418,13 @@ fn muscles() -> Value {
     json!({ "type": "object", "properties": properties, "additionalProperties": false })
 }
 
+/// A label as the sentence of a description: `Mass of the adapter.`
+fn sentence(label: &str) -> String {
+    let mut rest = label.chars();
+    let first = rest.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", rest.as_str())
+}
+
 fn number(meaning: &str, minimum: f64, maximum: f64, kind: &Value) -> Value {
     json!({ "type": kind, "description": meaning, "minimum": minimum, "maximum": maximum })
-}
-
-/// The schema of settings: the shape of their defaults, with what their own checks say when a value is far out of
-/// range.
-fn settings<T>(default: T, check: impl Fn(&T) -> Option<Error>) -> Value
-where
-    T: Serialize + DeserializeOwned,
-{
-    let Ok(default) = serde_json::to_value(default) else { return json!({ "type": "object" }) };
-    let refusal = |changed: &Value| -> Option<Error> {
-        match serde_json::to_vec(changed).map(|bytes| json_document::read::<T>(&bytes)) {
-            Ok(Ok(settings)) => check(&settings),
-            Ok(Err(error)) => Some(error),
-            Err(_) => None,
-        }
-    };
-    shape(&default, "", &default, &refusal)
-}
-
-/// The schema of the part of a document at a place.
-fn shape(whole: &Value, place: &str, part: &Value, refusal: &dyn Fn(&Value) -> Option<Error>) -> Value {
-    let with = |value: Value| {
-        let mut changed = whole.clone();
-        *changed.pointer_mut(place)? = value;
-        refusal(&changed)
-    };
-    match part {
-        Value::Object(fields) => {
-            let properties: Map<String, Value> = fields
-                .iter()
-                .map(|(name, part)| (name.clone(), shape(whole, &format!("{place}/{name}"), part, refusal)))
-                .collect();
-            let needed = |name: &&String| {
-                let mut rest = fields.clone();
-                rest.remove(*name);
-                with(Value::Object(rest)).is_some()
-            };
-            let required: Vec<&String> = fields.keys().filter(needed).collect();
-            let mut schema = json!({ "type": "object", "properties": properties, "additionalProperties": false });
-            if !required.is_empty() {
-                schema["required"] = json!(required);
-            }
-            schema
-        }
-        Value::Bool(_) => json!({ "type": "boolean" }),
-        Value::Number(number) => number_shape(number.is_f64(), with),
-        Value::String(_) => match with(json!("\u{1}")).as_ref().map(words_in) {
-            Some(words) if !words.is_empty() => json!({ "enum": words }),
-            _ => json!({ "type": "string" }),
-        },
-        Value::Array(items) => {
-            let item = items.first().map(|part| shape(whole, &format!("{place}/0"), part, refusal));
-            json!({ "type": "array", "items": item.unwrap_or_else(|| json!({})) })
-        }
-        Value::Null => {
-            // Settings that are null by default are numbers, and integers if a fraction is refused without a range.
-            let fraction = with(json!(0.5));
-            let is_fraction = fraction.as_ref().is_none_or(|refused| range_in(refused).is_some());
-            let mut schema = number_shape(is_fraction, with);
-            schema["type"] = json!([schema["type"], "null"]);
-            schema
-        }
-    }
-}
-
-/// The schema of a number; `with` returns the error for a value in its place.
-fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Value {
-    let mut schema = json!({ "type": if is_fraction { "number" } else { "integer" } });
-    for far in [json!(1_000_000_000_u32), json!(-1_000_000_000_i64)] {
-        if let Some((least, most)) = with(far).as_ref().and_then(range_in) {
-            (schema["minimum"], schema["maximum"]) = (json!(least), json!(most));
-        }
-    }
-    if !is_fraction && schema.get("minimum").is_none() {
-        schema["minimum"] = json!(u8::from(with(json!(0)).is_some()));
-    }
-    schema
-}
-
-/// The range in an error: `0.1 to 5` of a field, or `must be 0.1 to 5` of a learner setting.
-fn range_in(error: &Error) -> Option<(f64, f64)> {
-    if let Error::Invalid(field) | Error::Unreadable(field) = error {
-        let (least, most) = field.allowed.as_deref()?.split_once(" to ")?;
-        return Some((least.trim().parse().ok()?, most.trim().parse().ok()?));
-    }
-    let text = error.to_string();
-    let (least, most) = text.split_once("must be ")?.1.split_once(" to ")?;
-    let most: String = most.chars().take_while(|c| c.is_ascii_digit() || "+-.e".contains(*c)).collect();
-    Some((least.trim().parse().ok()?, most.trim_end_matches('.').parse().ok()?))
-}
-
-/// The allowed words in an error: `a, b, c` or `a or b`.
-fn words_in(error: &Error) -> Vec<String> {
-    let (Error::Invalid(field) | Error::Unreadable(field)) = error else { return Vec::new() };
-    let allowed = field.allowed.as_deref().unwrap_or_default().trim_start_matches("one of ");
-    let words = allowed.split(", ").flat_map(|words| words.split(" or "));
-    let words: Vec<String> = words.map(|word| word.trim_matches(['`', '"', ' ']).to_owned()).collect();
-    let plain = |word: &String| !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    if words.iter().all(plain) { words } else { Vec::new() }
 }

@@ -139,7 +139,7 @@ impl Kind {
             Self::Changed => entry(
                 "/problems/changed",
                 StatusCode::PRECONDITION_FAILED,
-                "Changed by someone else",
+                "Changed since it was read",
                 "The If-Match header names an old revision. Nothing was changed.",
                 "Read the resource again, then repeat the change with its new ETag.",
             ),

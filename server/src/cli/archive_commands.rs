@@ -1,10 +1,11 @@
 //! `gaitwright export`, `gaitwright import`, `gaitwright signing-key` and `gaitwright prune`.
 
-use super::config::{AnchoredFlags, RecordFlags, Settings};
 use super::database_file::{exists, note_export};
+use super::flag_numbers::days;
 use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem_flags::read;
+use super::settings::{AnchoredFlags, RecordFlags, Settings};
 use clap::Args;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
@@ -22,6 +23,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct Export {
     /// Identifier of the study.
+    #[arg(value_parser = study)]
     study: StudyId,
     /// New file for the archive.
     to: PathBuf,
@@ -30,6 +32,10 @@ pub(super) struct Export {
     /// Key file for signing the archive, made by `gaitwright signing-key`.
     #[arg(long, value_name = "FILE")]
     sign: Option<PathBuf>,
+}
+
+fn study(text: &str) -> Result<StudyId, String> {
+    text.parse().map_err(|_| "must be the identifier of a study, as in the address of its page".to_owned())
 }
 
 impl Export {
@@ -90,7 +96,7 @@ impl NewKey {
 pub(super) struct Prune {
     /// Delete trajectories of studies that ended more than this many days ago. Keeps gaits that are or may be
     /// recommended, their warm starts, and gaits of lab sessions.
-    #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(u32).range(1..=36_500))]
+    #[arg(long, value_name = "DAYS", value_parser = days, allow_negative_numbers = true)]
     older_than_days: u32,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,

@@ -1,8 +1,8 @@
 //! `gaitwright audit`.
 
-use super::config::{AnchoredFlags, Settings};
 use super::database_file::exists;
 use super::output::data;
+use super::settings::{AnchoredFlags, Settings};
 use clap::{Args, Subcommand};
 use gaitwright_service::error::Error;
 use gaitwright_store::verify;

@@ -1,8 +1,8 @@
 //! `gaitwright backup` and `gaitwright restore`.
 
-use super::config::{AnchoredFlags, RecordFlags, Settings};
 use super::database_file::{exists, note_export};
 use super::output::{data, tell};
+use super::settings::{AnchoredFlags, RecordFlags, Settings};
 use clap::Args;
 use gaitwright_service::error::Error;
 use gaitwright_store::{backup, restore};

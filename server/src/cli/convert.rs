@@ -1,6 +1,7 @@
 //! `gaitwright convert`: converts a gait for other programs. Not to controller files: only the record knows safety
 //! reports.
 
+use super::flag_numbers::number;
 use super::gait_file::read_gait_file;
 use super::out_file::OutFile;
 use super::output::data;
@@ -21,7 +22,7 @@ enum Form {
     Mot,
     /// The stride as a row of pictures (SVG).
     Tiles,
-    /// The walker, who moves in a loop (SVG).
+    /// Animation of the walker in a loop (SVG).
     Animation,
 }
 
@@ -34,7 +35,7 @@ pub(super) struct Convert {
     #[arg(long, value_enum)]
     to: Form,
     /// Sampling rate of `mot`, 10 to 5000.
-    #[arg(long, value_name = "HZ", default_value = "200", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", default_value = "200", value_parser = number, allow_negative_numbers = true)]
     rate_hz: f64,
     /// Output file (default: standard output).
     #[arg(long, value_name = "FILE")]

@@ -21,7 +21,7 @@ pub(super) fn note_export(database: &Path, command: &str, object: &str, named: V
         named,
     };
     if let Err(error) = access_spool::note(database, &access) {
-        tell(&format!("gaitwright: cannot record this {command} for the access log: {error}"));
+        tell(&format!("gaitwright: cannot record this {command} in the access log: {error}"));
     }
 }
 

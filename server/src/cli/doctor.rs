@@ -1,7 +1,7 @@
 //! `gaitwright doctor`: checks the machine, the settings and the record, for bug reports.
 
-use super::config::{Flags, Settings};
 use super::output::data;
+use super::settings::{Flags, Settings};
 use clap::Args;
 use gaitwright_service::error::Error;
 #[cfg(feature = "nats")]

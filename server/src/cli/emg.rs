@@ -1,6 +1,7 @@
 //! `gaitwright emg`: processes EMG recordings to muscle activity over the gait cycle.
 
 use super::flag_choices::{EMG_FORMATS, one_of};
+use super::flag_numbers::{filter_order, number};
 use super::out_file::OutFile;
 use super::output::data;
 use super::problem_flags::read;
@@ -24,7 +25,7 @@ pub(super) struct Emg {
     #[arg(long, value_parser = one_of::<MeasurementFormat>(EMG_FORMATS), default_value = "csv")]
     format: MeasurementFormat,
     /// Sampling rate of a CSV file without a time_s column, 100 to 20000.
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = number, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
     /// Columns of the channels, as in TA_L=EMG2,BF_L=EMG3; other channels are ignored (default: columns with the
     /// names of the channels).
@@ -34,13 +35,13 @@ pub(super) struct Emg {
     #[arg(long, value_name = "NAME", conflicts_with_all = ["heel_strikes_s", "normal_heel_strikes_s"])]
     heel_strike_column: Option<String>,
     /// Value of that column above which the foot is on the ground.
-    #[arg(long, value_name = "NUMBER", default_value = "0.5", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NUMBER", default_value = "0.5", value_parser = number, allow_negative_numbers = true)]
     heel_strike_threshold: f64,
     /// Times of right heel strikes in the recording, as in 0.41,1.52,2.63.
-    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', value_parser = number, allow_negative_numbers = true)]
     heel_strikes_s: Vec<f64>,
     /// Times of right heel strikes in the recording without the device.
-    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "normal", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "normal", value_parser = number, allow_negative_numbers = true)]
     normal_heel_strikes_s: Vec<f64>,
     #[command(flatten)]
     filters: Filters,
@@ -60,16 +61,16 @@ pub(super) struct Emg {
 #[derive(Debug, Args)]
 struct Filters {
     /// Lower cut-off frequency of the band-pass filter (default: 20).
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = number, allow_negative_numbers = true)]
     band_low_hz: Option<f64>,
     /// Upper cut-off frequency of the band-pass filter, below half the sampling rate (default: 450).
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = number, allow_negative_numbers = true)]
     band_high_hz: Option<f64>,
     /// Cut-off frequency of the low-pass filter for the envelope (default: 6).
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = number, allow_negative_numbers = true)]
     envelope_hz: Option<f64>,
     /// Order of both filters: 2, 4, 6 or 8 (default: 4).
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", value_parser = filter_order, allow_negative_numbers = true)]
     order: Option<usize>,
 }
 

@@ -14,7 +14,7 @@ pub(super) const JOINT_ANGLE_FORMATS: [Choice; 3] = [
     ("csv", "time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad; optionally knee_R_rad, right_force_n"),
 ];
 /// Units of angles.
-pub(super) const ANGLE_UNITS: [Choice; 2] = [("degrees", "Degrees"), ("radians", "Radians")];
+pub(super) const ANGLE_UNITS: [Choice; 2] = [("degrees", "Angles in degrees"), ("radians", "Angles in radians")];
 /// Ways to find right heel strikes.
 pub(super) const HEEL_STRIKES: [Choice; 3] = [
     ("force", "Whenever the vertical force under the right foot rises above 20 N"),

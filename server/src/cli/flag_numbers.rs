@@ -27,6 +27,23 @@ pub(super) fn subject(text: &str) -> Result<u32, String> {
     text.parse().map_err(|_| "must be 1 or 2".to_owned())
 }
 
+/// Days after which something is deleted.
+pub(super) fn days(text: &str) -> Result<u32, String> {
+    whole(text, 1, 36_500)
+}
+
+pub(super) fn basin(text: &str) -> Result<usize, String> {
+    text.trim().parse().map_err(|_| "must be a whole number".to_owned())
+}
+
+pub(super) fn filter_order(text: &str) -> Result<usize, String> {
+    text.trim().parse().map_err(|_| "must be 2, 4, 6 or 8".to_owned())
+}
+
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| "must be a number".to_owned())
+}
+
 pub(super) fn whole<T: FromStr + PartialOrd + Display + Copy>(text: &str, least: T, most: T) -> Result<T, String> {
     match text.trim().parse::<T>() {
         Ok(value) if value >= least && value <= most => Ok(value),

@@ -24,6 +24,7 @@ mod reference_comparison;
 mod reproduce;
 mod scheduled_backups;
 mod serve;
+mod settings;
 mod simulate;
 mod solve;
 mod subject_flags;
@@ -36,10 +37,10 @@ mod users;
 mod worker;
 
 use clap::{Parser, Subcommand};
-use config::{AnchoredFlags, Flags, RecordFlags, Settings, unknown_variables};
 use gaitwright_http::openapi;
 use gaitwright_service::error::Error;
 use output::{data, tell};
+use settings::{AnchoredFlags, Flags, RecordFlags, Settings, unknown_variables};
 use std::process::ExitCode;
 
 /// Exit code for invalid input, as for every usage error.
@@ -87,7 +88,7 @@ enum Command {
     Sweep(sweep::Sweep),
     /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
     Certify(certify::Certify),
-    /// Simulate walks with a gait on uneven ground, with the controllers of a laboratory.
+    /// Simulate walks with a gait on uneven ground, under laboratory controllers.
     Simulate(simulate::Simulate),
     /// Convert a gait to a table, an OpenSim motion or a picture.
     Convert(convert::Convert),

@@ -1,6 +1,6 @@
 //! Flags for the initial guesses of a cold start, shared by `solve` and `tune`.
 
-use super::flag_numbers::whole;
+use super::flag_numbers::{number, whole};
 use clap::Args;
 use gait_optimizer::{BasinChoice, InitialGuess, ModelError, SolveOptions};
 use gaitwright_service::error::Error;
@@ -11,13 +11,13 @@ fn initial_guesses(text: &str) -> Result<usize, String> {
 
 #[derive(Debug, Clone, Args)]
 pub(super) struct MultiStartFlags {
-    /// Number of initial guesses that a cold start always tries. They may lead to different gaits, called local optima or
-    /// basins.
+    /// Number of initial guesses that a cold start always tries (default: 2). They may lead to different gaits, called
+    /// local optima or basins.
     #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
     initial_guesses: Option<usize>,
     /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest
     /// (default: the lowest objective).
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    #[arg(long, value_name = "PERCENT", value_parser = number, allow_negative_numbers = true)]
     nearest_within: Option<f64>,
 }
 

@@ -1,6 +1,6 @@
 //! Flags of the gait problem, warm-start files and cancellation, shared by `solve` and `sweep`.
 
-use super::flag_numbers::iterations;
+use super::flag_numbers::{iterations, number};
 use super::lineage::{Lineage, LineageStart, basin_of_answer};
 use super::output::tell;
 use super::serve::interrupted;
@@ -33,7 +33,7 @@ pub(super) struct ProblemFiles {
     /// `gaitwright reference` (default: falisse-2019).
     #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
-    /// Settings of the interior-point method that differ from the defaults (JSON), as in {"tau_min": 0.995,
+    /// Settings of the interior-point method that differ from the defaults (JSON), as in {"bound_push": 0.01,
     /// "linear_solver": "delayed_pivots"}. The error for an unknown name lists the known ones.
     #[arg(long, value_name = "FILE")]
     solver_settings: Option<PathBuf>,
@@ -93,7 +93,7 @@ pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> 
 pub(super) struct ProblemFlags {
     #[command(flatten)]
     body: Body,
-    /// Solve with muscles (C1-C12) or without (C1-C4).
+    /// Whether to solve with muscles.
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
     #[command(flatten)]
@@ -104,14 +104,14 @@ pub(super) struct ProblemFlags {
     /// Warm-start from the gait in a file written by `solve --out`.
     #[arg(long, value_name = "FILE")]
     warm: Option<PathBuf>,
-    /// Scaled optimality tolerance.
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    /// Scaled optimality tolerance (default: 1e-6).
+    #[arg(long, value_name = "NUMBER", value_parser = number, allow_negative_numbers = true)]
     tolerance: Option<f64>,
-    /// Maximum number of iterations of each phase; phases that track the reference have at most 200.
+    /// Maximum number of iterations of each phase (default: 1000). Phases that track the reference have at most 200.
     #[arg(long, value_name = "NUMBER", value_parser = iterations, allow_negative_numbers = true)]
     max_iterations: Option<usize>,
-    /// Time limit of a solve.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// Time limit of a solve (default: none).
+    #[arg(long, value_name = "SECONDS", value_parser = number, allow_negative_numbers = true)]
     time_limit_s: Option<f64>,
 }
 

@@ -1,6 +1,7 @@
 //! `gaitwright reference`: computes a reference gait from a recording.
 
 use super::flag_choices::{ANGLE_UNITS, HEEL_STRIKES, JOINT_ANGLE_FORMATS, one_of};
+use super::flag_numbers::number;
 use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem_flags::read;
@@ -35,13 +36,13 @@ pub(super) struct Reference {
     #[arg(long, value_parser = one_of::<Strikes>(HEEL_STRIKES), default_value = "kinematics", conflicts_with = "heel_strikes_s")]
     strikes: Strikes,
     /// Times of right heel strikes, as in 0.41,1.52,2.63.
-    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', value_parser = number, allow_negative_numbers = true)]
     heel_strikes_s: Vec<f64>,
-    /// Height of the recorded person.
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    /// Height of the measured person, m.
+    #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     height_m: Option<f64>,
-    /// Body mass of the recorded person.
-    #[arg(long, value_name = "KILOGRAMS", allow_negative_numbers = true)]
+    /// Body mass of the measured person, kg.
+    #[arg(long, value_name = "KILOGRAMS", value_parser = number, allow_negative_numbers = true)]
     mass_kg: Option<f64>,
     /// JSON output file (default: standard output).
     #[arg(long, value_name = "FILE")]

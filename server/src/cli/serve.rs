@@ -1,8 +1,8 @@
 //! `gaitwright serve`: starts the service, and stops it on Ctrl-C or SIGTERM.
 
-use super::config::{Flags, Settings};
 use super::output::tell;
 use super::scheduled_backups::ClaimedPlan;
+use super::settings::{Flags, Settings};
 #[cfg(feature = "tls")]
 use super::tls;
 use axum_server::{Handle, Server};

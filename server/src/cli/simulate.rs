@@ -1,13 +1,15 @@
 //! `gaitwright simulate`: walks with a gait outside the optimiser's model.
 
-use super::flag_numbers::{seed, whole};
+use super::flag_numbers::{number, seed, whole};
 use super::gait_file::read_gait_file;
 use super::output::data;
 use clap::Args;
+use gait_optimizer::CancelToken;
 use gait_optimizer::execution::{ExecutionOptions, ExecutionReport, WalksOnGround, simulate};
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicU32;
 
 #[derive(Debug, Args)]
 pub(super) struct Simulate {
@@ -17,10 +19,10 @@ pub(super) struct Simulate {
     /// Number of simulated walks on each ground.
     #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().walks, value_parser = walks, allow_negative_numbers = true)]
     walks: u32,
-    /// Largest height and depth of the ground, mm, instead of 0, 5 and 10.
-    #[arg(long, value_name = "MILLIMETRES", allow_negative_numbers = true)]
+    /// Largest height and depth of the uneven ground, 0 to 50 mm (default: 0, 5 and 10 in turn).
+    #[arg(long, value_name = "MILLIMETRES", value_parser = ground, allow_negative_numbers = true)]
     ground: Option<f64>,
-    /// Seed of the disturbances.
+    /// Seed for the disturbances.
     #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().seed, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Print the report as one JSON object.
@@ -30,6 +32,15 @@ pub(super) struct Simulate {
 
 fn walks(text: &str) -> Result<u32, String> {
     whole(text, 1, ExecutionOptions::MOST_WALKS)
+}
+
+/// A height in millimetres, because the error of the library names its own field, in metres.
+fn ground(text: &str) -> Result<f64, String> {
+    let most = 1000.0 * ExecutionOptions::HIGHEST_GROUND_M;
+    match number(text) {
+        Ok(millimetres) if (0.0..=most).contains(&millimetres) => Ok(millimetres),
+        _ => Err(format!("must be a number from 0 to {most}")),
+    }
 }
 
 impl Simulate {
@@ -46,7 +57,9 @@ impl Simulate {
         }
         options.validate()?;
         let gait = read_gait_file(&self.gait)?.gait;
-        let report = Pool::new(1).run(move |_| simulate(&gait, &options)).await??;
+        let (done, cancel) = (AtomicU32::new(0), CancelToken::new());
+        let report = Pool::new(1).run(move |_| simulate(&gait, &options, &done, &cancel)).await??;
+        let report = report.ok_or_else(|| Error::Internal("the simulation ended without a report".to_owned()))?;
         if self.json {
             data(&serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?)
         } else {
@@ -68,6 +81,8 @@ fn for_people(report: &ExecutionReport) -> String {
         .map(|walk| format!("{} at {:.0} mm", walk.strides, 1000.0 * walk.yield_m))
         .collect();
     lines.push(format!("  undisturbed strides on ground that yields under body weight: {}", by_yield.join(", ")));
+    let [lightest, heaviest] = report.body_mass_kg;
+    lines.push(format!("  disturbed walks: bodies of {lightest:.1} to {heaviest:.1} kg"));
     lines.extend(report.grounds.iter().flat_map(ground_for_people));
     lines.push(match report.pushes {
         Some(pushes) => format!(
@@ -76,20 +91,19 @@ fn for_people(report: &ExecutionReport) -> String {
         ),
         None => "  pushes: not tried, because the undisturbed walk is not complete".to_owned(),
     });
-    lines.push("  the intact side is a person who tracks the gait; a real person can do better or worse".to_owned());
+    lines.push(
+        "  the intact side is a model of a person who tracks the gait; a real person may do better or worse".to_owned(),
+    );
     lines.join("\n")
 }
 
 fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let [low, high] = ground.completed_share_interval;
-    let ground_in_words = match 1000.0 * ground.ground_height_m {
-        0.0 => "level ground".to_owned(),
-        millimetres => format!("ground of +-{millimetres} mm"),
-    };
     [
         format!(
-            "  {ground_in_words}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; {} falls, {} halts",
+            "  {}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; {} falls, {} halts",
+            ground.ground_in_words(),
             ground.completed,
             ground.walks,
             percent(ground.completed_share),

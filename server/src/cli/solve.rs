@@ -1,10 +1,11 @@
 //! `gaitwright solve`: optimises one gait.
 
 use super::Ended;
+use super::flag_numbers::basin;
 use super::lineage::{Lineage, LineageStart, basin_of_answer};
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
-use super::output::data;
+use super::output::{data, tell};
 use super::problem_flags::{ProblemFlags, cancelled_by_signal, read_document};
 use super::reference_comparison;
 use super::serve::cores_or;
@@ -12,12 +13,13 @@ use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
-use gait_optimizer::sensitivity::{GaitSensitivities, GaitSensitivityError, sensitivities};
+use gait_optimizer::sensitivity::{GaitSensitivities, sensitivities};
 use gait_optimizer::{
     GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, TunedBounds, solve,
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::sensitivities::refusal;
 use gaitwright_service::studies::solve_input::SolveInput;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -53,7 +55,7 @@ pub(super) struct Solve {
     /// Start from another local optimum (basin) in the file given to --warm. Basins are numbered from 1, in the order
     /// in which the initial guesses reached them; `solve` prints the list if there are several (default: the basin of
     /// the gait in that file).
-    #[arg(long, value_name = "NUMBER", requires = "warm")]
+    #[arg(long, value_name = "NUMBER", requires = "warm", value_parser = basin, allow_negative_numbers = true)]
     warm_basin: Option<usize>,
     #[command(flatten)]
     multi_start: MultiStartFlags,
@@ -63,8 +65,8 @@ pub(super) struct Solve {
     /// Print the results as one JSON object.
     #[arg(long)]
     json: bool,
-    /// If no gait is found, explain which bounds conflict and which bound, relaxed alone, gives a gait. Takes up to eight
-    /// solves for each bound.
+    /// If no gait is found, explain which bounds conflict, and which of them gives a gait when relaxed alone. Takes up to
+    /// eight solves for each bound.
     #[arg(long)]
     explain: bool,
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
@@ -137,7 +139,10 @@ impl Solve {
             };
             let outcome = solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)?;
             let explanation = if explain {
-                let mut progress = |question: &str| shown.set_message(question.to_owned());
+                let mut progress = |question: &str| {
+                    shown.suspend(|| tell(question));
+                    shown.set_message(question.to_owned());
+                };
                 explanation::explain(&problem, (&outcome).into(), &options, &mut progress, &cancel)?
             } else {
                 None
@@ -192,16 +197,6 @@ impl Solve {
     }
 }
 
-/// Why a gait has no sensitivities.
-fn refusal(error: GaitSensitivityError) -> Error {
-    match error {
-        GaitSensitivityError::Solve(error) => error.into(),
-        GaitSensitivityError::Sensitivity(error) => {
-            Error::conflict(format!("The sensitivities of this gait cannot be computed: {error}."))
-        }
-    }
-}
-
 /// The status as in JSON.
 pub(super) fn status_word(status: SolveStatus) -> &'static str {
     match status {
@@ -241,7 +236,7 @@ fn for_people(
     lines.extend(lineage_in_words(r, lineage, start));
     lines.extend(basins_in_words(r));
     for violation in outcome.violations.iter().take(10) {
-        lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
+        lines.push(format!("  violated: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
     }
     if let Some(explanation) = explanation {
         lines.extend(explanation.sentences().iter().map(|sentence| format!("  {sentence}")));

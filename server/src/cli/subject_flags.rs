@@ -1,6 +1,6 @@
 //! Flags for the subject and the variant.
 
-use super::flag_numbers::subject;
+use super::flag_numbers::{number, subject};
 use clap::{Args, ValueEnum};
 use gait_optimizer::Subject;
 use gaitwright_service::error::Error;
@@ -8,14 +8,14 @@ use gaitwright_service::error::Error;
 /// The subject: one of the paper's, or a height and a mass.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Body {
-    /// Subject from the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg). Default: 1.
+    /// Subject from the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg) (default: 1).
     #[arg(long, value_name = "NUMBER", value_parser = subject, allow_negative_numbers = true, conflicts_with_all = ["height_m", "mass_kg"])]
     subject: Option<u32>,
     /// Body height, m.
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true, requires = "mass_kg")]
+    #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true, requires = "mass_kg")]
     height_m: Option<f64>,
     /// Body mass, kg.
-    #[arg(long, value_name = "KILOGRAMS", allow_negative_numbers = true, requires = "height_m")]
+    #[arg(long, value_name = "KILOGRAMS", value_parser = number, allow_negative_numbers = true, requires = "height_m")]
     mass_kg: Option<f64>,
 }
 
@@ -29,12 +29,12 @@ impl Body {
     }
 }
 
-/// A switch.
+/// Whether to solve with muscles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Switch {
-    /// On.
+    /// With muscles (C1-C12).
     On,
-    /// Off.
+    /// Without muscles (C1-C4).
     Off,
 }
 

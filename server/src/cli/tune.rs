@@ -1,12 +1,12 @@
 //! `gaitwright tune`: runs an unattended study.
 
 use super::Ended;
-use super::config::{AnchoredFlags, Settings};
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
 use super::problem_flags::ProblemFiles;
 use super::serve::cores_or;
+use super::settings::{AnchoredFlags, Settings};
 use super::subject_flags::{Body, Switch};
 use super::unattended::{self, Lines, action_line};
 use clap::Args;
@@ -140,7 +140,7 @@ fn certificate_lines(summary: &Summary) -> Vec<String> {
             lines.push(format!("best gait that passed certification: trial {}{rmse}", trial.number));
             lines.push(format!("  action            {}", action_line(&trial.action)));
         }
-        None => lines.push("none of the certified gaits passed".to_owned()),
+        None => lines.push("none of the gaits that were checked passed certification".to_owned()),
     }
     lines.push("a finer mesh often gives a gait that passes: gaitwright solve --mesh 8,8,12,12 --certify".to_owned());
     lines

@@ -1,8 +1,8 @@
 //! `gaitwright users`: lists users, and creates sign-in links for them.
 
-use super::config::{AnchoredFlags, Settings};
 use super::database_file::exists;
 use super::output::{data, tell};
+use super::settings::{AnchoredFlags, Settings};
 use clap::{Args, Subcommand};
 use gaitwright_service::access::user_administration;
 use gaitwright_service::error::Error;

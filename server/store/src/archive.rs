@@ -8,8 +8,8 @@ use sqlx::{AssertSqlSafe, Row as _};
 use std::collections::HashMap;
 use tokio::sync::mpsc::Sender;
 
-/// Tables in the order in which their rows can be written, with the condition for rows of a study. Certificates and
-/// explanations are not included: the importing service computes them again.
+/// Tables in the order in which their rows can be written, with the condition for rows of a study. Certificates,
+/// explanations and execution reports are not included: the importing service computes them again.
 const TABLES: [(&str, &str); 31] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),

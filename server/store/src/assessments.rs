@@ -21,7 +21,7 @@ pub struct Assessment {
     pub second: TrialId,
     /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
     pub answer: Judgement,
-    /// Source.
+    /// Who answered.
     pub source: Source,
     /// Author.
     pub author: String,

@@ -1,7 +1,8 @@
 //! Backups of the record: consistent while the service is running, and verified.
 
 use super::atomic_file::{WholeFile, folder_of};
-use super::{Store, StoreError, StoreResult, free_name, read_only, verify};
+use super::record_files::free_name;
+use super::{Store, StoreError, StoreResult, read_only, verify};
 use sqlx::SqlitePool;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};

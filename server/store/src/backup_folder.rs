@@ -2,7 +2,8 @@
 
 use super::atomic_file::private;
 use super::record_files::companion;
-use super::{Store, StoreError, StoreResult, backup, free_name};
+use super::record_files::free_name;
+use super::{Store, StoreError, StoreResult, backup};
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};

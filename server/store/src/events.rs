@@ -14,7 +14,7 @@ pub struct Event {
     pub study_id: StudyId,
     /// Kind of the event: `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`,
     /// `feedback_retracted`, `lab_session_answered`, `reported_unsafe`, `safety_reviewed`, `gait_certified`, `trial_explained`,
-    /// `trial_not_explained`.
+    /// `trial_not_explained`, `gait_simulated`.
     pub kind: String,
     /// Details.
     pub payload: serde_json::Value,

@@ -30,6 +30,7 @@ pub mod consents;
 pub mod devices;
 mod error;
 pub mod events;
+pub mod execution_reports;
 pub mod explanations;
 pub mod feedback;
 mod free_disk_space;
@@ -47,6 +48,7 @@ pub mod measurement_files;
 pub mod members;
 mod migrations;
 pub mod openapi_schemas;
+mod opening_checks;
 mod ownership;
 pub mod presentations;
 pub mod quarantine;
@@ -93,8 +95,8 @@ pub use writer::Writer;
 use anchor::Anchors;
 use gaitwright_compute::{ComputeError, OnPool, Pool};
 use lost_files::Files;
+use opening_checks::{check_history, refuse_empty_in_place_of_record, refuse_unchanged};
 use ownership::Ownership;
-use record_files::companion;
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use std::path::{Path, PathBuf};
@@ -362,69 +364,4 @@ pub async fn commit(mut writer: LentWriter<'_>) -> StoreResult<()> {
 /// SHA-256, hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
     json_columns::sha256(bytes)
-}
-
-/// Refuses a file of another program or a newer version, before a writing connection opens it.
-async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
-    if !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
-        return Ok(());
-    }
-    let options = SqliteConnectOptions::new().filename(path).read_only(true);
-    let Ok(pool) = SqlitePoolOptions::new().max_connections(1).connect_with(options).await else { return Ok(()) };
-    let checked = schema_versions::check_version(&pool, path).await;
-    pool.close().await;
-    match checked {
-        Err(refusal @ (StoreError::NotADatabase { .. } | StoreError::NewerSchema { .. })) => Err(refusal),
-        // A file that cannot be read without writing, such as one with a hot journal, is checked by the next
-        // connection.
-        _ => Ok(()),
-    }
-}
-
-/// Accepts an empty file as a new record, unless an anchor shows that there was one.
-fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
-    let bytes = |file: &Path| std::fs::metadata(file).map_or(0, |file| file.len());
-    if bytes(path) > 0 {
-        return Ok(());
-    }
-    let log = companion(path, "-wal");
-    if bytes(&log) > 0 {
-        return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: log });
-    }
-    refuse_to_begin_anew(path, anchors)
-}
-
-/// Refuses a file that is not the record which its companions know: another program's, an earlier state, or an empty file
-/// in its place.
-async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
-    if schema_versions::check_version(pool, path).await? == 0 {
-        return refuse_to_begin_anew(path, anchors);
-    }
-    for anchor in anchors {
-        anchor::check(&mut *pool.acquire().await?, path, anchor).await?;
-    }
-    Ok(())
-}
-
-/// Refuses a file without a schema if an anchor shows that its log was lost.
-fn refuse_to_begin_anew(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
-    for anchor in anchors {
-        if anchor::has_seen_rows(anchor)? {
-            return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: anchor.clone() });
-        }
-    }
-    Ok(())
-}
-
-/// `gaitwright.db.WHAT-20260501T101500`, with a number if that name is taken.
-fn free_name(of: &Path, what: &str) -> PathBuf {
-    let stamp: String = now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect();
-    let first = companion(of, &format!(".{what}-{stamp}"));
-    let mut name = first.clone();
-    let mut number = 1_u32;
-    while name.exists() {
-        number += 1;
-        name = companion(&first, &format!("-{number}"));
-    }
-    name
 }

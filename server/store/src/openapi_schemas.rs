@@ -18,7 +18,7 @@ document! {
     GaitDocument
 }
 document! {
-    /// What `gaitwright solve --problem` reads: subject, device, bounds, settings, reference gait, limits, start.
+    /// Input for `gaitwright solve --problem`: subject, device, bounds, settings, reference gait, limits and warm start.
     SolveProblem
 }
 document! {
@@ -271,9 +271,9 @@ pub struct SolveReport {
     pub unchanged_bounds: Vec<UnchangedBound>,
     /// Wall time, s.
     pub seconds_total: f64,
-    /// Evaluating functions and derivatives, s.
+    /// Time for evaluating functions and derivatives, s.
     pub seconds_evaluation: f64,
-    /// Linear algebra, s.
+    /// Time for linear algebra, s.
     pub seconds_linear_algebra: f64,
     /// Breakdown of the linear algebra. Null if unknown.
     pub linear_algebra: Option<LinearAlgebra>,
@@ -343,17 +343,17 @@ pub struct Optimality {
 /// Operations and times of the linear algebra of a solve.
 #[derive(Debug, ToSchema)]
 pub struct LinearAlgebra {
-    /// Analysing the structure of matrices, s.
+    /// Time for analysing the structure of matrices, s.
     pub seconds_analysis: f64,
-    /// Assembling and factorising, s.
+    /// Time for assembling and factorising matrices, s.
     pub seconds_factorisation: f64,
-    /// Substitutions, residuals and refinement, s.
+    /// Time for substitutions, residuals and refinement, s.
     pub seconds_solves: f64,
-    /// Numerical factorisations.
+    /// Number of numerical factorisations.
     pub factorisations: u64,
-    /// Forward-backward substitutions.
+    /// Number of forward and backward substitutions.
     pub substitutions: u64,
-    /// Number of times that the fallback method was used.
+    /// Number of factorisations that failed and were replaced by a fallback method.
     pub fallbacks: u64,
 }
 
@@ -442,13 +442,13 @@ pub struct ReturnMap {
     pub gait_residual: f64,
     /// Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
     pub fixed_point_residual: f64,
-    /// Largest distance from the gait's first state to the fixed point, rad and rad/s.
+    /// Largest component of the difference between the gait's first state and the fixed point, rad and rad/s.
     pub fixed_point_distance: f64,
-    /// Multipliers from variational equations and saltation, largest first.
+    /// Multipliers from variational equations and saltation matrices, largest first.
     pub multipliers: Vec<Multiplier>,
     /// Largest modulus of the multipliers.
     pub largest: f64,
-    /// Largest modulus of the multipliers from differences of simulated domains.
+    /// Largest modulus of the multipliers, from finite differences of simulated domains.
     pub largest_by_differences: f64,
     /// Resolution of the finite differences.
     pub differences_resolve: f64,
@@ -569,4 +569,106 @@ pub struct EmgSettings {
     /// Order of both filters: 2, 4, 6 or 8.
     #[schema(required = false)]
     pub order: u64,
+}
+
+/// Simulated walks with a gait, outside the optimiser's model.
+#[derive(Debug, ToSchema)]
+pub struct ExecutionReport {
+    /// Version of this layout and of the simulation.
+    pub format_version: u32,
+    /// SHA-256 of the gait as compact JSON, as in its certificate.
+    pub gait_sha256: String,
+    /// Seed of the disturbances.
+    pub seed: u64,
+    /// Strides of a complete simulated walk.
+    pub strides: u32,
+    /// Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    #[schema(min_items = 2, max_items = 2)]
+    pub body_mass_kg: Vec<f64>,
+    /// Completed strides without any disturbance.
+    pub undisturbed_strides: u32,
+    /// Randomly disturbed walks, for each ground.
+    pub grounds: Vec<WalksOnGround>,
+    /// Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    pub strides_by_yield: Vec<StridesOnYield>,
+    /// Largest pushes survived. Null if the walker does not complete the undisturbed walk.
+    pub pushes: Option<SurvivedPushes>,
+}
+
+/// Simulated walks on one ground.
+#[derive(Debug, ToSchema)]
+pub struct WalksOnGround {
+    /// Largest height and depth of the plateaus of the ground, m.
+    pub ground_height_m: f64,
+    /// Number of simulated walks.
+    pub walks: u32,
+    /// Walks that completed all strides.
+    pub completed: u32,
+    /// Walks that ended with a fall.
+    pub fell: u32,
+    /// Walks that ended without a further step.
+    pub halted: u32,
+    /// Share of completed walks.
+    pub completed_share: f64,
+    /// 95 % confidence interval of this share (Wilson).
+    #[schema(min_items = 2, max_items = 2)]
+    pub completed_share_interval: Vec<f64>,
+    /// Mean number of completed strides.
+    pub mean_strides: f64,
+    /// Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    pub knee_saturated_share: f64,
+    /// The same for its ankle.
+    pub ankle_saturated_share: f64,
+    /// Share of the time in which the knee wanted to change its torque faster than it can.
+    pub knee_rate_limited_share: f64,
+    /// The same for the ankle.
+    pub ankle_rate_limited_share: f64,
+}
+
+/// Undisturbed simulated walk on ground of some stiffness.
+#[derive(Debug, ToSchema)]
+pub struct StridesOnYield {
+    /// Depth of the ground under body weight, m.
+    pub yield_m: f64,
+    /// Completed strides.
+    pub strides: u32,
+}
+
+/// Largest pushes of a fixed ladder that the walker survives, without other disturbances.
+#[derive(Debug, ToSchema)]
+pub struct SurvivedPushes {
+    /// Forwards, N s; 0 if it survives none.
+    pub forwards_n_s: f64,
+    /// Backwards, N s.
+    pub backwards_n_s: f64,
+    /// Largest push of the ladder, N s.
+    pub largest_tried_n_s: f64,
+}
+
+/// Constraint that is active at a node or over the stride.
+#[derive(Debug, ToSchema)]
+pub struct ActiveConstraint {
+    /// Domain, node and quantity.
+    pub place: String,
+    /// Multiplier of the scaled constraint: decrease of the objective per unit that the constraint is relaxed.
+    pub multiplier: f64,
+}
+
+/// Derivatives of figures per unit of a tuned bound.
+#[derive(Debug, ToSchema)]
+pub struct FigureDerivatives {
+    /// Of the objective.
+    pub objective: f64,
+    /// Of the mechanical cost of transport.
+    pub cost_of_transport: f64,
+    /// Of Gait RMSE, rad.
+    pub gait_rmse_rad: f64,
+    /// Of the mean walking speed, m/s.
+    pub speed_m_s: f64,
+    /// Of the largest angle at a node of torso, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, rad.
+    #[schema(min_items = 7, max_items = 7)]
+    pub largest_angles_rad: Vec<f64>,
+    /// Of the smallest angle at a node, rad.
+    #[schema(min_items = 7, max_items = 7)]
+    pub smallest_angles_rad: Vec<f64>,
 }

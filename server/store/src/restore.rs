@@ -7,8 +7,9 @@
 use super::atomic_file::{WholeFile, sync_folder};
 use super::ownership::Ownership;
 use super::record_files::companion;
+use super::record_files::free_name;
 use super::restore_marker::{self, Marker, mark, unmark};
-use super::{StoreError, StoreResult, anchor, backup, free_name, read_only};
+use super::{StoreError, StoreResult, anchor, backup, read_only};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};

@@ -18,7 +18,7 @@ pub struct AttemptResult {
     /// How the solve ended.
     #[schema(value_type = openapi_schemas::SolveStatus)]
     pub status: SolveStatus,
-    /// All figures of the solve that are finite.
+    /// Figures of the solve. Figures that are not finite are omitted.
     #[schema(value_type = Option<openapi_schemas::SolveReport>)]
     pub report: Option<SolveReport>,
     /// Time of arrival.

@@ -79,6 +79,11 @@ impl Chromium {
                 "--disable-component-update",
                 "--disable-sync",
             ])
+            // A mouse, which a machine without a screen does not have: 2 is a device that hovers, 4 a fine pointer.
+            .arg((
+                "blink-settings",
+                "primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4",
+            ))
             .build()
             .unwrap();
         let (browser, mut handler) = Browser::launch(config).await.unwrap();
@@ -142,6 +147,8 @@ impl Tab {
             page.execute(SetScriptExecutionDisabledParams::new(true)).await.unwrap();
         }
         page.execute(SetDeviceMetricsOverrideParams::new(1280, 900, 1.0, false)).await.unwrap();
+        // The library switches the emulation on for every tab, so that no page has a mouse.
+        page.execute(SetTouchEmulationEnabledParams::new(false)).await.unwrap();
         page.bring_to_front().await.unwrap();
         page.goto(address).await.unwrap();
         Self { page, requests, complaints }
@@ -169,6 +176,29 @@ impl Tab {
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
         panic!("never true on {:?}: {expression}", self.page.url().await);
+    }
+
+    /// Waits until an answer counts, and returns the selector of its button.
+    pub(crate) async fn answer(&self, value: &str) -> String {
+        let button = format!("form[data-ready] button[value={value}]:enabled");
+        self.wait_for(&button).await;
+        self.wait_until("document.readyState === 'complete'").await;
+        button
+    }
+
+    /// Opens every folded part of the page.
+    pub(crate) async fn unfold(&self) {
+        self.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
+    }
+
+    /// The lowest edge of elements, and the size of the smallest one, px.
+    pub(crate) async fn lowest(&self, selector: &str) -> (f64, f64, f64) {
+        let of = |what: &str| {
+            format!("[...document.querySelectorAll(`{selector}`)].map(e => e.getBoundingClientRect().{what})")
+        };
+        let (low, width, height) = (of("bottom"), of("width"), of("height"));
+        let all = format!("JSON.stringify([Math.max(...{low}), Math.min(...{width}), Math.min(...{height})])");
+        serde_json::from_str(&self.value(&all).await).unwrap()
     }
 
     /// Goes to another address.

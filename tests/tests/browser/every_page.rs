@@ -12,6 +12,7 @@ use gaitwright_store::{StudyId, TrialId, commit, explanations};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{explanation, without_gaits};
 use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::simulated;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -82,6 +83,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let taken = site.service.post_text(&format!("/rate/{other}"), "application/x-www-form-urlencoded", "").await;
     let pair = taken.headers["location"].to_str().unwrap().to_owned();
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
+    simulated::keep(&site.service.store, converged[0]).await;
     let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id, "notes": "treadmill, 1.1 m/s"});
     let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
     let session = session["id"].as_str().unwrap();

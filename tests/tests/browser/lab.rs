@@ -43,27 +43,20 @@ async fn browser_lab_session_records_walks_and_asks_which_was_better() {
     }
     page.wait_until("document.querySelector('h1').innerText === 'Which walk was better?'").await;
     assert_eq!(page.count("[role=alert]:not([hidden])").await, 0);
-    for (width, height) in [(768, 1024), (1024, 768)] {
+    for (width, height) in [(390, 844), (768, 1024), (1024, 768)] {
         page.resize(width, height).await;
-        let bottom =
-            "Math.max(...[...document.querySelectorAll('.answer-option')].map(e => e.getBoundingClientRect().bottom))";
-        let bottom: f64 = page.value(bottom).await.parse().unwrap();
+        let (bottom, ..) = page.lowest(".answers-in-line .answer, details summary").await;
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
     }
 
-    // Answers by touch, retracts the answer, then answers with the keyboard.
+    // Answers with one touch, retracts the answer, then answers with the keyboard.
     page.become_touch_screen().await;
-    page.touch("input[value=first]").await;
-    page.wait_until("document.querySelector('input:checked')?.value === 'first'").await;
-    page.touch("main form button").await;
+    page.touch(&page.answer("first").await).await;
     page.wait_for(".notice.good button").await;
     assert!(page.text(".notice.good").await.contains("walk 2, the first with the device, was better"));
     page.click(".notice.good button").await;
-    page.wait_for(".answer-options input[value=no_difference]").await;
-    page.run("document.querySelector('input[name=answer]').focus()").await;
-    page.press("ArrowRight").await;
-    page.press("ArrowRight").await;
-    assert_eq!(page.value("document.querySelector('input:checked')?.value ?? ''").await, "second");
+    page.answer("second").await;
+    page.run("document.querySelector('button[value=second]').focus()").await;
     page.press("Enter").await;
     page.wait_until("document.querySelector('.notice.good')?.textContent.includes('walk 3, the second with the device, was better') ?? false").await;
     page.reload().await;
@@ -120,8 +113,7 @@ async fn browser_lab_session_reports_an_unsafe_walk_before_and_after_the_answer(
         }
         let page = browser.open(&site.at(&format!("/lab/{session}"))).await;
         if walks == 3 {
-            page.click("input[value=first]").await;
-            page.click("main form button").await;
+            page.click(&page.answer("first").await).await;
             page.wait_for(".notice.good").await;
         }
         page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
@@ -151,16 +143,16 @@ async fn browser_lab_session_accepts_answers_without_scripts_and_in_two_tabs() {
     }
     let at = site.at(&format!("/lab/{session}"));
     let (plain, other) = (browser.open_without_scripts(&at).await, browser.open(&at).await);
-    plain.click_plainly("input[value=unsafe_first]").await;
+    plain.click_plainly("details:has(#note) summary").await;
     plain.click_plainly("#note").await;
     plain.type_text("stumbled").await;
-    plain.click_plainly("main form button").await;
+    plain.click_plainly("details:has([value=unsafe_first]) summary").await;
+    plain.click_plainly("button[value=unsafe_first]").await;
     plain.wait_for(".notice.good").await;
     assert!(plain.text(".notice.good").await.contains("walk 2 was unsafe"));
     // The other tab says that its answer was not recorded, and shows the recorded one.
-    other.click("input[value=second]").await;
-    other.click("main form button").await;
-    other.wait_for("[role=alert]").await;
+    other.click(&other.answer("second").await).await;
+    other.wait_for("[role=alert]:not([data-unsent])").await;
     assert!(other.text(".notice.good").await.contains("walk 2 was unsafe"));
     // Both gaits are unsafe until unblinding shows which one was meant.
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
@@ -188,9 +180,9 @@ async fn browser_staff_report_a_gait_as_unsafe_and_cannot_retract_the_report() {
     );
     compare.run(&choose).await;
     compare.wait_until(&format!("document.querySelector('figcaption a')?.innerText === '{best}'")).await;
-    compare.click("input[value=unsafe_a]").await;
     compare.fill("#author", "K1").await;
-    compare.click("main form[method=post] button[type=submit]").await;
+    compare.unfold().await;
+    compare.click(&compare.answer("unsafe_a").await).await;
     compare.wait_for(".notice.good").await;
     assert!(compare.text(".notice.good").await.contains(&format!("{best} is unsafe")));
     // The study page updates without reloading, and recommends another gait.

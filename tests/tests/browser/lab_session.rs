@@ -50,9 +50,9 @@ async fn browser_completes_a_lab_session_from_plan_to_unblinding() {
     page.wait_until("document.querySelector('h1').innerText === 'Which walk was better?'").await;
     assert!(!page.text("main").await.contains("trial"));
     is_for_everybody(axe, &page, "the question").await;
-    page.click("input[value=second]").await;
+    page.unfold().await;
     page.fill("#note", "softer at the heel").await;
-    page.click("main form button").await;
+    page.click(&page.answer("second").await).await;
     page.wait_until("document.querySelector('.notice.good')?.innerText.includes('walk 3, the second with the device, was better') ?? false").await;
     is_for_everybody(axe, &page, "answered").await;
     page.is_clean(&site.origin).await;

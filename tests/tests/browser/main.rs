@@ -5,6 +5,7 @@
 
 mod axe;
 mod chromium;
+mod compare;
 mod every_page;
 mod gait;
 mod lab;

@@ -125,11 +125,11 @@ async fn browser_sends_an_answer_after_the_session_ended() {
     };
     sign_in().await;
     page.click("main form[action^='/rate/'] button").await;
-    page.wait_until("document.querySelector('[data-answer] [type=submit]')?.disabled === false").await;
-    page.click("input[value=no_difference]").await;
+    let button = page.answer("no_difference").await;
+    page.unfold().await;
     page.fill("#note", "both fine").await;
     page.forget_cookies().await;
-    page.click("[data-answer] [type=submit]").await;
+    page.click(&button).await;
     page.wait_for("#password").await;
     assert!(page.text("main").await.contains("Your entry was not saved"));
     sign_in().await;

@@ -202,21 +202,25 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
         "[...document.querySelectorAll('.walker [data-segment]')].map(part => part.getAttribute('transform')).join()";
     let before = page.value(drawn).await;
     page.wait_until(&format!("{drawn} !== {before:?}")).await;
-    page.wait_for("input[name=answer]").await;
-    page.run("document.querySelector('input[name=answer]').focus()").await;
-    page.press("ArrowRight").await;
-    let chosen = "document.querySelector('input[name=answer]:checked')?.value ?? 'nothing'";
-    assert_eq!(page.value(chosen).await, "no_difference");
-    page.run("document.querySelector('#author').focus()").await;
+    page.answer("no_difference").await;
+    // Without a name nothing is sent, and Enter in the field of the name answers nothing.
+    page.press("2").await;
+    page.wait_until("document.activeElement?.id === 'author'").await;
     page.type_text("K1").await;
-    assert_eq!(page.value("document.querySelector('#author').value").await, "K1");
     page.press("Enter").await;
+    page.wait_until("!document.querySelector('details.person').open").await;
+    assert!(page.text("details.person summary").await.ends_with("the subject, K1"));
+    assert_eq!(site.service.feedback(study).await.iter().filter(|row| row.author == "K1").count(), 0);
+    page.run("document.activeElement.blur()").await;
+    page.press("2").await;
     page.wait_for(".notice.good").await;
     let said = page.text(".notice.good").await;
     assert!(said.contains("no difference between trial"), "{said}");
-    // The next comparison comes by itself.
-    page.wait_for("input[name=answer]").await;
+    // The next comparison comes by itself, and the name is not asked again.
+    page.answer("a").await;
     assert!(page.text(".notice.good").await.contains("The next comparison is below"));
+    assert!(page.text("details.person summary").await.ends_with("the subject, K1"));
+    assert_eq!(page.value("document.querySelector('details.person').open").await, "false");
 
     while site.service.trials(study).await.len() < 3 {
         tokio::time::sleep(Duration::from_millis(10)).await;
@@ -225,13 +229,27 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     let plain = browser.open_without_scripts(&site.at(&format!("/studies/{study}/compare"))).await;
     // The answers stand below the pictures of both gaits.
     plain.resize(1280, 2000).await;
-    plain.click_plainly("input[value=b]").await;
     plain.click_plainly("#author").await;
     plain.type_text("K2").await;
-    plain.click_plainly("main > form button[type=submit]").await;
+    // Enter presses the first button of the form, which answers nothing.
+    plain.press("Enter").await;
+    plain.wait_for("[role=alert]:not([data-unsent])").await;
+    assert!(plain.text("[role=alert]").await.contains("one of the answers on the form"));
+    plain.click_plainly("button[value=b]").await;
     plain.wait_for(".notice.good").await;
+    // Undone on the next page, and given again.
+    plain.click_plainly(".notice.good [data-undo] button").await;
+    plain.wait_for(".notice.good a[href*='a=']").await;
+    let undone = site.service.feedback(study).await.into_iter().find(|row| row.author == "K2").unwrap();
+    assert_eq!(undone.retraction.unwrap().reason, "undone right after the answer");
+    plain.click_plainly(".notice.good a[href*='a=']").await;
+    plain.wait_for("#author").await;
+    plain.click_plainly("#author").await;
+    plain.type_text("K2").await;
+    plain.click_plainly("button[value=b]").await;
+    plain.wait_for(".notice.good [data-undo]").await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    assert_eq!(site.service.feedback(study).await.iter().filter(|row| row.author.starts_with('K')).count(), 2);
+    assert_eq!(site.service.feedback(study).await.iter().filter(|row| row.author.starts_with('K')).count(), 3);
     browser.close().await;
 }
 
@@ -358,9 +376,8 @@ async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
     assert_eq!(still.count("svg.tiles").await, 2);
     let plain = browser.open_without_scripts(&at).await;
     assert_eq!(plain.count("svg.tiles").await, 2);
-    assert!(!plain.text("main").await.contains("key 1"));
-    let seen = "[...document.querySelectorAll('svg.gait-figure')].filter(c => c.getClientRects().length).length";
-    assert_eq!(plain.value(seen).await, "0", "no empty frames");
+    let seen = "[...document.querySelectorAll('svg.gait-figure, [data-key], [data-keys]')].filter(c => c.getClientRects().length).length";
+    assert_eq!(plain.value(seen).await, "0", "no empty frames, no keys that do nothing");
     browser.close().await;
 }
 
@@ -373,9 +390,9 @@ async fn browser_does_not_offer_an_answered_comparison_as_the_next_one() {
     let at = site.at(&format!("/studies/{study}/compare"));
     let (one, other) = (browser.open(&at).await, browser.open(&at).await);
     // Only one tab is in front: the form is filled in by script.
-    let send = "document.querySelector('#author').value = 'K1'; document.querySelector('input[value=a]').checked = true; \
-                document.querySelector('form[data-answer] [type=submit]').click()";
+    let send = "document.querySelector('#author').value = 'K1'; document.querySelector('button[value=a]').click()";
     for page in [&one, &other] {
+        page.answer("a").await;
         page.run(send).await;
         page.wait_until("document.querySelector('.notice.good') !== null").await;
         site.service.wait_for(study, &[StudyState::Waiting]).await;

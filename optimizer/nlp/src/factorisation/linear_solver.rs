@@ -43,7 +43,7 @@ pub(crate) fn choose(
         if settings.linear_solver == LinearSolver::Multifrontal {
             return Ok(Box::new(multifrontal(&vec![0; matrix.order], &alike, settings.threads)?));
         }
-        return without_blocks(matrix, settings.linear_solver);
+        return without_blocks(matrix, settings);
     };
     let front_of = ordering::block_of_index_raised(form, blocks);
     let trusted = delayed(matrix, front_of.clone());
@@ -64,10 +64,11 @@ pub(crate) fn choose(
         RowForm::Inequality(_) | RowForm::Free => PivotKind::Other,
     });
     let kinds: Vec<PivotKind> = variables.chain(rows).collect();
-    let two_stages = multifrontal(&front_of, &kinds, settings.threads)?;
+    let first_kinds = if settings.constants.two_stage_fronts { &kinds } else { &alike };
+    let two_stages = multifrontal(&front_of, first_kinds, settings.threads)?;
     #[cfg(feature = "supernodal")]
     if settings.linear_solver == LinearSolver::Auto && two_stages.flops() > WORTHWHILE * other.flops() {
-        return Ok(with_trusted(settings.linear_solver, other, trusted));
+        return Ok(with_trusted(settings, other, trusted));
     }
     let pattern = Arc::new((matrix.column_starts.clone(), matrix.row_indices.clone(), front_of));
     let lazily = |kinds: Vec<PivotKind>| -> Box<dyn KktSolver> {
@@ -77,11 +78,14 @@ pub(crate) fn choose(
             Ok(Box::new(Multifrontal::new(starts, indices, front_of, &kinds, room, threads)?))
         }))
     };
-    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), lazily(kinds), lazily(alike)];
+    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages)];
+    if settings.constants.roomy_fronts {
+        methods.extend([lazily(kinds), lazily(alike)]);
+    }
     if settings.linear_solver == LinearSolver::Auto {
         methods.push(trusted);
     }
-    Ok(Box::new(Ladder::new(methods)))
+    Ok(Box::new(Ladder::new(methods, settings.constants.doubts)))
 }
 
 fn delayed(matrix: &KktMatrix, front_of: Vec<usize>) -> Box<dyn KktSolver> {
@@ -91,14 +95,14 @@ fn delayed(matrix: &KktMatrix, front_of: Vec<usize>) -> Box<dyn KktSolver> {
 
 /// Without elimination blocks: the supernodal factorisation in minimum-degree order.
 #[cfg(feature = "supernodal")]
-fn without_blocks(matrix: &KktMatrix, setting: LinearSolver) -> Result<Box<dyn KktSolver>, NlpError> {
+fn without_blocks(matrix: &KktMatrix, settings: &NlpSettings) -> Result<Box<dyn KktSolver>, NlpError> {
     let minimum_degree = Supernodal::new(&matrix.column_starts, &matrix.row_indices, None)?;
     let front_of = minimum_degree.supernode_of_index();
-    Ok(with_trusted(setting, minimum_degree, delayed(matrix, front_of)))
+    Ok(with_trusted(settings, minimum_degree, delayed(matrix, front_of)))
 }
 
 #[cfg(not(feature = "supernodal"))]
-fn without_blocks(matrix: &KktMatrix, _: LinearSolver) -> Result<Box<dyn KktSolver>, NlpError> {
+fn without_blocks(matrix: &KktMatrix, _: &NlpSettings) -> Result<Box<dyn KktSolver>, NlpError> {
     Err(not_built(matrix.order))
 }
 
@@ -110,11 +114,13 @@ fn not_built(order: usize) -> NlpError {
 /// By setting: the supernodal factorisation, the trusted one, or (auto) the supernodal one with the trusted one as
 /// fallback.
 #[cfg(feature = "supernodal")]
-fn with_trusted(setting: LinearSolver, supernodal: Supernodal, trusted: Box<dyn KktSolver>) -> Box<dyn KktSolver> {
-    match setting {
+fn with_trusted(settings: &NlpSettings, supernodal: Supernodal, trusted: Box<dyn KktSolver>) -> Box<dyn KktSolver> {
+    match settings.linear_solver {
         LinearSolver::Supernodal => Box::new(supernodal),
         LinearSolver::DelayedPivots => trusted,
-        LinearSolver::Auto | LinearSolver::Multifrontal => Box::new(Ladder::new(vec![Box::new(supernodal), trusted])),
+        LinearSolver::Auto | LinearSolver::Multifrontal => {
+            Box::new(Ladder::new(vec![Box::new(supernodal), trusted], settings.constants.doubts))
+        }
     }
 }
 
@@ -131,16 +137,17 @@ struct Ladder {
     fallbacks: usize,
     /// Number of consecutive distrusted matrices.
     doubts: usize,
+    /// After this many the next [`TRUSTED_ONLY`] go to the most trusted method directly.
+    most_doubts: usize,
     /// Number of following matrices that go to the most trusted method directly.
     trusted_only: usize,
 }
 
-/// After this many consecutive distrusted matrices the next [`TRUSTED_ONLY`] go to the most trusted method directly.
-const DOUBTS: usize = 3;
+/// See `most_doubts`.
 const TRUSTED_ONLY: usize = 20;
 
 impl Ladder {
-    fn new(methods: Vec<Box<dyn KktSolver>>) -> Self {
+    fn new(methods: Vec<Box<dyn KktSolver>>, most_doubts: usize) -> Self {
         Self {
             up_to_date: vec![false; methods.len()],
             methods,
@@ -148,6 +155,7 @@ impl Ladder {
             in_use: 0,
             fallbacks: 0,
             doubts: 0,
+            most_doubts,
             trusted_only: 0,
         }
     }
@@ -160,7 +168,7 @@ impl KktSolver for Ladder {
             self.up_to_date.fill(false);
             if self.trusted_only == 0 {
                 self.doubts = if self.first > 0 { self.doubts + 1 } else { 0 };
-                if self.doubts == DOUBTS {
+                if self.doubts == self.most_doubts && self.doubts > 0 {
                     (self.doubts, self.trusted_only) = (0, TRUSTED_ONLY);
                 }
             }

@@ -1,8 +1,10 @@
-//! Small dense problems with known optima; derivatives by hyper-dual numbers.
+//! Problems with known optima; derivatives by hyper-dual numbers.
 #![allow(dead_code, clippy::pedantic, clippy::unwrap_used, clippy::type_complexity, missing_docs, unreachable_pub)]
 
 pub mod hock_schittkowski;
 pub mod hyper_dual;
+pub mod optimal_control;
+pub mod sets;
 pub mod sparse;
 pub mod swing_up;
 

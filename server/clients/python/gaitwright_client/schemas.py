@@ -49,7 +49,7 @@ GaitDocument = dict[str, Any]
 Instant = str
 
 # Kind of a job.
-JobKind = Literal["backup", "certificate", "explanation", "solve"]
+JobKind = Literal["backup", "certificate", "execution_report", "explanation", "solve"]
 
 # State of a job.
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -86,7 +86,7 @@ Outcome = Literal["converged", "not_converged"]
 # Which of two gaits is better.
 PairAnswer = Literal["a", "b", "no_difference"]
 
-# Who answers
+# Who answers.
 PersonSource = Literal["subject", "clinician", "script"]
 
 PresentationId = str
@@ -114,7 +114,7 @@ SafetyReviewId = str
 
 SessionId = str
 
-# What `gaitwright solve --problem` reads: subject, device, bounds, settings, reference gait, limits, start.
+# Input for `gaitwright solve --problem`: subject, device, bounds, settings, reference gait, limits and warm start.
 SolveProblem = dict[str, Any]
 
 # How a solve ended.
@@ -183,6 +183,15 @@ class AccessRow(_AccessRowRequired, total=False):
     subject_id: Optional[SubjectId]
 
 
+class ActiveConstraint(TypedDict):
+    """Constraint that is active at a node or over the stride."""
+
+    # Multiplier of the scaled constraint: decrease of the objective per unit that the constraint is relaxed.
+    multiplier: float
+    # Domain, node and quantity.
+    place: str
+
+
 class Answered(TypedDict):
     """Confirmation of a rater's answer. It contains neither the gaits nor the answer, because the copy kept for
     repeated requests would otherwise reveal to readers of the study which gait was shown on which side.
@@ -214,7 +223,7 @@ class _AssessmentRequired(TypedDict):
     note: str
     # Trial of the other gait.
     second: TrialId
-    # Source.
+    # Who answered.
     source: Source
     # The study.
     study_id: StudyId
@@ -245,7 +254,7 @@ class _AttemptResultRequired(TypedDict):
 class AttemptResult(_AttemptResultRequired, total=False):
     """Result of an attempt."""
 
-    # All figures of the solve that are finite.
+    # Figures of the solve. Figures that are not finite are omitted.
     report: Optional[SolveReport]
 
 
@@ -536,7 +545,7 @@ class _FeedbackRowRequired(TypedDict):
     note: str
     # Sequence number.
     seq: int
-    # Source.
+    # Who or what it came from.
     source: Source
     # The study.
     study_id: StudyId
@@ -614,47 +623,47 @@ class Device(TypedDict):
 
 
 class _DeviceDefinitionRequired(TypedDict):
-    # radius of gyration of the adapter
+    # Radius of gyration of the adapter.
     adapter_gyration_radius_m: float
-    # mass of the adapter, midway between human and prosthetic knee
+    # Mass of the adapter, midway between human and prosthetic knee.
     adapter_mass_kg: float
-    # height of the ankle above the sole
+    # Height of the ankle above the sole.
     ankle_height_m: float
-    # dorsiflexion stop
+    # Dorsiflexion stop.
     ankle_max_rad: float
-    # plantarflexion stop (dorsiflexion positive)
+    # Plantarflexion stop (dorsiflexion positive).
     ankle_min_rad: float
-    # largest ankle torque
+    # Largest ankle torque.
     ankle_torque_limit_n_m: float
     carried_limb: bool
-    # distance of the foot's centre of mass below the ankle
+    # Distance of the foot's centre of mass below the ankle.
     foot_com_down_m: float
-    # distance of the foot's centre of mass ahead of the ankle
+    # Distance of the foot's centre of mass ahead of the ankle.
     foot_com_forward_m: float
-    # moment of inertia of the foot about its centre of mass
+    # Moment of inertia of the foot about its centre of mass.
     foot_inertia_kg_m2: float
-    # mass of the prosthetic foot with shoe
+    # Mass of the prosthetic foot with shoe.
     foot_mass_kg: float
-    # distance of the heel contact behind the ankle
+    # Distance of the heel contact behind the ankle.
     heel_behind_m: float
-    # largest knee and ankle speed
+    # Largest knee and ankle speed.
     joint_speed_limit_rad_s: float
-    # moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh
+    # Moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh.
     knee_housing_inertia_kg_m2: float
-    # mass at the prosthetic knee that moves with the thigh
+    # Mass at the prosthetic knee that moves with the thigh.
     knee_housing_mass_kg: float
-    # largest knee torque
+    # Largest knee torque.
     knee_torque_limit_n_m: float
     name: str
-    # distance of the shank's centre of mass below the knee, in shank lengths
+    # Distance of the shank's centre of mass below the knee, in shank lengths.
     shank_com_fraction: float
-    # radius of gyration of the shank about its centre of mass, in shank lengths
+    # Radius of gyration of the shank about its centre of mass, in shank lengths.
     shank_gyration_fraction: float
-    # distance from knee to ankle
+    # Distance from knee to ankle.
     shank_length_m: float
-    # mass of the prosthetic shank
+    # Mass of the prosthetic shank.
     shank_mass_kg: float
-    # distance of the toe contact ahead of the ankle
+    # Distance of the toe contact ahead of the ankle.
     toe_ahead_m: float
 
 
@@ -751,6 +760,32 @@ class EmgView(TypedDict):
     result: EmgResult
 
 
+class _ExecutionReportRequired(TypedDict):
+    # Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    body_mass_kg: list[float]
+    # Version of this layout and of the simulation.
+    format_version: int
+    # SHA-256 of the gait as compact JSON, as in its certificate.
+    gait_sha256: str
+    # Randomly disturbed walks, for each ground.
+    grounds: list[WalksOnGround]
+    # Seed of the disturbances.
+    seed: int
+    # Strides of a complete simulated walk.
+    strides: int
+    # Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    strides_by_yield: list[StridesOnYield]
+    # Completed strides without any disturbance.
+    undisturbed_strides: int
+
+
+class ExecutionReport(_ExecutionReportRequired, total=False):
+    """Simulated walks with a gait, outside the optimiser's model."""
+
+    # Largest pushes survived. Null if the walker does not complete the undisturbed walk.
+    pushes: Optional[SurvivedPushes]
+
+
 class Extend(TypedDict):
     """A larger trial budget."""
 
@@ -772,7 +807,7 @@ class FeedbackContentPreference(TypedDict):
     """One trial is better than another."""
 
     kind: Literal["preference"]
-    # Other trial.
+    # Worse trial.
     loser: TrialId
     # Better trial.
     winner: TrialId
@@ -792,10 +827,27 @@ class FeedbackContentSuggestion(TypedDict):
     """An action would have been better than a trial."""
 
     kind: Literal["suggestion"]
-    # Trial.
+    # Trial that it would have been better than.
     over: TrialId
     # Index of the suggested action.
     suggested: int
+
+
+class FigureDerivatives(TypedDict):
+    """Derivatives of figures per unit of a tuned bound."""
+
+    # Of the mechanical cost of transport.
+    cost_of_transport: float
+    # Of Gait RMSE, rad.
+    gait_rmse_rad: float
+    # Of the largest angle at a node of torso, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, rad.
+    largest_angles_rad: list[float]
+    # Of the objective.
+    objective: float
+    # Of the smallest angle at a node, rad.
+    smallest_angles_rad: list[float]
+    # Of the mean walking speed, m/s.
+    speed_m_s: float
 
 
 class Fork(TypedDict, total=False):
@@ -923,6 +975,19 @@ class GivenBound(TypedDict):
     value: float
 
 
+class GridStep(TypedDict):
+    """Change of a bound by one step of the grid, and changes of figures to first order."""
+
+    # Change of the mechanical cost of transport.
+    cost_of_transport: float
+    # Change of Gait RMSE, rad.
+    gait_rmse_rad: float
+    # Whether the same constraints stay active up to this value, to first order.
+    keeps_active: bool
+    # The next stricter value, or the next less strict one if there is none.
+    to: float
+
+
 class Health(TypedDict):
     """Health of the service."""
 
@@ -992,6 +1057,8 @@ class _JobRequired(TypedDict):
 class Job(_JobRequired, total=False):
     """Background work of the service."""
 
+    # Share of the work that is done, 0 to 1, where it is known: while walks are simulated. Null otherwise.
+    progress: Optional[float]
     # Reason if it failed. Null otherwise.
     reason: Optional[str]
     # Address of the result. Null until the job is done.
@@ -1173,17 +1240,17 @@ class LimitCycles(TypedDict):
 class LinearAlgebra(TypedDict):
     """Operations and times of the linear algebra of a solve."""
 
-    # Numerical factorisations.
+    # Number of numerical factorisations.
     factorisations: int
-    # Number of times that the fallback method was used.
+    # Number of factorisations that failed and were replaced by a fallback method.
     fallbacks: int
-    # Analysing the structure of matrices, s.
+    # Time for analysing the structure of matrices, s.
     seconds_analysis: float
-    # Assembling and factorising, s.
+    # Time for assembling and factorising matrices, s.
     seconds_factorisation: float
-    # Substitutions, residuals and refinement, s.
+    # Time for substitutions, residuals and refinement, s.
     seconds_solves: float
-    # Forward-backward substitutions.
+    # Number of forward and backward substitutions.
     substitutions: int
 
 
@@ -1318,97 +1385,97 @@ class Multiplier(TypedDict):
 
 
 class MuscleParametersGas(TypedDict, total=False):
-    # largest moment arm at the ankle, m
+    # Largest moment arm at the ankle, m.
     ankle_lever_m: Optional[float]
-    # largest moment arm at the knee, m
+    # Largest moment arm at the knee, m.
     knee_lever_m: Optional[float]
-    # maximum isometric force, N
+    # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # maximum shortening speed, optimal lengths per second
+    # Maximum shortening speed, optimal lengths per second.
     max_speed: Optional[float]
-    # optimal fibre length, m
+    # Optimal fibre length, m.
     optimal_length_m: Optional[float]
-    # tendon slack length, m
+    # Tendon slack length, m.
     slack_length_m: Optional[float]
 
 
 class MuscleParametersGlu(TypedDict, total=False):
-    # largest moment arm at the hip, m
+    # Largest moment arm at the hip, m.
     hip_lever_m: Optional[float]
-    # maximum isometric force, N
+    # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # maximum shortening speed, optimal lengths per second
+    # Maximum shortening speed, optimal lengths per second.
     max_speed: Optional[float]
-    # optimal fibre length, m
+    # Optimal fibre length, m.
     optimal_length_m: Optional[float]
-    # tendon slack length, m
+    # Tendon slack length, m.
     slack_length_m: Optional[float]
 
 
 class MuscleParametersHam(TypedDict, total=False):
-    # largest moment arm at the hip, m
+    # Largest moment arm at the hip, m.
     hip_lever_m: Optional[float]
-    # largest moment arm at the knee, m
+    # Largest moment arm at the knee, m.
     knee_lever_m: Optional[float]
-    # maximum isometric force, N
+    # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # maximum shortening speed, optimal lengths per second
+    # Maximum shortening speed, optimal lengths per second.
     max_speed: Optional[float]
-    # optimal fibre length, m
+    # Optimal fibre length, m.
     optimal_length_m: Optional[float]
-    # tendon slack length, m
+    # Tendon slack length, m.
     slack_length_m: Optional[float]
 
 
 class MuscleParametersHfl(TypedDict, total=False):
-    # largest moment arm at the hip, m
+    # Largest moment arm at the hip, m.
     hip_lever_m: Optional[float]
-    # maximum isometric force, N
+    # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # maximum shortening speed, optimal lengths per second
+    # Maximum shortening speed, optimal lengths per second.
     max_speed: Optional[float]
-    # optimal fibre length, m
+    # Optimal fibre length, m.
     optimal_length_m: Optional[float]
-    # tendon slack length, m
+    # Tendon slack length, m.
     slack_length_m: Optional[float]
 
 
 class MuscleParametersSol(TypedDict, total=False):
-    # largest moment arm at the ankle, m
+    # Largest moment arm at the ankle, m.
     ankle_lever_m: Optional[float]
-    # maximum isometric force, N
+    # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # maximum shortening speed, optimal lengths per second
+    # Maximum shortening speed, optimal lengths per second.
     max_speed: Optional[float]
-    # optimal fibre length, m
+    # Optimal fibre length, m.
     optimal_length_m: Optional[float]
-    # tendon slack length, m
+    # Tendon slack length, m.
     slack_length_m: Optional[float]
 
 
 class MuscleParametersTa(TypedDict, total=False):
-    # largest moment arm at the ankle, m
+    # Largest moment arm at the ankle, m.
     ankle_lever_m: Optional[float]
-    # maximum isometric force, N
+    # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # maximum shortening speed, optimal lengths per second
+    # Maximum shortening speed, optimal lengths per second.
     max_speed: Optional[float]
-    # optimal fibre length, m
+    # Optimal fibre length, m.
     optimal_length_m: Optional[float]
-    # tendon slack length, m
+    # Tendon slack length, m.
     slack_length_m: Optional[float]
 
 
 class MuscleParametersVas(TypedDict, total=False):
-    # largest moment arm at the knee, m
+    # Largest moment arm at the knee, m.
     knee_lever_m: Optional[float]
-    # maximum isometric force, N
+    # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # maximum shortening speed, optimal lengths per second
+    # Maximum shortening speed, optimal lengths per second.
     max_speed: Optional[float]
-    # optimal fibre length, m
+    # Optimal fibre length, m.
     optimal_length_m: Optional[float]
-    # tendon slack length, m
+    # Tendon slack length, m.
     slack_length_m: Optional[float]
 
 
@@ -1476,6 +1543,15 @@ class NewEmg(_NewEmgRequired, total=False):
 
     # How to read the file.
     reading: EmgReading
+
+
+class NewExecutionReport(TypedDict, total=False):
+    """The simulated walks of a request. There are three grounds: level, ±5 mm and ±10 mm."""
+
+    # Seed of the disturbances. The same seed gives the same report.
+    seed: int
+    # Number of simulated walks on each ground, 1 to 1000.
+    walks: int
 
 
 class _NewLabAnswerRequired(TypedDict):
@@ -1560,7 +1636,7 @@ class _NewReferenceGaitRequired(TypedDict):
 class NewReferenceGait(_NewReferenceGaitRequired, total=False):
     """A recording that becomes a reference gait."""
 
-    # Body mass of the recorded person, kg.
+    # Body mass of the measured person, kg.
     body_mass_kg: Optional[float]
     # Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
     # `Treadmill_R_vy` for Camargo 2021.
@@ -1572,7 +1648,7 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
     format: JointAngleFormat
     # Times of right heel strikes, s. If empty, they are detected.
     heel_strikes_s: list[float]
-    # Height of the recorded person, m.
+    # Height of the measured person, m.
     height_m: Optional[float]
     # How to find right heel strikes if `heel_strikes_s` is empty.
     strikes: Strikes
@@ -1610,8 +1686,8 @@ class NewSafetyReview(_NewSafetyReviewRequired, total=False):
 
     # Name or pseudonym of the reviewer. Defaults to the caller's name.
     author: Optional[str]
-    # The open safety reports that the reviewer has seen. The decision is refused if there is another one. By default,
-    # all open reports count as seen.
+    # The open safety reports that the reviewer has seen. The decision is refused if an open report is not among them.
+    # By default, all open reports count as seen.
     reports: Optional[list[SafetyReportId]]
 
 
@@ -1631,7 +1707,7 @@ class NewStudy(_NewStudyRequired, total=False):
     evaluation: Evaluation
     # Who answers comparisons.
     feedback_mode: FeedbackMode
-    # Settings of the gait problem. Unless they set muscles, the measured muscle values of the subject apply.
+    # Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     gait_settings: GaitSettings
     # Settings of the learner. Absent settings take the values that the method recommends.
     learner: LearnerSettings
@@ -1807,8 +1883,7 @@ class _ProblemRequired(TypedDict):
     status: int
     # Name of this kind of problem.
     title: str
-    # Address that identifies the kind of problem. It is stable across versions and serves a page that explains the
-    # kind.
+    # Address that identifies the kind of problem. It does not change between versions, and its page explains the kind.
     type: str
 
 
@@ -1930,6 +2005,8 @@ class _RecommendationRequired(Recommended):
 class Recommendation(_RecommendationRequired, total=False):
     """Best action of a study."""
 
+    # The newest execution report of its gait. Null if nobody requested one.
+    execution_report: Optional[ExecutionReport]
     # If the certificate failed, the best action whose gait passed.
     passing: Optional[Recommended]
 
@@ -1965,7 +2042,7 @@ class _ReferenceGaitMatchRequired(TypedDict):
 
 
 class ReferenceGaitMatch(_ReferenceGaitMatchRequired, total=False):
-    """A reference gait and the distance between the recorded person and a subject."""
+    """A reference gait and the distance between the measured person and a subject."""
 
     # `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait does not state height and mass.
     distance: Optional[float]
@@ -2049,7 +2126,7 @@ class ReturnMap(TypedDict):
 
     # Resolution of the finite differences.
     differences_resolve: float
-    # Largest distance from the gait's first state to the fixed point, rad and rad/s.
+    # Largest component of the difference between the gait's first state and the fixed point, rad and rad/s.
     fixed_point_distance: float
     # Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
     fixed_point_residual: float
@@ -2057,9 +2134,9 @@ class ReturnMap(TypedDict):
     gait_residual: float
     # Largest modulus of the multipliers.
     largest: float
-    # Largest modulus of the multipliers from differences of simulated domains.
+    # Largest modulus of the multipliers, from finite differences of simulated domains.
     largest_by_differences: float
-    # Multipliers from variational equations and saltation, largest first.
+    # Multipliers from variational equations and saltation matrices, largest first.
     multipliers: list[Multiplier]
     # Fraction of a proportional change of all velocities that remains after one stride.
     speed_kept: float
@@ -2113,6 +2190,29 @@ class SearchSpace(TypedDict):
 
     # One dimension for each tuned bound.
     dimensions: list[Dimension]
+
+
+class _SensitivityToBoundRequired(TypedDict):
+    # The active constraints that it sets. Empty if small changes of the bound change nothing.
+    active: list[ActiveConstraint]
+    # Name of the bound.
+    bound: str
+    # Derivatives of the figures of the gait.
+    derivatives: FigureDerivatives
+    # Values of the bound between which the active constraints stay the same, to first order. Null: for every value in
+    # that direction.
+    interval: list[Optional[float]]
+    # Whether a constraint is about to become active or inactive, so that the derivatives to both sides differ.
+    is_weakly_active: bool
+    # Its value.
+    value: float
+
+
+class SensitivityToBound(_SensitivityToBoundRequired, total=False):
+    """Sensitivity with respect to one tuned bound. Derivatives are per unit of the bound."""
+
+    # Change of the bound by one step of the study's grid. Null if the study does not tune the bound.
+    grid_step: Optional[GridStep]
 
 
 class _SessionRequired(TypedDict):
@@ -2207,9 +2307,9 @@ class _SolveReportRequired(TypedDict):
     max_violation: float
     # Objective: cost of transport plus regularisation.
     objective: float
-    # Evaluating functions and derivatives, s.
+    # Time for evaluating functions and derivatives, s.
     seconds_evaluation: float
-    # Linear algebra, s.
+    # Time for linear algebra, s.
     seconds_linear_algebra: float
     # Wall time, s.
     seconds_total: float
@@ -2241,6 +2341,15 @@ class SolveReport(_SolveReportRequired, total=False):
     optimality: Optional[Optimality]
 
 
+class StridesOnYield(TypedDict):
+    """Undisturbed simulated walk on ground of some stiffness."""
+
+    # Completed strides.
+    strides: int
+    # Depth of the ground under body weight, m.
+    yield_m: float
+
+
 class _StudyPlanRequired(TypedDict):
     # Values of bounds that are not tuned.
     base_bounds: Bounds
@@ -2264,8 +2373,8 @@ class _StudyPlanRequired(TypedDict):
     priority: int
     # Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
-    # Whether a trial may have an action whose gait is known from another trial, as in the paper. In studies from
-    # earlier versions, it may.
+    # Whether a trial may have an action whose gait is known from another trial, as in the paper. Always true for
+    # studies created by versions without this setting.
     repeat_results: bool
     # Tuned bounds and their values, with each dimension named after its bound.
     search_space: SearchSpace
@@ -2398,6 +2507,17 @@ class Suggestion(_SuggestionRequired, total=False):
     source: Optional[PersonSource]
 
 
+class SurvivedPushes(TypedDict):
+    """Largest pushes of a fixed ladder that the walker survives, without other disturbances."""
+
+    # Backwards, N s.
+    backwards_n_s: float
+    # Forwards, N s; 0 if it survives none.
+    forwards_n_s: float
+    # Largest push of the ladder, N s.
+    largest_tried_n_s: float
+
+
 class _TellRequired(TypedDict):
     # Whether the evaluation found a gait.
     outcome: Outcome
@@ -2410,7 +2530,7 @@ class Tell(_TellRequired, total=False):
     cost_of_transport: Optional[float]
     # Gait RMSE, rad. Required for `converged` if Gait RMSE answers the comparisons of the study.
     gait_rmse_rad: Optional[float]
-    # Why there is no gait, 1 to 2000 characters. Required for `not_converged`.
+    # Reason why no gait was found, 1 to 2000 characters. Required for `not_converged`.
     reason: str
 
 
@@ -2464,7 +2584,7 @@ class Trial(_TrialRequired, total=False):
     started_at: Optional[Instant]
     # How the solve ended.
     status: Optional[SolveStatus]
-    # Trial that gives the warm start. Absent for a cold start.
+    # Trial whose gait is the warm start. Absent for a cold start.
     warm_started_from: Optional[TrialId]
 
 
@@ -2483,13 +2603,26 @@ class TrialCounts(TypedDict):
     without_result: int
 
 
+class TrialExecutionReport(TypedDict):
+    """Execution report of a gait."""
+
+    created_at: Instant
+    # Version of the program that made it.
+    program: str
+    # The report, as `gaitwright simulate --json` prints it.
+    report: ExecutionReport
+    # How many walks were complete, as a sentence.
+    sentence: str
+    trial_id: TrialId
+
+
 class TrialExplanation(TypedDict):
     """Infeasibility explanation of a trial."""
 
     # Tuned bounds that are active at the last iterate.
     at_limit: list[BoundAtLimit]
-    # Tuned bounds that conflict, and further conflicts if no single bound resolves the first one. Empty in older
-    # explanations.
+    # Conflicts between tuned bounds: the first one, and others if relaxing a single bound does not resolve it. Empty in
+    # older explanations.
     conflicts: list[Conflict]
     created_at: Instant
     # Whether the search for a conflict found a gait with the given bounds, which the solve had missed.
@@ -2509,6 +2642,18 @@ class TrialExplanation(TypedDict):
     trial_id: TrialId
     # Violations of the last iterate, worst first.
     violations: list[Violation]
+
+
+class TrialSensitivities(TypedDict):
+    """Sensitivities of a gait with respect to the tuned bounds."""
+
+    # Each tuned bound, in the order of an action.
+    bounds: list[SensitivityToBound]
+    # Mechanical cost of transport of the gait.
+    cost_of_transport: float
+    # The sensitivities in sentences.
+    sentences: list[str]
+    trial_id: TrialId
 
 
 class Unblind(TypedDict):
@@ -2621,6 +2766,35 @@ class WalkView(_WalkViewRequired, total=False):
     condition: Optional[Condition]
     # Who recorded the walk, and when.
     recorded: Optional[LabSessionStep]
+
+
+class WalksOnGround(TypedDict):
+    """Simulated walks on one ground."""
+
+    # The same for the ankle.
+    ankle_rate_limited_share: float
+    # The same for its ankle.
+    ankle_saturated_share: float
+    # Walks that completed all strides.
+    completed: int
+    # Share of completed walks.
+    completed_share: float
+    # 95 % confidence interval of this share (Wilson).
+    completed_share_interval: list[float]
+    # Walks that ended with a fall.
+    fell: int
+    # Largest height and depth of the plateaus of the ground, m.
+    ground_height_m: float
+    # Walks that ended without a further step.
+    halted: int
+    # Share of the time in which the knee wanted to change its torque faster than it can.
+    knee_rate_limited_share: float
+    # Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    knee_saturated_share: float
+    # Mean number of completed strides.
+    mean_strides: float
+    # Number of simulated walks.
+    walks: int
 
 
 class Withdrawal(TypedDict):

@@ -96,7 +96,7 @@ class Transport:
                     raise
                 broken = True
             time.sleep(0.2 * 2 ** (attempt - 1))
-        raise ValueError("`tries` is less than 1")
+        raise ValueError("`tries` must be 1 or more")
 
     def request(
         self,

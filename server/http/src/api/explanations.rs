@@ -33,8 +33,8 @@ pub(super) struct TrialExplanation {
     /// Violations of the last iterate, worst first.
     #[schema(value_type = Vec<openapi_schemas::Violation>)]
     violations: Vec<Violation>,
-    /// Tuned bounds that conflict, and further conflicts if no single bound resolves the first one. Empty in older
-    /// explanations.
+    /// Conflicts between tuned bounds: the first one, and others if relaxing a single bound does not resolve it. Empty in
+    /// older explanations.
     #[schema(value_type = Vec<openapi_schemas::Conflict>)]
     conflicts: Vec<Conflict>,
     /// Whether the search for a conflict found a gait with the given bounds, which the solve had missed.

@@ -21,7 +21,7 @@ pub struct Health {
 /// Check that the service is healthy
 ///
 /// Succeeds if the database responds. Needs no sign-in, and therefore reveals nothing about solves, from which a rater could
-/// infer the effect of an answer. Fails if the database does not respond.
+/// infer the effect of an answer.
 #[utoipa::path(
     get,
     path = "/health",

@@ -36,21 +36,24 @@ pub(super) struct Job {
     result: Option<String>,
     /// Reason if it failed. Null otherwise.
     reason: Option<String>,
+    /// Share of the work that is done, 0 to 1, where it is known: while walks are simulated. Null otherwise.
+    progress: Option<f64>,
     /// Attempts and worker of an open solve. Null otherwise.
     solve: Option<OpenSolve>,
 }
 
 impl From<JobStatus> for Job {
     fn from(job: JobStatus) -> Self {
-        let JobStatus { id, study, state, reason, solve } = job;
+        let JobStatus { id, study, state, reason, progress, solve } = job;
         let result = match id {
             JobId::Backup(backup) => format!("/api/v1/backups/{backup}"),
             JobId::Certificate(trial) => format!("/api/v1/trials/{trial}/certificate"),
+            JobId::ExecutionReport(trial) => format!("/api/v1/trials/{trial}/execution-report"),
             JobId::Explanation(trial) => format!("/api/v1/trials/{trial}/explanation"),
             JobId::Solve(trial) => format!("/api/v1/trials/{trial}"),
         };
         let result = (state == JobState::Done).then_some(result);
-        Self { id, kind: id.kind(), state, trial_id: id.trial(), study_id: study, result, reason, solve }
+        Self { id, kind: id.kind(), state, trial_id: id.trial(), study_id: study, result, reason, progress, solve }
     }
 }
 
@@ -160,7 +163,7 @@ pub(super) async fn cancel(
 
 /// List workers
 ///
-/// A remote worker is known only while it has a solve.
+/// A remote worker is listed only while it runs a solve.
 #[utoipa::path(
     get,
     path = "/workers",

@@ -48,7 +48,8 @@ pub(super) async fn of_study(
 
 /// Plan a lab session
 ///
-/// The session consists of a walk without the device, then one with each gait, in an order that is drawn at random on planning and concealed.
+/// The session consists of a walk without the device, then one with each gait. The order of the gaits is drawn at random
+/// when the session is planned, and concealed.
 #[utoipa::path(
     post,
     path = "/studies/{id}/lab-sessions",
@@ -267,7 +268,8 @@ pub(super) async fn walk(
 
 /// Record the answer of the subject
 ///
-/// States which walk was better. The answer reaches the learner at unblinding.
+/// States which walk was better, that there is no difference, that the subject cannot tell, or that a walk was unsafe. The
+/// answer reaches the learner at unblinding; a safety report takes effect at once.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/answers",

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 
 /// List members of a study
 ///
-/// Raters can access studies of which they are members. Clinicians, and tokens with any scope besides `rate`, can
+/// Raters can access studies of which they are members. Clinicians, and tokens with any scope other than `rate`, can
 /// access every unrestricted study, and the restricted studies of which they are members. A request for any other study
 /// is answered with 404.
 #[utoipa::path(

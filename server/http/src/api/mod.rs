@@ -12,6 +12,7 @@ mod certificates;
 mod comparison;
 mod devices;
 mod events;
+mod execution_reports;
 mod explanations;
 mod exports;
 mod figures;
@@ -27,6 +28,7 @@ mod preferences;
 mod recommendation;
 mod reference_gaits;
 mod safety_reports;
+mod sensitivities;
 mod sessions;
 mod studies;
 mod subjects;
@@ -94,6 +96,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(exports::controller))
         .routes(routes!(motion::get))
         .routes(routes!(certificates::get, certificates::create))
+        .routes(routes!(execution_reports::get, execution_reports::create))
+        .routes(routes!(sensitivities::get))
         .routes(routes!(explanations::get, explanations::create))
         // figures
         .routes(routes!(figures::of_study))

@@ -9,11 +9,13 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::TunedBounds;
+use gait_optimizer::execution::ExecutionReport;
 use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certified_best::{self, CertificateState};
+use gaitwright_service::studies::execution;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_service::studies::walkable::Grounds;
@@ -37,6 +39,9 @@ pub(super) struct Recommendation {
     failures: Vec<String>,
     /// If the certificate failed, the best action whose gait passed.
     passing: Option<Recommended>,
+    /// The newest execution report of its gait. Null if nobody requested one.
+    #[schema(value_type = Option<openapi_schemas::ExecutionReport>)]
+    execution_report: Option<ExecutionReport>,
     /// Whether gaits of the study are being certified, so that the recommendation may change.
     certifying: bool,
 }
@@ -163,6 +168,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         return Err(Error::conflict(why).into());
     };
     let judged = certified_best::judged(&mut reader, &ranking[place..]).await?;
+    let execution_report = execution::newest(&mut reader, trial.id).await?.map(|kept| kept.simulated.report);
     drop(reader);
     Ok(Recommendation {
         study_id: id,
@@ -170,6 +176,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         best: Recommended::of(&gait, trial),
         certificate: judged.certificate,
         failures: judged.failures,
+        execution_report,
         certifying,
         passing: judged.passing.and_then(|id| {
             let trial = snapshot.trial(id)?;

@@ -2,6 +2,7 @@
 
 use super::page_chart::{Drawn, shared_legend};
 use super::study::{answer_in_words, assessment_in_words};
+use super::undo::undo_seconds;
 use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
 use crate::accessible::Id;
@@ -9,6 +10,7 @@ use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::figures::trial;
 use crate::form_errors;
+use crate::format::source_name;
 use crate::page_error::{Page, PageError, page};
 use crate::problem_details::Problem;
 use crate::visible::Visible;
@@ -33,7 +35,7 @@ use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::idempotency::{self, Kept, fingerprint};
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
-    AssessmentId, Connection, FeedbackId, StudyId, TrialId, assessments, commit, events, feedback, gaits,
+    AssessmentId, Connection, FeedbackId, Instant, StudyId, TrialId, assessments, commit, events, feedback, gaits,
     presentations, reference_gaits, studies, trials,
 };
 use serde::Deserialize;
@@ -101,17 +103,46 @@ struct ComparePage {
     is_going_on: bool,
     last_event: i64,
     typed: Submitted,
+    /// The signed-in user; empty without sign-in.
+    user: String,
     refused: Option<String>,
 }
 
 impl ComparePage {
-    /// Answers that state no preference: value and label.
-    const ASSESSMENTS: [(&str, &str); 4] = [
-        ("cannot_tell", "Cannot tell"),
-        ("unsafe_a", "Gait A is unsafe"),
-        ("unsafe_b", "Gait B is unsafe"),
-        ("unsafe_both", "Both gaits are unsafe"),
-    ];
+    /// Answers under a gait: value, label, keys, and the key that the button shows.
+    const BETTER: [(&str, &str, &str, &str); 2] =
+        [("a", "Gait A is better", "ArrowLeft 1", "←"), ("b", "Gait B is better", "ArrowRight 3", "→")];
+    /// Answers between the gaits.
+    const BETWEEN: [(&str, &str, &str, &str); 2] =
+        [("no_difference", "No difference", "2", "2"), ("cannot_tell", "Cannot tell", "", "")];
+    /// Safety reports.
+    const UNSAFE: [(&str, &str); 3] =
+        [("unsafe_a", "Gait A is unsafe"), ("unsafe_b", "Gait B is unsafe"), ("unsafe_both", "Both gaits are unsafe")];
+
+    /// The gait at a place, if it can be drawn.
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn gait(&self, place: &usize) -> Option<&WalkingGait> {
+        self.walking.get(*place)
+    }
+
+    /// Whether a refused form had this answer.
+    fn is_given(&self, value: &str) -> bool {
+        self.typed.answer == value
+    }
+
+    /// Who answers, in words; empty if nobody is named yet.
+    fn person(&self) -> String {
+        let source = Source::from_str(&self.typed.source).unwrap_or(Source::Subject);
+        match self.typed.author.trim() {
+            "" => String::new(),
+            author => format!("{}, {author}", source_name(source)),
+        }
+    }
+
+    /// Who retracts an answer: the signed-in user, or else its author.
+    fn retractor<'a>(&'a self, saved: &'a Saved) -> &'a str {
+        if self.user.is_empty() { &saved.author } else { &self.user }
+    }
 }
 
 /// A gait that can be compared.
@@ -126,13 +157,21 @@ struct Offered {
 struct Saved {
     id: Recorded,
     text: String,
-    at: String,
+    author: String,
+    at: Instant,
     retracted: bool,
     is_safety_report: bool,
     /// The gaits of the comparison.
     pair: Option<(TrialId, TrialId)>,
     /// Answers of others to the same comparison: author and text.
     other_answers: Vec<(String, String)>,
+}
+
+impl Saved {
+    /// Seconds for which the page offers *Undo*, if the answer is new.
+    fn undo(&self) -> Option<f64> {
+        undo_seconds(self.at).filter(|_| !self.retracted && !self.is_safety_report)
+    }
 }
 
 /// How many trials of a large study are offered.
@@ -150,17 +189,29 @@ pub(super) async fn get(
 ) -> Page {
     // The default author is the signed-in user, and the default source is a clinician.
     let mut typed = Submitted::default();
-    if authorized.caller.user.is_some() {
-        (typed.author, typed.source) = (authorized.caller.name, Source::Clinician.as_str().to_owned());
+    let user = user_of(&authorized.caller);
+    if !user.is_empty() {
+        (typed.author, typed.source) = (user.clone(), Source::Clinician.as_str().to_owned());
     }
     if choice.a.is_some() && choice.a == choice.b {
         let refused = "Gait A and gait B are the same. Choose two different gaits.".to_owned();
-        return Box::pin(show(&mut app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused))).await;
+        return Box::pin(show(&mut app, id, Choice { a: None, b: None, ..choice }, (user, typed), Some(refused))).await;
     }
-    Box::pin(show(&mut app, id, choice, typed, None)).await
+    Box::pin(show(&mut app, id, choice, (user, typed), None)).await
 }
 
-async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
+/// The name of the signed-in user; empty without sign-in.
+fn user_of(caller: &Caller) -> String {
+    if caller.user.is_some() { caller.name.clone() } else { String::new() }
+}
+
+async fn show(
+    app: &mut AppState,
+    id: StudyId,
+    choice: Choice,
+    (user, typed): (String, Submitted),
+    refused: Option<String>,
+) -> Page {
     let mut reader = app.read().await?;
     let last_event = events::last(&mut reader, id).await?;
     let study = studies::get(&mut reader, id).await?;
@@ -246,6 +297,7 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
         is_going_on,
         last_event,
         typed,
+        user,
         refused,
     })
 }
@@ -263,7 +315,8 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
             answer_in_words(&row, snapshot).map(|text| Saved {
                 id: saved,
                 text,
-                at: row.created_at.minute(),
+                author: row.author.clone(),
+                at: row.created_at,
                 retracted: row.retraction.is_some(),
                 is_safety_report: false,
                 pair: compared(&row.content),
@@ -278,7 +331,8 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
             assessment_in_words(&assessment, snapshot).map(|text| Saved {
                 id: saved,
                 text,
-                at: assessment.created_at.minute(),
+                author: assessment.author.clone(),
+                at: assessment.created_at,
                 retracted: assessment.retraction.is_some(),
                 is_safety_report: assessment.answer.is_about_safety(),
                 pair: Some((assessment.first, assessment.second)),
@@ -382,8 +436,8 @@ const LABELS: [(&str, &str); 6] = [
     ("a", "Gait A"),
     ("b", "Gait B"),
     ("answer", "Answer"),
-    ("source", "Answer given by"),
-    ("author", "Name or code of this person"),
+    ("source", "This person is"),
+    ("author", "Name or code"),
     ("note", "Note"),
 ];
 
@@ -415,7 +469,8 @@ pub(super) async fn post(
         Err(other) => return Err(other.into()),
     };
     let choice = Choice { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
-    Ok((status, Box::pin(show(&mut app, id, choice, form, Some(why))).await?).into_response())
+    let typed = (user_of(&authorized.caller), form);
+    Ok((status, Box::pin(show(&mut app, id, choice, typed, Some(why))).await?).into_response())
 }
 
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {

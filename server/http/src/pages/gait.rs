@@ -6,8 +6,11 @@ use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
 use super::page_chart::{Drawn, shared_legend};
 use super::reached_bounds::{self, BoundUse};
+use super::sensitivities::SensitivityTable;
+use super::simulated_walks::SimulatedWalks;
 use crate::AppState;
 use crate::authorization::Authorized;
+use crate::extractors::Params;
 use crate::format::{self, words};
 use crate::page_error::{Page, page};
 use crate::visible::Visible;
@@ -19,11 +22,14 @@ use gaitwright_charts::{Figure, Ghost, WalkerFigure, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Answer, Permission, Read, Run};
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
+use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{TrialId, certificates, events, gaits, reference_gaits, studies, trials};
+use serde::Deserialize;
 
 #[derive(Template)]
 #[template(path = "gait.html")]
@@ -43,6 +49,12 @@ struct GaitPage {
     summary: Option<GaitSummary>,
     may_run: bool,
     certificate: Option<certificate::InWords>,
+    /// Walks outside the optimiser's model, for a converged gait.
+    walks: Option<SimulatedWalks>,
+    /// Whether the page offers the sensitivities of a converged gait, which take a second.
+    offers_sensitivities: bool,
+    /// The sensitivities, or why there are none.
+    sensitivities: Option<Result<SensitivityTable, String>>,
     groups: Vec<Group>,
     solve: Option<Drawn>,
     /// The stride as a row of pictures.
@@ -75,11 +87,20 @@ impl GaitPage {
     }
 }
 
+/// What the page shows beyond what it always shows.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Shown {
+    #[serde(default)]
+    sensitivities: bool,
+}
+
 /// `GET /trials/{id}`.
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
+    Params(shown): Params<Shown>,
 ) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
@@ -102,6 +123,14 @@ pub(super) async fn get(
         reports.retain(|closed| closed.trial == id);
     }
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
+    let converged = trial.state == TrialState::Converged;
+    let walks = if converged {
+        Some(SimulatedWalks::new(app.scheduler.simulating(id), execution::newest(&mut reader, id).await?))
+    } else {
+        None
+    };
+    let solution =
+        if converged && shown.sensitivities { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
     let last_event = events::last(&mut reader, study.id).await?;
     let explained = explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await?;
     let may_run = authorized.caller.may(Run::NEEDED);
@@ -111,7 +140,6 @@ pub(super) async fn get(
     drop(reader);
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
-    let converged = trial.state == TrialState::Converged;
     let tried = trial.clone();
     let drawn = move |pool: &OnPool| {
         let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
@@ -119,9 +147,11 @@ pub(super) async fn get(
         // Charts show what they can of a malformed gait; figures of it would be false.
         let well_formed = gait.as_ref().filter(|gait| converged && gait.validate().is_ok());
         let summary = well_formed.map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
-        Ok::<_, Error>((draw(&tried, gait.as_ref(), &reference, &iterations.unwrap_or_default())?, summary))
+        let sensitivities = solution.map(|solution| SensitivityTable::new(solution, pool));
+        let drawn = draw(&tried, gait.as_ref(), &reference, &iterations.unwrap_or_default())?;
+        Ok::<_, Error>((drawn, summary, sensitivities))
     };
-    let (drawn, summary) = app.compute(drawn).await.map_err(Error::from)??;
+    let (drawn, summary, sensitivities) = app.compute(drawn).await.map_err(Error::from)??;
     page(&GaitPage {
         state: words(trial.state.as_str()),
         rmse: format::figure(trial.gait_rmse_rad),
@@ -137,6 +167,9 @@ pub(super) async fn get(
         summary,
         may_run,
         certificate,
+        walks,
+        offers_sensitivities: converged && sensitivities.is_none(),
+        sensitivities,
         groups: drawn.groups,
         solve: drawn.solve,
         tiles: drawn.tiles,

@@ -28,11 +28,14 @@ mod rate;
 mod reached_bounds;
 mod reference_gaits;
 mod safety_review;
+mod sensitivities;
 mod side_by_side;
 mod sign_in;
+mod simulated_walks;
 mod study;
 mod subject;
 mod system;
+mod undo;
 mod unsent_form;
 mod users;
 mod walking_pair;
@@ -69,6 +72,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/trials/{id}/explain", post(explanation::post))
+        .route("/trials/{id}/simulate", post(simulated_walks::post))
         .route("/trials/{id}/safety-report", post(safety_review::report))
         .route("/trials/{id}/safety-review", post(safety_review::post))
         .route("/reference-gaits", get(reference_gaits::list).post(reference_gaits::import))

@@ -1,5 +1,6 @@
 //! The pages of a rater: the studies, and one blinded pair. They never name a trial.
 
+use super::undo::undo_seconds;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -20,7 +21,7 @@ use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::Sided;
 use gaitwright_store::presentations::{self, Judgement, Presentation};
 use gaitwright_store::studies::{Chosen, FeedbackMode};
-use gaitwright_store::{Connection, Packed, StudyId, commit, consents, gaits, members, studies};
+use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
 
 /// In how many of the newest studies a rater's newest answer is searched.
@@ -30,6 +31,8 @@ const SEARCHED: u32 = 200;
 #[template(path = "rate.html")]
 struct RatePage {
     studies: Vec<(StudyId, String)>,
+    /// The study whose next pair comes by itself.
+    next: Option<StudyId>,
     /// Whether the caller can see any study.
     assigned: bool,
     nothing: bool,
@@ -37,18 +40,41 @@ struct RatePage {
     reported: bool,
     /// The answer just given, or else the newest one that can be retracted.
     saved: Option<Saved>,
+    /// Seconds that are left to undo the answer just given.
+    undo: Option<f64>,
     /// Whether the caller may read the study, and so could know which gait is which.
     not_blind: bool,
     /// The caller signed in with a one-time link, and has no password.
     no_password: bool,
 }
 
+impl RatePage {
+    fn is_next(&self, study: &StudyId) -> bool {
+        self.next.as_ref() == Some(study)
+    }
+
+    /// Seconds until the next pair comes by itself, after the time to undo an answer.
+    fn pause(&self) -> u32 {
+        match (self.nothing, self.undo) {
+            (true, _) => LOOK_AGAIN_S,
+            (false, Some(_)) => 0,
+            (false, None) => READ_S,
+        }
+    }
+}
+
+/// Time between two requests for the next pair while there is none, s.
+const LOOK_AGAIN_S: u32 = 5;
+/// Time to read a confirmation that cannot be undone, s.
+const READ_S: u32 = 2;
+
 /// An answer, read from the record.
 struct Saved {
+    study: StudyId,
     token: String,
     number: u32,
     answer: Judgement,
-    at: String,
+    at: Instant,
     can_be_retracted: bool,
 }
 
@@ -105,6 +131,8 @@ impl Stride {
 pub(super) struct Before {
     #[serde(default)]
     nothing: bool,
+    /// The study that had no next pair.
+    study: Option<StudyId>,
     /// The pair that was just answered.
     saved: Option<String>,
     #[serde(default)]
@@ -118,6 +146,7 @@ pub(super) async fn list(
     Params(before): Params<Before>,
 ) -> Page {
     let mut reader = app.read().await?;
+    let is_answer = before.saved.is_some();
     let saved = match before.saved {
         Some(token) => {
             let shown = blind::own(&mut reader, &authorized.caller, &token).await?;
@@ -126,20 +155,28 @@ pub(super) async fn list(
         None => newest(&mut reader, &authorized.caller).await?,
     };
     let reach = authorized.caller.reach();
-    let studies = studies::asking_raters(&mut reader, reach)
+    let studies: Vec<_> = studies::asking_raters(&mut reader, reach)
         .await?
         .into_iter()
         // Names of studies can reveal what is tuned, so raters see the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
+    // After an answer, and while there is no next pair, the page goes on with the same study.
+    let answered = saved.as_ref().filter(|_| is_answer);
+    let undo = answered.and_then(|saved| undo_seconds(saved.at));
+    let next = before.study.or(answered.filter(|_| undo.is_some()).map(|saved| saved.study));
+    let undo = undo.filter(|_| answered.is_some_and(|saved| saved.can_be_retracted));
+    let next = next.filter(|next| studies.iter().any(|(study, _)| study == next));
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
     let assigned = members::reaches_any(&mut reader, reach).await?;
     let not_blind = blind::sees_or_saw_gaits(&mut reader, &authorized.caller).await?;
     page(&RatePage {
         studies,
+        next,
         assigned,
         nothing: before.nothing,
         reported: before.reported,
+        undo,
         saved,
         not_blind,
         no_password,
@@ -168,8 +205,9 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, E
 async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, Error> {
     let can_be_retracted = blind::can_be_retracted(db, &shown.presentation).await?;
     Ok(shown.answer().zip(shown.presentation.answered_at).map(|(judgement, at)| Saved {
+        study: shown.presentation.study_id,
         answer: judgement,
-        at: at.minute(),
+        at,
         number: shown.presentation.number,
         token: shown.presentation.token,
         can_be_retracted,
@@ -186,7 +224,7 @@ pub(super) async fn next(
     commit(writer).await?;
     Ok(match shown {
         Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.presentation.token)),
-        None => Redirect::to("/rate?nothing=true"),
+        None => Redirect::to(&format!("/rate?nothing=true&study={id}")),
     })
 }
 

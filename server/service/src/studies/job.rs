@@ -14,6 +14,8 @@ pub enum JobKind {
     Backup,
     /// The certificate of a gait.
     Certificate,
+    /// The execution report of a gait.
+    ExecutionReport,
     /// The explanation of a trial without a gait.
     Explanation,
     /// The solve of a trial.
@@ -28,6 +30,8 @@ pub enum JobId {
     Backup(BackupId),
     /// The certificate of the gait of a trial.
     Certificate(TrialId),
+    /// The execution report of the gait of a trial.
+    ExecutionReport(TrialId),
     /// The explanation of a trial.
     Explanation(TrialId),
     /// The solve of a trial.
@@ -40,6 +44,7 @@ impl JobId {
         match self {
             Self::Backup(_) => JobKind::Backup,
             Self::Certificate(_) => JobKind::Certificate,
+            Self::ExecutionReport(_) => JobKind::ExecutionReport,
             Self::Explanation(_) => JobKind::Explanation,
             Self::Solve(_) => JobKind::Solve,
         }
@@ -49,7 +54,9 @@ impl JobId {
     pub fn trial(self) -> Option<TrialId> {
         match self {
             Self::Backup(_) => None,
-            Self::Certificate(trial) | Self::Explanation(trial) | Self::Solve(trial) => Some(trial),
+            Self::Certificate(trial) | Self::ExecutionReport(trial) | Self::Explanation(trial) | Self::Solve(trial) => {
+                Some(trial)
+            }
         }
     }
 }
@@ -59,6 +66,7 @@ impl fmt::Display for JobId {
         match self {
             Self::Backup(id) => write!(f, "backup-{id}"),
             Self::Certificate(trial) => write!(f, "certificate-{trial}"),
+            Self::ExecutionReport(trial) => write!(f, "execution_report-{trial}"),
             Self::Explanation(trial) => write!(f, "explanation-{trial}"),
             Self::Solve(trial) => write!(f, "solve-{trial}"),
         }
@@ -74,6 +82,7 @@ impl FromStr for JobId {
         match kind {
             "backup" => id.parse().ok().map(Self::Backup),
             "certificate" => id.parse().ok().map(Self::Certificate),
+            "execution_report" => id.parse().ok().map(Self::ExecutionReport),
             "explanation" => id.parse().ok().map(Self::Explanation),
             "solve" => id.parse().ok().map(Self::Solve),
             _ => None,

@@ -1,8 +1,9 @@
-//! Status and cancellation of jobs: backups, and solves, certificates and explanations of trials.
+//! Status and cancellation of jobs: backups, and solves, certificates, execution reports and explanations of trials.
 //!
 //! A job has no row of its own. Its state follows from the record and the running process.
 
 use super::command;
+use super::execution::{self, Simulation};
 use super::explanation::{self, Effort, ExplanationState};
 use super::job::{JobId, JobState};
 use super::scheduler::Scheduler;
@@ -26,6 +27,8 @@ pub struct JobStatus {
     pub state: JobState,
     /// Reason if it failed.
     pub reason: Option<String>,
+    /// Share of the work that is done, 0 to 1, where it is known.
+    pub progress: Option<f64>,
     /// Attempts and worker of a solve that has not ended.
     pub solve: Option<OpenSolve>,
 }
@@ -53,12 +56,14 @@ pub async fn find(db: &mut Connection, runners: Runners<'_>, id: JobId) -> Resul
         (JobId::Backup(backup), _) => runners.backups.find(db, backup).await?,
         (JobId::Solve(_), Some(trial)) => solve(trial),
         (JobId::Certificate(id), _) => certificate(db, runners.scheduler, id).await?,
+        (JobId::ExecutionReport(id), _) => execution_report(db, runners.scheduler, id).await?,
         (JobId::Explanation(_), Some(trial)) => explanation(db, runners.scheduler, trial).await?,
         (JobId::Solve(_) | JobId::Explanation(_), None) => None,
     };
     let (state, reason) = found.ok_or_else(missing)?;
     let solve = if let JobId::Solve(trial) = id { jobs::open_of(db, trial).await? } else { None };
-    Ok(JobStatus { id, study: trial.map(|trial| trial.study_id), state, reason, solve })
+    let progress = progress(runners.scheduler, id);
+    Ok(JobStatus { id, study: trial.map(|trial| trial.study_id), state, reason, progress, solve })
 }
 
 /// State of a job, and the reason if it failed.
@@ -86,6 +91,24 @@ async fn certificate(db: &mut Connection, scheduler: &Scheduler, trial: TrialId)
     Ok(asked.map(|(_, state)| (state, None)))
 }
 
+async fn execution_report(db: &mut Connection, scheduler: &Scheduler, trial: TrialId) -> Result<Found, Error> {
+    Ok(match scheduler.simulating(trial) {
+        Simulation::Queued(_) => Some((JobState::Queued, None)),
+        Simulation::Running { .. } => Some((JobState::Running, None)),
+        Simulation::Cancelled => Some((JobState::Cancelled, None)),
+        Simulation::Failed(reason) => Some((JobState::Failed, Some(reason))),
+        Simulation::None => execution::newest(db, trial).await?.map(|_| (JobState::Done, None)),
+    })
+}
+
+fn progress(scheduler: &Scheduler, id: JobId) -> Option<f64> {
+    let JobId::ExecutionReport(trial) = id else { return None };
+    match scheduler.simulating(trial) {
+        Simulation::Running { done, walks, .. } => Some(f64::from(done) / f64::from(walks.max(1))),
+        _ => None,
+    }
+}
+
 async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) -> Result<Found, Error> {
     let effort = scheduler.explaining(trial.id);
     let running = effort == Effort::Running;
@@ -106,7 +129,10 @@ async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) 
 /// # Errors
 /// Errors of the database.
 pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Result<Vec<JobStatus>, Error> {
-    let status = |id, study, state, solve| JobStatus { id, study, state, reason: None, solve };
+    let status = |id, study, state, solve| {
+        let progress = progress(runners.scheduler, id);
+        JobStatus { id, study, state, reason: None, progress, solve }
+    };
     let mut all: Vec<JobStatus> = runners
         .backups
         .running()
@@ -117,6 +143,12 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
         let study = trials::get(db, trial).await?.study_id;
         if members::reaches(db, reach, study).await? {
             all.push(status(JobId::Certificate(trial), Some(study), state, None));
+        }
+    }
+    for (trial, state) in runners.scheduler.all_simulating() {
+        let study = trials::get(db, trial).await?.study_id;
+        if members::reaches(db, reach, study).await? {
+            all.push(status(JobId::ExecutionReport(trial), Some(study), state, None));
         }
     }
     for (trial, study) in explanations::requested(db, reach).await? {
@@ -153,17 +185,19 @@ pub async fn cancel(writer: &mut Writer, caller: &Caller, runners: Runners<'_>, 
         JobId::Solve(trial) => {
             command::cancel(writer, &caller.actor, trial, "Cancelled on request.").await?;
         }
-        JobId::Certificate(_) | JobId::Explanation(_) => {
+        JobId::Certificate(_) | JobId::ExecutionReport(_) | JobId::Explanation(_) => {
             audit::append(writer, &caller.actor, "job.cancel", &format!("job {id}"), &json!({})).await?;
         }
     }
-    Ok(JobStatus { state: JobState::Cancelled, solve: None, ..job })
+    Ok(JobStatus { state: JobState::Cancelled, progress: None, solve: None, ..job })
 }
 
 /// Stops the work of a job whose cancellation is durable.
 pub async fn stop(runners: Runners<'_>, id: JobId) {
     match id {
         JobId::Backup(backup) => runners.backups.stop(backup),
-        JobId::Certificate(_) | JobId::Explanation(_) | JobId::Solve(_) => runners.scheduler.cancel_job(id).await,
+        JobId::Certificate(_) | JobId::ExecutionReport(_) | JobId::Explanation(_) | JobId::Solve(_) => {
+            runners.scheduler.cancel_job(id).await;
+        }
     }
 }

@@ -5,6 +5,7 @@
 
 use super::belief::Beliefs;
 use super::comparison::{by_gait_rmse, partners};
+use super::lifecycle;
 use super::preference;
 use super::safety_reports::SafetyReports;
 use super::snapshot::StudySnapshot;
@@ -65,7 +66,7 @@ pub async fn suggest(
         return Ok(SuggestedTrial::Same(open));
     }
     if study.state != StudyState::Running {
-        let reason = format!("The study is {}. {}", study.state.as_str(), study.state_reason);
+        let reason = format!("The study is {}. {}", lifecycle::in_words(study.state), study.state_reason);
         return Err(Error::conflict(reason.trim_end()));
     }
     let snapshot = StudySnapshot::read(&mut db, study).await?;
@@ -162,7 +163,7 @@ pub enum Outcome {
 pub struct Tell {
     /// Whether the evaluation found a gait.
     pub outcome: Outcome,
-    /// Why there is no gait, 1 to 2000 characters. Required for `not_converged`.
+    /// Reason why no gait was found, 1 to 2000 characters. Required for `not_converged`.
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub reason: String,
@@ -194,7 +195,10 @@ pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Resul
         return Err(Error::conflict("The service evaluates this trial itself."));
     }
     if trial.state != TrialState::Running {
-        return Err(Error::conflict(format!("The trial is already {}.", trial.state.as_str())));
+        return Err(Error::conflict(format!(
+            "The trial has already ended ({}).",
+            trial.state.as_str().replace('_', " ")
+        )));
     }
     let study = studies::get(&mut db, trial.study_id).await?;
     let outcome = checked(&study, tell)?;
@@ -230,7 +234,7 @@ fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
     let state = match tell.outcome {
         Outcome::Converged => TrialState::Converged,
         Outcome::NotConverged if reason.is_empty() => {
-            return Err(Error::invalid("reason", "", "1 to 2000 characters that say why there is no gait"));
+            return Err(Error::invalid("reason", "", "1 to 2000 characters that say why no gait was found"));
         }
         Outcome::NotConverged => TrialState::NotConverged,
     };

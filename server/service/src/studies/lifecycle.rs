@@ -53,12 +53,17 @@ impl Act {
 
 /// The transition is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("Cannot {} a study that is {}. Possible now: {}.", act.as_str(), state.as_str(), possible(*state))]
+#[error("Cannot {} a study that is {}. Possible now: {}.", act.as_str(), in_words(*state), possible(*state))]
 pub struct NotPossible {
     /// The state of the study.
     pub state: StudyState,
     /// The requested transition.
     pub act: Act,
+}
+
+/// A state as the adjective of a sentence: `The study is not started`.
+pub fn in_words(state: StudyState) -> &'static str {
+    if state == StudyState::Draft { "not started" } else { state.as_str() }
 }
 
 /// The state of a study after a transition.

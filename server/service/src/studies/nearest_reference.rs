@@ -8,7 +8,7 @@ use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// A reference gait and the distance between the recorded person and a subject.
+/// A reference gait and the distance between the measured person and a subject.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReferenceGaitMatch {
     /// The reference gait.

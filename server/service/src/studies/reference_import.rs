@@ -93,10 +93,10 @@ pub struct NewReferenceGait {
     /// Times of right heel strikes, s. If empty, they are detected.
     #[serde(default)]
     pub heel_strikes_s: Vec<f64>,
-    /// Height of the recorded person, m.
+    /// Height of the measured person, m.
     #[serde(default)]
     pub height_m: Option<f64>,
-    /// Body mass of the recorded person, kg.
+    /// Body mass of the measured person, kg.
     #[serde(default)]
     pub body_mass_kg: Option<f64>,
 }

@@ -37,7 +37,7 @@ pub struct NewStudy {
     /// Whether to solve with muscles (C1-C12) or without (C1-C4).
     #[serde(default = "yes")]
     pub muscles: bool,
-    /// Settings of the gait problem. Unless they set muscles, the measured muscle values of the subject apply.
+    /// Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     #[serde(default)]
     #[schema(value_type = openapi_schemas::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,

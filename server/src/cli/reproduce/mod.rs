@@ -69,8 +69,8 @@ pub(super) struct Reproduce {
     /// Number of consecutive seeds. Several are needed, because local optima can tip the comparison either way.
     #[arg(long, default_value = "3", value_name = "NUMBER", value_parser = seeds, allow_negative_numbers = true)]
     seeds: u64,
-    /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
-    #[arg(long, value_name = "FILE")]
+    /// Reference gait, given as for `solve` (default: falisse-2019).
+    #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Folder for the database, the report and the tables. Finished studies in it are not repeated.
     #[arg(long, default_value = "reproduction", value_name = "FOLDER")]

@@ -117,9 +117,9 @@ class AccessMethods(Transport):
     def list_study_members(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Member]:
         """List members of a study.
 
-        Raters can access studies of which they are members. Clinicians, and tokens with any scope besides `rate`, can
-        access every unrestricted study, and the restricted studies of which they are members. A request for any other
-        study is answered with 404.
+        Raters can access studies of which they are members. Clinicians, and tokens with any scope other than `rate`,
+        can access every unrestricted study, and the restricted studies of which they are members. A request for any
+        other study is answered with 404.
         """
         return Pages(self, "/api/v1/studies/{id}/members", {"id": study_id}, query={"limit": page_size})
 

@@ -5,7 +5,7 @@ Made by generate.py from server/openapi.json.
 
 from __future__ import annotations
 
-from typing import Optional
+from typing import Literal, Optional
 
 from ..schemas import (
     LabSessionId,
@@ -43,8 +43,8 @@ class FiguresMethods(Transport):
         study_id: StudyId,
         file: str,
         *,
-        x: Optional[str] = None,
-        y: Optional[str] = None,
+        x: Optional[Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]] = None,
+        y: Optional[Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]] = None,
     ) -> bytes:
         """Download a figure of the posterior.
 

@@ -20,6 +20,6 @@ class HealthMethods(Transport):
         """Check that the service is healthy.
 
         Succeeds if the database responds. Needs no sign-in, and therefore reveals nothing about solves, from which a
-        rater could infer the effect of an answer. Fails if the database does not respond.
+        rater could infer the effect of an answer.
         """
         return cast(Health, self.request_json("GET", "/api/v1/health"))

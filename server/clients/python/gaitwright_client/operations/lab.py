@@ -52,7 +52,8 @@ class LabMethods(Transport):
     ) -> LabSessionProgress:
         """Record the answer of the subject.
 
-        States which walk was better. The answer reaches the learner at unblinding.
+        States which walk was better, that there is no difference, that the subject cannot tell, or that a walk was
+        unsafe. The answer reaches the learner at unblinding; a safety report takes effect at once.
 
         Fields: answer, number; optionally note.
         """
@@ -340,8 +341,8 @@ class LabMethods(Transport):
     ) -> LabSessionView:
         """Plan a lab session.
 
-        The session consists of a walk without the device, then one with each gait, in an order that is drawn at random
-        on planning and concealed.
+        The session consists of a walk without the device, then one with each gait. The order of the gaits is drawn at
+        random when the session is planned, and concealed.
 
         Fields: gait_one, gait_two; optionally notes.
         """

@@ -101,6 +101,6 @@ class OperationMethods(Transport):
     def get_workers(self) -> Workers:
         """List workers.
 
-        A remote worker is known only while it has a solve.
+        A remote worker is listed only while it runs a solve.
         """
         return cast(Workers, self.request_json("GET", "/api/v1/workers"))

@@ -5,7 +5,7 @@ Made by generate.py from server/openapi.json.
 
 from __future__ import annotations
 
-from typing import Literal, Optional, cast
+from typing import TYPE_CHECKING, Literal, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
@@ -16,14 +16,20 @@ from ..schemas import (
     Iteration,
     Job,
     Motion,
+    NewExecutionReport,
     SolveProblem,
     StudyId,
     Trial,
+    TrialExecutionReport,
     TrialExplanation,
     TrialId,
+    TrialSensitivities,
     TrialState,
 )
 from ..transport import Transport
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 ListTrialsSort = Literal[
     "number", "-number", "state", "-state", "gait_rmse_rad", "-gait_rmse_rad", "cost_of_transport",
@@ -128,6 +134,45 @@ class TrialsMethods(Transport):
             ),
         )
 
+    def get_execution_report(self, trial_id: TrialId) -> TrialExecutionReport:
+        """Get the execution report of a trial.
+
+        The newest report: how simulated walks with the gait end outside the optimiser's model.
+        """
+        return cast(
+            TrialExecutionReport,
+            self.request_json(
+                "GET",
+                "/api/v1/trials/{id}/execution-report",
+                {"id": trial_id},
+            ),
+        )
+
+    def request_execution_report(
+        self,
+        trial_id: TrialId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[NewExecutionReport],
+    ) -> Job:
+        """Request the execution report of a trial.
+
+        The gait of the trial must have converged. Walks on level ground, on ground of ±5 mm and of ±10 mm are
+        simulated. The same number of walks and seed give the same report.
+
+        Fields: optionally seed, walks.
+        """
+        return cast(
+            Job,
+            self.request_json(
+                "POST",
+                "/api/v1/trials/{id}/execution-report",
+                {"id": trial_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
     def get_explanation(self, trial_id: TrialId) -> TrialExplanation:
         """Get the infeasibility explanation of a trial.
 
@@ -203,3 +248,10 @@ class TrialsMethods(Transport):
                 key=idempotency_key,
             ),
         )
+
+    def get_sensitivities(self, trial_id: TrialId) -> TrialSensitivities:
+        """Get the sensitivities of a trial.
+
+        What changes, to first order, if a tuned bound moves. They are computed on request from the stored solution.
+        """
+        return cast(TrialSensitivities, self.request_json("GET", "/api/v1/trials/{id}/sensitivities", {"id": trial_id}))

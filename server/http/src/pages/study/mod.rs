@@ -29,6 +29,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::MOST_ANSWERS;
 use gaitwright_service::studies::certified_best::{self, CertificateState, Judged};
 use gaitwright_service::studies::equal_actions::never_active;
+use gaitwright_service::studies::execution;
 use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
 use gaitwright_service::studies::safety_reports::Closed;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -148,6 +149,8 @@ struct Best {
     by_script: bool,
     /// The state of its certificate.
     judged: Judged,
+    /// How many simulated walks with it were complete; `None` if none were simulated.
+    simulated_walks: Option<String>,
     /// If it failed, the best trial whose gait passed.
     passing: Option<Passing>,
 }
@@ -336,6 +339,10 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
         Some(best) => gaits::is_here(&mut reader, best).await?,
         None => false,
     };
+    let simulated_walks = match outcome.best {
+        Some(best) => execution::newest(&mut reader, best).await?.map(|kept| kept.simulated.report.sentence()),
+        None => None,
+    };
     drop(reader);
     if let Some(next) = judged.without_certificate {
         judged.certified_by_service(app.scheduler.is_certifying(id, next));
@@ -349,7 +356,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let mut answers = answers(&snapshot, &assessments);
     answers.truncate(SHOWN as usize);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let found = Found { outcome, judged, has_gait, without_gait };
+    let found = Found { outcome, judged, simulated_walks, has_gait, without_gait };
     // The newest trials do not say it of all.
     let inactive = if large { Vec::new() } else { never_active(&snapshot) };
     let mut live = view(snapshot, counts, found, running, table, answers, caller.may(Run::NEEDED));
@@ -385,6 +392,8 @@ struct Found {
     outcome: Outcome,
     /// The states of the certificates.
     judged: Judged,
+    /// How many simulated walks with the best gait were complete.
+    simulated_walks: Option<String>,
     /// Whether the trajectory of the best gait is stored.
     has_gait: bool,
     without_gait: Option<WithoutGait>,
@@ -399,7 +408,7 @@ fn view(
     answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
-    let Found { outcome, judged, has_gait, without_gait } = found;
+    let Found { outcome, judged, simulated_walks, has_gait, without_gait } = found;
     let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| Best {
         id: trial.id,
         number: trial.number,
@@ -414,6 +423,7 @@ fn view(
             rmse: format::figure(trial.gait_rmse_rad),
         }),
         judged: judged.clone(),
+        simulated_walks,
     });
     let unsafe_gait = |closed: &Closed| {
         let number = snapshot.trial(closed.trial)?.number;

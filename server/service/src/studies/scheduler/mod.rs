@@ -11,11 +11,13 @@ mod prefetch_loop;
 
 use super::belief::Beliefs;
 use super::certifier::Certifier;
+use super::execution::{Simulation, WalksAsked};
 use super::explainer::Explainer;
 use super::explanation::Effort;
 use super::job::{JobId, JobState};
 use super::prefetch::Prefetches;
 use super::snapshot::StudySnapshot;
+use super::walk_simulator::WalkSimulator;
 use crate::error::Error;
 use crate::supervise::{Task, Tasks};
 use crate::workers::{AfterSolves, Board, Dispatch};
@@ -47,6 +49,8 @@ struct Inner {
     waiting: watch::Sender<Arc<[Arc<StudySnapshot>]>>,
     /// The tasks that certify the best gaits of ended studies and explain their trials without a gait.
     after_solves: Option<(Certifier, Explainer)>,
+    /// The task that simulates walks.
+    simulator: Option<WalkSimulator>,
     beliefs: Arc<Beliefs>,
     /// Held from the search for a free worker until the engine has the job, so that a prefetch never takes the worker
     /// of a trial.
@@ -74,8 +78,8 @@ impl fmt::Debug for Inner {
 }
 
 impl Scheduler {
-    /// Creates a scheduler; [`Self::run`] starts it. Without `after_solves`, it certifies gaits on request only and
-    /// explains nothing.
+    /// Creates a scheduler; [`Self::run`] starts it. Without `after_solves`, it certifies gaits on request only,
+    /// explains nothing and simulates no walks.
     pub fn new(
         store: &Store,
         engine: Arc<dyn Dispatch>,
@@ -89,6 +93,7 @@ impl Scheduler {
             (Certifier::new(store.clone(), certify, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
         };
         Self(Arc::new(Inner {
+            simulator: after_solves.is_some().then(|| WalkSimulator::new(store.clone())),
             after_solves: after_solves.map(over_record),
             unpacking: store.with_own_pool(),
             store,
@@ -160,12 +165,33 @@ impl Scheduler {
         self.0.after_solves.as_ref().map(|(certifier, _)| certifier.jobs()).unwrap_or_default()
     }
 
+    /// Requests the execution report of one gait; `None` if it exists already. Returns `false` if this process simulates
+    /// no walks.
+    pub(super) fn simulate(&self, trial: TrialId, asked: Option<WalksAsked>) -> bool {
+        self.0.simulator.as_ref().map(|simulator| simulator.ask_for(trial, asked)).is_some()
+    }
+
+    /// The state of the execution report of a gait in this process.
+    pub fn simulating(&self, trial: TrialId) -> Simulation {
+        self.0.simulator.as_ref().map_or(Simulation::None, |simulator| simulator.state_of(trial))
+    }
+
+    /// The gaits whose execution reports are queued or running, each with the state of its job.
+    pub fn all_simulating(&self) -> Vec<(TrialId, JobState)> {
+        self.0.simulator.as_ref().map(WalkSimulator::jobs).unwrap_or_default()
+    }
+
     /// Stops the work of a job that was cancelled.
     pub async fn cancel_job(&self, id: JobId) {
         match (id, &self.0.after_solves) {
             (JobId::Solve(trial), _) => self.cancel_solve(trial).await,
             (JobId::Certificate(trial), Some((certifier, _))) => certifier.cancel(trial),
             (JobId::Explanation(trial), Some((_, explainer))) => explainer.cancel(trial),
+            (JobId::ExecutionReport(trial), _) => {
+                if let Some(simulator) = &self.0.simulator {
+                    simulator.cancel(trial);
+                }
+            }
             (JobId::Certificate(_) | JobId::Explanation(_), None) | (JobId::Backup(_), _) => {}
         }
     }
@@ -228,6 +254,7 @@ impl Scheduler {
             keep("explaining trials", |scheduler, task| Box::pin(
                 async move { scheduler.keep_explaining(&task).await }
             )),
+            keep("simulating walks", |scheduler, task| Box::pin(async move { scheduler.keep_simulating(&task).await })),
         );
         self.0.tasks.close();
         self.0.tasks.wait().await;
@@ -245,6 +272,14 @@ impl Scheduler {
         let Some((certifier, explainer)) = &self.0.after_solves else { return std::future::pending().await };
         task.works();
         certifier.run(self.pulse(), || self.changed(), |study| explainer.take_up(study)).await;
+        Ok(())
+    }
+
+    /// Simulates walks forever.
+    async fn keep_simulating(&self, task: &Task) -> Result<(), Error> {
+        let Some(simulator) = &self.0.simulator else { return std::future::pending().await };
+        task.works();
+        simulator.run(self.pulse(), || self.changed()).await;
         Ok(())
     }
 

@@ -1,87 +1,16 @@
 //! The feedback log: labels, preferences and suggestions for the learner, append-only.
 
+mod content;
+
+pub use content::{FeedbackContent, Source};
+
 use super::many_rows::read_many;
 use super::{Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use gait_learner::ActionIndex;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
-use std::str::FromStr;
 use utoipa::ToSchema;
-
-/// Source of an entry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Source {
-    /// The solver.
-    Convergence,
-    /// Gait RMSE; the smaller one wins.
-    GaitRmse,
-    /// The subject.
-    Subject,
-    /// A clinician.
-    Clinician,
-    /// A script of the lab.
-    Script,
-}
-
-impl Source {
-    /// The name in the record and in REST.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Convergence => "convergence",
-            Self::GaitRmse => "gait_rmse",
-            Self::Subject => "subject",
-            Self::Clinician => "clinician",
-            Self::Script => "script",
-        }
-    }
-}
-
-impl FromStr for Source {
-    type Err = StoreError;
-    fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Convergence, Self::GaitRmse, Self::Subject, Self::Clinician, Self::Script]
-            .into_iter()
-            .find(|source| source.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "feedback source", reason: text.to_owned() })
-    }
-}
-
-/// Content of an entry, in terms of trials.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum FeedbackContent {
-    /// Label of a trial.
-    Label {
-        /// The trial.
-        trial: TrialId,
-        /// Category: 0 for not converged, 1 for converged.
-        category: u32,
-    },
-    /// One trial is better than another.
-    Preference {
-        /// Better trial.
-        winner: TrialId,
-        /// Other trial.
-        loser: TrialId,
-    },
-    /// Two trials are equally good.
-    Tie {
-        /// One trial.
-        a: TrialId,
-        /// The other trial.
-        b: TrialId,
-    },
-    /// An action would have been better than a trial.
-    Suggestion {
-        /// Index of the suggested action.
-        #[schema(value_type = u64)]
-        suggested: ActionIndex,
-        /// Trial.
-        over: TrialId,
-    },
-}
 
 /// Entry of the feedback log.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -94,7 +23,7 @@ pub struct FeedbackRow {
     pub study_id: StudyId,
     /// Content of the entry.
     pub content: FeedbackContent,
-    /// Source.
+    /// Who or what it came from.
     pub source: Source,
     /// Author.
     pub author: String,

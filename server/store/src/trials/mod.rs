@@ -1,73 +1,19 @@
 //! Stored trials: actions of a study and their results.
 
+mod progress;
+mod state;
+
+pub use progress::{Measured, TrialCounts, counts, improvements, measured};
+pub use state::TrialState;
+
 use super::many_rows::read_many;
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now, openapi_schemas};
 use gait_learner::ActionIndex;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use std::str::FromStr;
 use utoipa::ToSchema;
-
-/// State of a trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum TrialState {
-    /// Waiting for a worker.
-    Queued,
-    /// Being evaluated.
-    Running,
-    /// The solve found a gait. A result.
-    Converged,
-    /// The solve ended without a gait. Also a result.
-    NotConverged,
-    /// The program failed by a panic, an error or the time limit. Not a result.
-    Failed,
-    /// The workers stopped responding. Not a result.
-    Lost,
-    /// Cancelled by a person.
-    Cancelled,
-}
-
-impl TrialState {
-    /// Every state.
-    pub const ALL: [Self; 7] =
-        [Self::Queued, Self::Running, Self::Converged, Self::NotConverged, Self::Failed, Self::Lost, Self::Cancelled];
-
-    /// The name in the record and in REST.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Queued => "queued",
-            Self::Running => "running",
-            Self::Converged => "converged",
-            Self::NotConverged => "not_converged",
-            Self::Failed => "failed",
-            Self::Lost => "lost",
-            Self::Cancelled => "cancelled",
-        }
-    }
-
-    /// Whether it is queued or running.
-    pub fn is_open(self) -> bool {
-        matches!(self, Self::Queued | Self::Running)
-    }
-
-    /// Whether it is a result for the learner: converged or not converged.
-    pub fn is_result(self) -> bool {
-        matches!(self, Self::Converged | Self::NotConverged)
-    }
-}
-
-impl FromStr for TrialState {
-    type Err = StoreError;
-    fn from_str(text: &str) -> StoreResult<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|state| state.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "trial state", reason: text.to_owned() })
-    }
-}
 
 /// Trial of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -88,7 +34,7 @@ pub struct Trial {
     pub reason: String,
     /// Best trial when this one was proposed.
     pub best_before: Option<TrialId>,
-    /// Trial that gives the warm start. Absent for a cold start.
+    /// Trial whose gait is the warm start. Absent for a cold start.
     pub warm_started_from: Option<TrialId>,
     /// Script that evaluates the trial. Absent if the service does.
     pub asked_by: Option<String>,
@@ -139,7 +85,7 @@ pub struct NewTrial {
     pub reason: String,
     /// Best trial so far.
     pub best_before: Option<TrialId>,
-    /// Trial that gives the warm start.
+    /// Trial whose gait is the warm start.
     pub warm_started_from: Option<TrialId>,
 }
 
@@ -371,96 +317,6 @@ pub async fn tell(db: &mut Connection, id: TrialId, outcome: &ScriptOutcome) -> 
     .execute(db)
     .await?;
     Ok(())
-}
-
-/// Numbers of trials of a study by state.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
-pub struct TrialCounts {
-    /// All trials.
-    pub total: u32,
-    /// Queued or running trials.
-    pub open: u32,
-    /// Converged trials.
-    pub converged: u32,
-    /// Trials that did not converge.
-    pub not_converged: u32,
-    /// Failed, lost or cancelled trials.
-    pub without_result: u32,
-}
-
-impl TrialCounts {
-    /// Number of trials with a result.
-    pub fn results(&self) -> u32 {
-        self.converged + self.not_converged
-    }
-}
-
-/// Counts the trials of a study.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCounts> {
-    let row = sqlx::query(
-        "with counted as (select state, count(*) as trials from trials where study_id = ? group by state) \
-         select coalesce(sum(trials), 0) as total, \
-         coalesce(sum(iif(state in ('queued', 'running'), trials, 0)), 0) as open, \
-         coalesce(sum(iif(state = 'converged', trials, 0)), 0) as converged, \
-         coalesce(sum(iif(state = 'not_converged', trials, 0)), 0) as not_converged, \
-         coalesce(sum(iif(state in ('failed', 'lost', 'cancelled'), trials, 0)), 0) as without_result \
-         from counted",
-    )
-    .bind(study)
-    .fetch_one(db)
-    .await?;
-    Ok(TrialCounts {
-        total: row.try_get("total")?,
-        open: row.try_get("open")?,
-        converged: row.try_get("converged")?,
-        not_converged: row.try_get("not_converged")?,
-        without_result: row.try_get("without_result")?,
-    })
-}
-
-/// The converged trials of a study with a lower Gait RMSE than all earlier ones: number and Gait RMSE, rad.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn improvements(db: &mut Connection, study: StudyId) -> StoreResult<Vec<(u32, f64)>> {
-    let rows = sqlx::query(
-        "select number, gait_rmse_rad from (select number, gait_rmse_rad, \
-         min(gait_rmse_rad) over (order by number rows between unbounded preceding and current row) as best \
-         from trials where study_id = ? and state = 'converged') where gait_rmse_rad = best order by number",
-    )
-    .bind(study)
-    .fetch_all(db)
-    .await?;
-    rows.iter().map(|row| Ok((row.try_get(0)?, row.try_get(1)?))).collect()
-}
-
-/// Solve times.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measured {
-    /// Number of solves.
-    pub solves: usize,
-    /// Median of their wall times, s.
-    pub median_seconds: f64,
-}
-
-/// The times of the newest solves, at most 200, with or without muscles; `None` before the first solve.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<Measured>> {
-    let rows = sqlx::query(
-        "select seconds_total from (select t.seconds_total from trials t join studies s on s.id = t.study_id \
-         where s.muscles = ? and t.seconds_total is not null and t.state in ('converged', 'not_converged') \
-         order by t.id desc limit 200) order by seconds_total",
-    )
-    .bind(muscles)
-    .fetch_all(db)
-    .await?;
-    let Some(middle) = rows.get(rows.len() / 2) else { return Ok(None) };
-    Ok(Some(Measured { solves: rows.len(), median_seconds: middle.try_get(0)? }))
 }
 
 /// A figure of a converged gait; `None` for other trials, whose last iterate is not a gait.

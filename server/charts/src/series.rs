@@ -1,0 +1,120 @@
+//! Lines and areas of a chart.
+
+use super::simplified::simplified;
+use std::fmt::Write;
+
+/// Style of a series. Lines differ by dash pattern, not by colour alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stroke {
+    /// A line.
+    Solid,
+    /// A dashed line.
+    Dashed,
+    /// A dotted line.
+    Dotted,
+    /// A line of alternating dashes and dots.
+    DashDotted,
+    /// A line of long dashes.
+    LongDashed,
+    /// Points only.
+    Points,
+    /// A step line with a mark at each point.
+    Steps,
+    /// A dashed step line with a mark at each point.
+    DashedSteps,
+    /// A line with a mark at each point.
+    Marked,
+}
+
+/// An area between two lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band {
+    /// Name in the legend.
+    pub label: String,
+    /// x, lower y, upper y.
+    pub points: Vec<(f64, f64, f64)>,
+    /// Colour of the palette, 0 to 9.
+    pub colour: usize,
+}
+
+/// One line of a chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend.
+    pub label: String,
+    /// Points. A point that is not finite interrupts the line.
+    pub points: Vec<(f64, f64)>,
+    /// Colour of the palette, 0 to 9.
+    pub colour: usize,
+    /// Style.
+    pub stroke: Stroke,
+}
+
+impl Stroke {
+    /// Dash patterns that distinguish lines without colours. They repeat after five.
+    pub const APART: [Self; 5] = [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDotted, Self::LongDashed];
+
+    pub(super) fn class(self) -> &'static str {
+        match self {
+            Self::Solid | Self::Steps | Self::Marked => "solid",
+            Self::Dashed | Self::DashedSteps => "dashed",
+            Self::Dotted => "dotted",
+            Self::DashDotted => "dash_dotted",
+            Self::LongDashed => "long_dashed",
+            Self::Points => "points",
+        }
+    }
+}
+
+impl Band {
+    pub(super) fn draw(
+        &self,
+        svg: &mut String,
+        px: &impl Fn(f64) -> f64,
+        py: &impl Fn(f64) -> f64,
+    ) -> std::fmt::Result {
+        write!(svg, "<path class=\"band c{}\" d=\"", self.colour % 10)?;
+        let low = self.points.iter().map(|&(x, low, _)| (x, low));
+        let high = self.points.iter().rev().map(|&(x, _, high)| (x, high));
+        for (i, (x, y)) in low.chain(high).enumerate() {
+            write!(svg, "{}{:.1} {:.1}", if i == 0 { 'M' } else { 'L' }, px(x), py(y))?;
+        }
+        write!(svg, "Z\"/>")
+    }
+}
+
+impl Series {
+    pub(super) fn draw(
+        &self,
+        svg: &mut String,
+        px: &impl Fn(f64) -> f64,
+        py: &impl Fn(f64) -> f64,
+    ) -> std::fmt::Result {
+        let colour = self.colour % 10;
+        if self.stroke != Stroke::Points {
+            write!(svg, "<path class=\"line c{colour} {}\" d=\"", self.stroke.class())?;
+            let seen = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+            for run in self.points.split(|point| !seen(point)) {
+                let mut places: Vec<(f64, f64)> = run.iter().map(|&(x, y)| (px(x), py(y))).collect();
+                let steps = matches!(self.stroke, Stroke::Steps | Stroke::DashedSteps);
+                if Stroke::APART.contains(&self.stroke) {
+                    places = simplified(&places);
+                }
+                for (place, (x, y)) in places.into_iter().enumerate() {
+                    match (place, steps) {
+                        (0, _) => write!(svg, "M{x:.1} {y:.1}")?,
+                        (_, true) => write!(svg, "H{x:.1}V{y:.1}")?,
+                        (_, false) => write!(svg, "L{x:.1} {y:.1}")?,
+                    }
+                }
+            }
+            write!(svg, "\"/>")?;
+        }
+        if !Stroke::APART.contains(&self.stroke) {
+            for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
+                write!(svg, "<circle class=\"dot c{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\"/>", px(x), py(y))?;
+            }
+        }
+        Ok(())
+    }
+}

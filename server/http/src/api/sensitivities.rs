@@ -1,0 +1,107 @@
+//! REST: sensitivities of gaits with respect to the tuned bounds.
+
+use crate::AppState;
+use crate::authorization::Authorized;
+use crate::problem_details::Refusal;
+use crate::visible::Visible;
+use axum::Json;
+use axum::extract::State;
+use gait_optimizer::sensitivity::{ActiveConstraint, BoundSensitivity, FigureDerivatives};
+use gaitwright_service::access::Read;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::sensitivities::{self, BoundStep, StudySensitivities};
+use gaitwright_store::{TrialId, openapi_schemas, trials};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Sensitivities of a gait with respect to the tuned bounds.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct TrialSensitivities {
+    trial_id: TrialId,
+    /// The sensitivities in sentences.
+    sentences: Vec<String>,
+    /// Mechanical cost of transport of the gait.
+    cost_of_transport: f64,
+    /// Each tuned bound, in the order of an action.
+    bounds: Vec<SensitivityToBound>,
+}
+
+/// Sensitivity with respect to one tuned bound. Derivatives are per unit of the bound.
+#[derive(Debug, Serialize, ToSchema)]
+struct SensitivityToBound {
+    /// Name of the bound.
+    bound: &'static str,
+    /// Its value.
+    value: f64,
+    /// The active constraints that it sets. Empty if small changes of the bound change nothing.
+    #[schema(value_type = Vec<openapi_schemas::ActiveConstraint>)]
+    active: Vec<ActiveConstraint>,
+    /// Derivatives of the figures of the gait.
+    #[schema(value_type = openapi_schemas::FigureDerivatives)]
+    derivatives: FigureDerivatives,
+    /// Values of the bound between which the active constraints stay the same, to first order. Null: for every value in
+    /// that direction.
+    #[schema(value_type = Vec<Option<f64>>, min_items = 2, max_items = 2)]
+    interval: (Option<f64>, Option<f64>),
+    /// Whether a constraint is about to become active or inactive, so that the derivatives to both sides differ.
+    is_weakly_active: bool,
+    /// Change of the bound by one step of the study's grid. Null if the study does not tune the bound.
+    grid_step: Option<GridStep>,
+}
+
+/// Change of a bound by one step of the grid, and changes of figures to first order.
+#[derive(Debug, Serialize, ToSchema)]
+struct GridStep {
+    /// The next stricter value, or the next less strict one if there is none.
+    to: f64,
+    /// Change of the mechanical cost of transport.
+    cost_of_transport: f64,
+    /// Change of Gait RMSE, rad.
+    gait_rmse_rad: f64,
+    /// Whether the same constraints stay active up to this value, to first order.
+    keeps_active: bool,
+}
+
+impl SensitivityToBound {
+    fn new(found: BoundSensitivity, step: Option<BoundStep>) -> Self {
+        let BoundSensitivity { bound, value, active, derivatives, interval, is_weakly_active } = found;
+        let grid_step = step.map(|BoundStep { to, cost_of_transport, gait_rmse_rad, keeps_active }| GridStep {
+            to,
+            cost_of_transport,
+            gait_rmse_rad,
+            keeps_active,
+        });
+        Self { bound, value, active, derivatives, interval, is_weakly_active, grid_step }
+    }
+}
+
+/// Get the sensitivities of a trial
+///
+/// What changes, to first order, if a tuned bound moves. They are computed on request from the stored solution.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/sensitivities",
+    operation_id = "get_sensitivities",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses(
+        (status = 200, description = "Sensitivities", body = TrialSensitivities),
+        (status = 409, description = "The gait has no sensitivities, or the subject withdrew consent")
+    ),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: Authorized<Read>,
+    State(mut app): State<AppState>,
+    Visible(id, _): Visible<TrialId, Read>,
+) -> Result<Json<TrialSensitivities>, Refusal> {
+    let mut reader = app.read().await?;
+    let trial = trials::get(&mut reader, id).await?;
+    let solution = sensitivities::solution(&mut reader, &trial).await?;
+    drop(reader);
+    let computed = app.compute(move |pool| solution.sensitivities(pool)).await.map_err(Error::from)?;
+    let StudySensitivities { found, steps } = computed?;
+    let (sentences, cost_of_transport) = (found.sentences(), found.cost_of_transport);
+    let bounds = found.bounds.into_iter().zip(steps).map(|(bound, step)| SensitivityToBound::new(bound, step));
+    Ok(Json(TrialSensitivities { trial_id: id, sentences, cost_of_transport, bounds: bounds.collect() }))
+}

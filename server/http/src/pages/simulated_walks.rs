@@ -1,0 +1,154 @@
+//! Simulated walks on the page of a gait, and the form that requests them.
+
+use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::extractors::Form;
+use crate::format;
+use crate::page_error::PageError;
+use axum::extract::State;
+use axum::response::Redirect;
+use gait_optimizer::execution::{ExecutionReport, WalksOnGround};
+use gaitwright_service::access::Run;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::execution::{self, MOST_WALKS, Simulation, WalksAsked};
+use gaitwright_service::studies::study_plan::LARGEST_SEED;
+use gaitwright_store::execution_reports::{GaitSimulated, KeptReport};
+use gaitwright_store::{Instant, TrialId, commit};
+use serde::Deserialize;
+
+/// The section: the newest report, and the state of a requested one.
+pub(super) struct SimulatedWalks {
+    pub(super) state: Simulation,
+    pub(super) shown: Option<Shown>,
+    /// What the form suggests.
+    pub(super) suggested: WalksAsked,
+}
+
+/// An execution report in words.
+pub(super) struct Shown {
+    pub(super) sentence: String,
+    pub(super) grounds: Vec<GroundRow>,
+    /// Label and value.
+    pub(super) figures: Vec<(&'static str, String)>,
+    pub(super) program: String,
+    pub(super) created_at: Instant,
+}
+
+/// Walks on one ground.
+pub(super) struct GroundRow {
+    pub(super) ground: String,
+    pub(super) complete: String,
+    pub(super) share: String,
+    pub(super) strides: String,
+    pub(super) ended: String,
+    pub(super) knee: String,
+    pub(super) ankle: String,
+}
+
+impl SimulatedWalks {
+    pub(super) fn new(state: Simulation, kept: Option<KeptReport>) -> Self {
+        Self { state, shown: kept.map(Shown::new), suggested: WalksAsked::default() }
+    }
+
+    /// Whether a report is queued or running.
+    pub(super) fn is_coming(&self) -> bool {
+        self.state.open().is_some()
+    }
+
+    pub(super) fn most_walks() -> u32 {
+        MOST_WALKS
+    }
+
+    pub(super) fn largest_seed() -> u64 {
+        LARGEST_SEED
+    }
+}
+
+impl Shown {
+    fn new(kept: KeptReport) -> Self {
+        let KeptReport { simulated: GaitSimulated { walks, seed, program, report, .. }, created_at } = kept;
+        let of_strides = |strides: u32| format!("{strides} of {}", report.strides);
+        let by_yield = report.strides_by_yield.iter();
+        let by_yield: Vec<String> = by_yield
+            .map(|walk| format!("{} on ground that yields {} mm", walk.strides, format::number(1e3 * walk.yield_m)))
+            .collect();
+        let [lightest, heaviest] = report.body_mass_kg;
+        let figures = vec![
+            ("Strides without any disturbance", of_strides(report.undisturbed_strides)),
+            ("Strides without any other disturbance", by_yield.join(", ")),
+            ("Largest push at the hip survived without other disturbances", pushes(&report)),
+            (
+                "Disturbed walks",
+                format!("{walks} on each ground, seed {seed}, bodies of {lightest:.1} to {heaviest:.1} kg"),
+            ),
+            ("Gait (SHA-256)", report.gait_sha256.clone()),
+        ];
+        let grounds = report.grounds.iter().map(GroundRow::new).collect();
+        Self { sentence: report.sentence(), grounds, figures, program, created_at }
+    }
+}
+
+fn pushes(report: &ExecutionReport) -> String {
+    let Some(pushes) = report.pushes else {
+        return "not tried, because the walk without any disturbance is not complete".to_owned();
+    };
+    let number = format::number;
+    format!(
+        "{} N s forwards, {} N s backwards (of at most {} N s)",
+        number(pushes.forwards_n_s),
+        number(pushes.backwards_n_s),
+        number(pushes.largest_tried_n_s)
+    )
+}
+
+impl GroundRow {
+    fn new(on: &WalksOnGround) -> Self {
+        let percent = |share: f64| format!("{:.0}", 100.0 * share);
+        let [low, high] = on.completed_share_interval;
+        Self {
+            ground: on.ground_in_words(),
+            complete: format!("{} of {}", on.completed, on.walks),
+            share: format!("{} ({} to {})", percent(on.completed_share), percent(low), percent(high)),
+            strides: format!("{:.1}", on.mean_strides),
+            ended: format!("{}, {}", on.fell, on.halted),
+            knee: percent(on.knee_saturated_share),
+            ankle: percent(on.ankle_saturated_share),
+        }
+    }
+}
+
+/// The fields of the form.
+#[derive(Debug, Deserialize)]
+pub(super) struct Fields {
+    #[serde(default)]
+    walks: String,
+    #[serde(default)]
+    seed: String,
+}
+
+impl Fields {
+    fn asked(&self) -> Result<WalksAsked, Error> {
+        let walks = self.walks.trim().parse();
+        let seed = self.seed.trim().parse();
+        Ok(WalksAsked {
+            walks: walks.map_err(|_| Error::invalid("walks", self.walks.as_str(), &format!("1 to {MOST_WALKS}")))?,
+            seed: seed.map_err(|_| Error::invalid("seed", self.seed.as_str(), &format!("0 to {LARGEST_SEED}")))?,
+        })
+    }
+}
+
+/// `POST /trials/{id}/simulate`.
+pub(super) async fn post(
+    authorized: Authorized<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<TrialId, Run>,
+    Form(fields): Form<Fields>,
+) -> Result<Redirect, PageError> {
+    let asked = fields.asked()?;
+    let mut writer = app.write().await?;
+    execution::ask(&mut writer, &app.scheduler, &authorized.caller.actor, id, asked).await?;
+    commit(writer).await?;
+    app.scheduler.changed();
+    Ok(Redirect::to(&format!("/trials/{id}#simulated-walks")))
+}

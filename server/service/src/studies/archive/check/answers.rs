@@ -1,0 +1,164 @@
+//! Checks the answers in an imported archive: each against its trials, and how often a person answered.
+
+use super::super::file::refuse;
+use super::{at, of_gaits};
+use crate::error::Error;
+use crate::printable;
+use crate::studies::comparison::by_gait_rmse;
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
+use gaitwright_store::lab_sessions::LabSession;
+use gaitwright_store::studies::{FeedbackMode, Study};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{
+    Connection, FeedbackId, Instant, SafetyReportId, TrialId, assessments, feedback, presentations, safety_reports,
+    safety_reviews,
+};
+use std::collections::{HashMap, HashSet};
+
+/// Checks the feedback log, assessments, presentations and safety reviews. The subject answers each lab session.
+pub(super) async fn answers(
+    db: &mut Connection,
+    study: &Study,
+    trials: &HashMap<TrialId, &Trial>,
+    (subject, sessions): (&str, &[LabSession]),
+) -> Result<(), Error> {
+    let id = study.id;
+    let rows = at("feedback", feedback::of_study(db, id, 0).await)?;
+    let noted = at("assessments", assessments::of_study(db, id).await)?;
+    // Whoever has answered may still report a gait as unsafe.
+    let of_reports: HashSet<FeedbackId> = noted.iter().filter_map(|assessment| assessment.feedback_id).collect();
+    let mut labelled = 0;
+    let mut answered: HashMap<_, usize> = HashMap::new();
+    for row in &rows {
+        let what = format!("feedback {} ({})", row.seq, row.id);
+        at(&what, heard(row, study, trials))?;
+        labelled += usize::from(matches!(row.content, FeedbackContent::Label { .. }));
+        let Some(compared) = pair(&row.content).filter(|_| is_of_person(row) && !of_reports.contains(&row.id)) else {
+            continue;
+        };
+        let author = printable::person(&row.author);
+        let walked = sessions.iter().filter(|session| sorted(session.gait_one, session.gait_two) == compared).count();
+        let most = if author == printable::person(subject) { 1 + walked } else { 1 };
+        let count = answered.entry((compared, author)).or_default();
+        *count += 1;
+        if *count > most {
+            return Err(refuse(format!("{what}: {} has answered this comparison already", row.author)));
+        }
+    }
+    let results = trials.values().filter(|trial| trial.state.is_result()).count();
+    if labelled != results {
+        return Err(refuse(format!("{results} trials have a result, but {labelled} have a label")));
+    }
+    let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.content)?))).collect();
+    for assessment in &noted {
+        let what = format!("assessment {}", assessment.id);
+        at(&what, of_gaits(trials, [assessment.first, assessment.second]))?;
+        let compared = [assessment.first, assessment.second].map(|id| trials.get(&id).copied());
+        if let [Some(first), Some(second)] = compared {
+            at(&what, after_both(assessment.created_at, [first, second]))?;
+        }
+        let wanted = sorted(assessment.first, assessment.second);
+        if assessment.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
+            return Err(refuse(format!("{what}: the preference derived from it is about other trials")));
+        }
+    }
+    let mut reports: HashSet<SafetyReportId> = HashSet::new();
+    reports.extend(
+        noted.iter().filter(|assessment| assessment.answer.is_about_safety()).map(|a| SafetyReportId::from(a.id)),
+    );
+    for shown in at("presentations", presentations::of_study(db, id).await)? {
+        at(format!("presentation {}", shown.id), of_gaits(trials, [shown.one, shown.other]))?;
+        reports.extend(
+            shown.answer.filter(|judgement| judgement.is_about_safety()).map(|_| SafetyReportId::from(shown.id)),
+        );
+    }
+    reports.extend(at("safety_reports", safety_reports::of_study(db, id).await)?.iter().map(|report| report.id));
+    let has_report = |session: &&LabSession| session.answers.iter().any(|answer| answer.judgement.is_about_safety());
+    reports.extend(sessions.iter().filter(has_report).map(|session| SafetyReportId::from(session.id)));
+    for review in at("safety_reviews", safety_reviews::of_study(db, id).await)? {
+        let what = format!("safety review {}", review.id);
+        at(&what, of_gaits(trials, [review.trial_id]))?;
+        if let Some(unknown) = review.reports.iter().find(|report| !reports.contains(report)) {
+            return Err(refuse(format!("{what}: the archive has no safety report {unknown}")));
+        }
+    }
+    Ok(())
+}
+
+/// A standing answer that a person gave once: raters are asked again.
+fn is_of_person(row: &FeedbackRow) -> bool {
+    matches!(row.source, Source::Subject | Source::Clinician | Source::Script)
+        && !row.by_rater
+        && row.retraction.is_none()
+}
+
+fn sorted(a: TrialId, b: TrialId) -> (TrialId, TrialId) {
+    if a < b { (a, b) } else { (b, a) }
+}
+
+fn pair(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
+    match *content {
+        FeedbackContent::Preference { winner, loser } => Some(sorted(winner, loser)),
+        FeedbackContent::Tie { a, b } => Some(sorted(a, b)),
+        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
+    }
+}
+
+/// Checks that an answer is not older than what it compares.
+fn after_both(answered_at: Instant, compared: [&Trial; 2]) -> Result<(), String> {
+    match compared.iter().find(|trial| trial.created_at > answered_at) {
+        Some(trial) => Err(format!("it is from {answered_at}, before trial {} was planned", trial.number)),
+        None => Ok(()),
+    }
+}
+
+/// Checks a row of the feedback log against the trials that it names.
+fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
+    let trial =
+        |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} does not belong to this study"));
+    match row.content {
+        FeedbackContent::Label { trial: id, category } => {
+            let state = trial(id)?.state;
+            let converged = state == TrialState::Converged;
+            if !state.is_result() || category != u32::from(converged) {
+                return Err(format!("category {category} does not match the trial state {}", state.as_str()));
+            }
+            if !matches!(row.source, Source::Convergence | Source::Script) {
+                return Err(format!("the source of a label is {}", row.source.as_str()));
+            }
+        }
+        FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
+            let (a, b) = (trial(a)?, trial(b)?);
+            after_both(row.created_at, [a, b])?;
+            if a.state != TrialState::Converged || b.state != TrialState::Converged {
+                return Err("it compares a trial that did not converge".to_owned());
+            }
+            match row.source {
+                Source::Convergence => return Err("the source of a preference is convergence".to_owned()),
+                Source::GaitRmse => {
+                    if study.plan.feedback_mode == FeedbackMode::Human {
+                        return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());
+                    }
+                    let (Some(one), Some(other)) = (a.gait_rmse_rad, b.gait_rmse_rad) else {
+                        return Err("Gait RMSE compares a trial without a Gait RMSE".to_owned());
+                    };
+                    let expected = by_gait_rmse((a.id, one), (b.id, other));
+                    if pair(&expected) != pair(&row.content)
+                        || std::mem::discriminant(&expected) != std::mem::discriminant(&row.content)
+                        || matches!((expected, row.content), (FeedbackContent::Preference { winner, .. }, FeedbackContent::Preference { winner: told, .. }) if winner != told)
+                    {
+                        return Err("the preference contradicts Gait RMSE".to_owned());
+                    }
+                }
+                Source::Subject | Source::Clinician | Source::Script => {}
+            }
+        }
+        FeedbackContent::Suggestion { suggested, over } => {
+            trial(over)?;
+            if suggested.0 >= study.plan.search_space.len() {
+                return Err(format!("action {} is not in the search space", suggested.0));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,149 @@
+//! Checks the trials of an imported archive: their figures, gaits and results.
+
+use super::Context;
+use crate::studies::{search_space, trial_state};
+use gait_optimizer::solve::CONVERGED_VIOLATION;
+use gait_optimizer::walking::progress_error_m;
+use gait_optimizer::{Gait, GaitFigures, ReferenceGait, WarmStart};
+use gaitwright_compute::{OnPool, Pool};
+use gaitwright_store::studies::StudyPlan;
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{Connection, StoreError, gaits, results};
+use std::sync::Arc;
+
+/// Tolerance for the hip position that follows from the durations of a converged gait, m: ten times that of a row. The
+/// certificate cannot check the duration of SS1, because the closed loop has no clock there.
+const HIP_PROGRESS_M: f64 = 1e-5;
+
+/// Checks an action, and the figures of a trial against its state and its report.
+pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
+    if trial.action_index.0 >= plan.search_space.len() {
+        return Err(format!("action_index {} is not in the search space", trial.action_index.0));
+    }
+    let action = search_space::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
+    if action.map_err(|e| e.to_string())? != trial.action {
+        return Err("the action does not match its index".to_owned());
+    }
+    let figures = [trial.gait_rmse_rad, trial.cost_of_transport, trial.max_violation, trial.seconds_total];
+    if figures.iter().flatten().any(|figure| !figure.is_finite() || *figure < 0.0) {
+        return Err("a figure is negative or not finite".to_owned());
+    }
+    if trial.asked_by.is_some() || !trial.state.is_result() {
+        let none = trial.report.is_none() && trial.status.is_none();
+        return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
+    }
+    let state = trial.status.and_then(trial_state::result_of);
+    if state != Some(trial.state) {
+        return Err(format!("status {:?} contradicts the state {}", trial.status, trial.state.as_str()));
+    }
+    let Some(report) = &trial.report else {
+        return if trial.state == TrialState::Converged {
+            Err("the solve report is missing".to_owned())
+        } else {
+            Ok(())
+        };
+    };
+    let converged = trial.state == TrialState::Converged;
+    let of_gait = |figure: f64| converged.then_some(figure);
+    let same = Some(report.status) == trial.status
+        && trial.gait_rmse_rad == of_gait(report.gait_rmse_rad)
+        && trial.cost_of_transport == of_gait(report.cost_of_transport)
+        && trial.objective == Some(report.objective)
+        && trial.max_violation == Some(report.max_violation)
+        && trial.iterations.is_some_and(|count| count as usize == report.iterations)
+        && trial.seconds_total == Some(report.seconds_total);
+    if !same {
+        return Err("its figures differ from its solve report".to_owned());
+    }
+    if converged && report.max_violation > CONVERGED_VIOLATION {
+        return Err(format!("it is converged, but its violation is {}", report.max_violation));
+    }
+    Ok(())
+}
+
+/// Checks the gait of a trial and computes its Gait RMSE again. Returns whether the trial has a gait.
+pub(super) async fn gait(
+    db: &mut Connection,
+    pool: &Pool,
+    trial: &Trial,
+    context: &Arc<Context>,
+) -> Result<bool, String> {
+    let text = |error: StoreError| error.to_string();
+    if !gaits::is_here(db, trial.id).await.map_err(text)? {
+        return Ok(false);
+    }
+    if trial.asked_by.is_some() || !trial.state.is_result() {
+        return Err("it has a gait but no solve".to_owned());
+    }
+    let gait = gaits::get(db, trial.id).await.map_err(text)?;
+    let warm_start = gaits::warm_start(db, trial.id).await.map_err(text)?;
+    let iterations = gaits::iterations(db, trial.id).await.map_err(text)?;
+    let (trial, context) = (trial.clone(), Arc::clone(context));
+    let id = trial.id;
+    let checked = move |pool: &OnPool| {
+        let gait = gait.unpack(pool).map_err(text)?;
+        let warm_start = warm_start.unpack(pool).map_err(text)?;
+        iterations.unpack(pool).map_err(text)?;
+        solved(&trial, &context, &gait, &warm_start)?;
+        Ok::<_, String>(gait)
+    };
+    let gait = pool.run(checked).await.map_err(|e| e.to_string())??;
+    if !gaits::is_described(db, id, &gait).await.map_err(text)? {
+        return Err("its gait does not match its row".to_owned());
+    }
+    Ok(true)
+}
+
+/// Checks the stored outcome of a solve against its trial.
+fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart) -> Result<(), String> {
+    gait.validate().map_err(|e| e.to_string())?;
+    if gait.subject != context.body {
+        return Err("its gait belongs to a subject with a different height or body mass".to_owned());
+    }
+    let plan = &context.study.plan;
+    if gait.device != context.device
+        || gait.muscles != plan.muscles
+        || gait.settings != *plan.gait_settings
+        || gait.bounds != trial.action
+    {
+        return Err("its gait belongs to another device, problem or action".to_owned());
+    }
+    if warm_start.muscles != plan.muscles || warm_start.mesh != plan.gait_settings.mesh {
+        return Err("its warm start belongs to another problem".to_owned());
+    }
+    same_figures(trial, gait, &context.reference)?;
+    if trial.state == TrialState::Converged {
+        let error = progress_error_m(gait).map_err(|e| e.to_string())?;
+        let follows = error <= HIP_PROGRESS_M;
+        if !follows {
+            return Err(format!("the durations of its gait do not match its motion: the hip is off by {error:.1e} m"));
+        }
+    }
+    Ok(())
+}
+
+/// Checks every stated figure that the gait determines. Safety reports recognise a motion by these figures.
+fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
+    let Some(report) = &trial.report else { return Ok(()) };
+    let anew = GaitFigures::of(gait, reference).map_err(|e| e.to_string())?;
+    match GaitFigures::stated_in(report).difference(&anew) {
+        Some((name, stated, anew)) => {
+            Err(format!("its stated {name} is {stated}, but computed from its gait it is {anew}"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Checks the results that workers delivered for a trial.
+pub(super) async fn brought(db: &mut Connection, trial: &Trial) -> Result<(), String> {
+    let results = results::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
+    let mut taken = results.iter().filter(|result| result.taken);
+    let Some(result) = taken.next() else { return Ok(()) };
+    if taken.next().is_some() {
+        return Err("two results were accepted".to_owned());
+    }
+    if Some(result.status) != trial.status || result.report != trial.report {
+        return Err("its result differs from the accepted one".to_owned());
+    }
+    Ok(())
+}

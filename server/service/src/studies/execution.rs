@@ -1,0 +1,174 @@
+//! The execution report of one trial's gait: requests for it, its state, and its storage.
+
+use super::scheduler::Scheduler;
+use super::study_plan::LARGEST_SEED;
+use crate::error::Error;
+use gait_optimizer::execution::{ExecutionOptions, ExecutionReport};
+use gait_optimizer::{CancelToken, Gait};
+use gaitwright_store::audit::{self, Actor};
+pub use gaitwright_store::execution_reports::newest;
+use gaitwright_store::execution_reports::{self, GaitSimulated, KeptReport};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{Connection, Packed, Store, TrialId, Writer, commit, consents, events, gaits, trials};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Largest number of simulated walks on a ground: some minutes of processor time.
+pub const MOST_WALKS: u32 = 1000;
+
+/// The simulated walks of a request. There are three grounds: level, ±5 mm and ±10 mm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schema(as = NewExecutionReport)]
+pub struct WalksAsked {
+    /// Number of simulated walks on each ground, 1 to 1000.
+    #[schema(minimum = 1, maximum = 1000)]
+    pub walks: u32,
+    /// Seed of the disturbances. The same seed gives the same report.
+    pub seed: u64,
+}
+
+impl Default for WalksAsked {
+    fn default() -> Self {
+        let ExecutionOptions { walks, seed, .. } = ExecutionOptions::default();
+        Self { walks, seed }
+    }
+}
+
+impl WalksAsked {
+    /// The options of the simulation.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field.
+    pub fn options(self) -> Result<ExecutionOptions, Error> {
+        let Self { walks, seed } = self;
+        if !(1..=MOST_WALKS).contains(&walks) {
+            return Err(Error::invalid("walks", walks, &format!("1 to {MOST_WALKS}")));
+        }
+        if seed > LARGEST_SEED {
+            return Err(Error::invalid("seed", seed, &format!("0 to {LARGEST_SEED}")));
+        }
+        Ok(ExecutionOptions { walks, seed, ..ExecutionOptions::default() })
+    }
+}
+
+/// The state of the execution report of a gait in this process.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Simulation {
+    /// This process has nothing to say of it.
+    None,
+    /// Queued.
+    Queued(WalksAsked),
+    /// The walks are being simulated.
+    Running {
+        /// The request.
+        asked: WalksAsked,
+        /// Number of simulated walks so far.
+        done: u32,
+        /// Number of walks, over all grounds.
+        walks: u32,
+    },
+    /// Somebody cancelled it.
+    Cancelled,
+    /// The simulation failed, for this reason.
+    Failed(String),
+}
+
+impl Simulation {
+    /// The request that is queued or running.
+    pub fn open(&self) -> Option<WalksAsked> {
+        match self {
+            Self::Queued(asked) | Self::Running { asked, .. } => Some(*asked),
+            Self::None | Self::Cancelled | Self::Failed(_) => None,
+        }
+    }
+}
+
+/// The gait of a trial to walk with.
+///
+/// # Errors
+/// [`Error::Conflict`] if the trial has no converged gait, a script evaluated it, or the subject withdrew consent;
+/// [`Error::NotFound`] if the gait was pruned; errors of the database.
+pub(super) async fn gait_of(db: &mut Connection, id: TrialId) -> Result<Packed<Gait>, Error> {
+    let trial = trials::get(db, id).await?;
+    consents::may_be_shown(db, trial.study_id).await?;
+    match why_not(&trial) {
+        Some(reason) => Err(Error::conflict(reason)),
+        None => Ok(gaits::get(db, id).await?),
+    }
+}
+
+/// Why no walk with the gait of a trial can be simulated.
+fn why_not(trial: &Trial) -> Option<String> {
+    let number = trial.number;
+    if trial.state != TrialState::Converged {
+        let state = trial.state.as_str().replace('_', " ");
+        return Some(format!("Trial {number} is {state}. Walks can be simulated with a converged gait only."));
+    }
+    let by_script = format!("Trial {number} was evaluated by a script, which gives no gait to walk with.");
+    trial.asked_by.is_some().then_some(by_script)
+}
+
+/// Requests the report of a trial's gait, unless its newest one is of the same walks.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field; [`Error::Conflict`] if the trial has no converged gait, a script evaluated it,
+/// the subject withdrew consent, or other walks with the gait are queued or running; [`Error::NotFound`] if the gait was
+/// pruned; [`Error::NotReady`] if this process simulates no walks; errors of the database.
+pub async fn ask(
+    writer: &mut Writer,
+    scheduler: &Scheduler,
+    actor: &Actor,
+    id: TrialId,
+    asked: WalksAsked,
+) -> Result<(), Error> {
+    asked.options()?;
+    let open = scheduler.simulating(id).open();
+    if let Some(WalksAsked { walks, seed }) = open.filter(|open| *open != asked) {
+        return Err(Error::conflict(format!(
+            "{walks} walks with seed {seed} are already queued or running for this gait. Wait for them, or cancel the job execution_report-{id}."
+        )));
+    }
+    let study = trials::get(writer, id).await?.study_id;
+    consents::may_be_shown(writer, study).await?;
+    let newest = newest(writer, id).await?.map(|KeptReport { simulated, .. }| simulated);
+    let exists = newest.is_some_and(|newest| (newest.walks, newest.seed) == (asked.walks, asked.seed));
+    if !exists {
+        gait_of(writer, id).await?;
+        if open.is_none() {
+            audit::append(writer, actor, execution_reports::REQUESTED, &format!("trial {id}"), &json!(asked)).await?;
+        }
+    }
+    if scheduler.simulate(id, (!exists).then_some(asked)) {
+        Ok(())
+    } else {
+        Err(Error::NotReady("This service simulates no walks.".to_owned()))
+    }
+}
+
+/// Stores a report, unless it was cancelled meanwhile.
+///
+/// # Errors
+/// [`Error::Conflict`] if the subject withdrew consent; errors of the database.
+pub(super) async fn record(
+    store: &Store,
+    id: TrialId,
+    asked: WalksAsked,
+    report: ExecutionReport,
+    cancel: &CancelToken,
+) -> Result<(), Error> {
+    let mut writer = store.write().await?;
+    let trial = trials::get(&mut writer, id).await?;
+    consents::may_be_shown(&mut writer, trial.study_id).await?;
+    if cancel.is_cancelled() {
+        return Ok(());
+    }
+    let WalksAsked { walks, seed } = asked;
+    let actor = Actor::program();
+    let program = actor.as_str().to_owned();
+    let simulated = GaitSimulated { trial_id: id, number: trial.number, walks, seed, program, report };
+    events::append(&mut writer, trial.study_id, execution_reports::SIMULATED, &simulated).await?;
+    audit::append(&mut writer, &actor, execution_reports::STORED, &format!("trial {id}"), &json!(asked)).await?;
+    Ok(commit(writer).await?)
+}

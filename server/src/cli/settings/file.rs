@@ -1,0 +1,31 @@
+//! The settings file.
+
+use super::KNOWN;
+use gaitwright_service::error::Error;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub(super) fn read(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("Cannot read {}: {e}.", path.display())))
+}
+
+pub(super) fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>, Error> {
+    let malformed = |reason: String| Error::Malformed(format!("{}: {reason}", path.display()));
+    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| malformed(e.to_string()))?;
+    let mut values = BTreeMap::new();
+    for (name, value) in table {
+        if !KNOWN.iter().any(|(known, ..)| *known == name) {
+            let known = KNOWN.iter().map(|(known, ..)| *known).collect::<Vec<_>>().join(", ");
+            return Err(malformed(format!("{name} is not a setting. Settings: {known}.")));
+        }
+        let value = match value {
+            toml::Value::String(text) => text,
+            toml::Value::Integer(number) => number.to_string(),
+            toml::Value::Float(number) => number.to_string(),
+            toml::Value::Boolean(flag) => flag.to_string(),
+            _ => return Err(malformed(format!("{name} must be a string, a number or true/false."))),
+        };
+        values.insert(name, value);
+    }
+    Ok(values)
+}

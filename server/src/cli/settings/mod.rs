@@ -1,0 +1,241 @@
+//! Settings of the service: flags override the environment, which overrides the settings file, which overrides
+//! defaults. Each value has its origin.
+
+mod file;
+mod flags;
+mod values;
+
+pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
+
+use super::output::data;
+use file::{parse, read};
+use gaitwright_service::error::Error;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// The settings file that is read by default.
+const DEFAULT_FILE: &str = "gaitwright.toml";
+
+/// The environment variable that names another settings file.
+const FILE_VARIABLE: &str = "GAITWRIGHT_CONFIG";
+
+/// Every setting: name in the file, default, meaning. Flag and environment variable derive from the name.
+const KNOWN: &[(&str, &str, &str)] = &[
+    ("listen", "127.0.0.1:8080", "address and port to listen on"),
+    ("database", "gaitwright.db", "SQLite file"),
+    ("anchor", "", "second anchor file, preferably on another disk; the first one is next to the database"),
+    ("backup_folder", "", "folder for scheduled backups, preferably on another disk; empty: no backups"),
+    ("backup_hours", "24", "hours between scheduled backups"),
+    ("backup_keep", "14", "number of scheduled backups to keep"),
+    ("host_names", "", "comma-separated host names of the service, besides its address and localhost"),
+    ("workers", "cores", "number of solves that run in parallel; with nats, the total of all workers"),
+    ("nats", "", "NATS broker for remote workers, nats://HOST:PORT; empty: solve in this process"),
+    ("nats_queue", "gaitwright", "name of this service on the broker; its workers must use the same name"),
+    ("sign_in", "true", "whether users and programs must sign in; false only on a loopback address"),
+    ("idle_minutes", "60", "minutes without a request after which a session ends"),
+    ("session_hours", "12", "hours after which a session ends in any case"),
+    ("tls_certificate", "", "PEM file with the certificate chain; enables HTTPS, with tls_key"),
+    ("tls_key", "", "PEM file with the private key"),
+    ("trusted_proxies", "", "comma-separated addresses and networks of reverse proxies whose headers are trusted"),
+    (
+        "proxy_headers",
+        "x-forwarded",
+        "headers of the trusted proxies: x-forwarded (X-Forwarded-For, -Proto, -Host) or forwarded",
+    ),
+    ("connections", "1000", "maximum number of open connections, if the system has enough file descriptors"),
+    ("connections_per_address", "100", "maximum number of connections from one address; trusted proxies are exempt"),
+    ("access_log_days", "0", "days for which rows of the access log are kept; 0: forever"),
+    ("reserve_mb", "500", "free disk space, MB, below which no new study or solve starts"),
+    ("log", "warn,gaitwright=info", "log filter, as in RUST_LOG"),
+    ("log_format", "text", "log format: text or json"),
+];
+
+/// The origin of a value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Origin {
+    Flag,
+    Environment(String),
+    File(PathBuf),
+    Default,
+}
+
+impl std::fmt::Display for Origin {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Flag => write!(f, "flag"),
+            Self::Environment(name) => write!(f, "environment {name}"),
+            Self::File(path) => write!(f, "file {}", path.display()),
+            Self::Default => write!(f, "default"),
+        }
+    }
+}
+
+/// Every setting, as text, with its origin.
+#[derive(Debug)]
+pub(super) struct Settings(BTreeMap<&'static str, (String, Origin)>);
+
+impl Settings {
+    /// Reads flags, environment and file.
+    pub(super) fn read(flags: &Flags) -> Result<Self, Error> {
+        Self::resolve(flags, |name| std::env::var(name).ok())
+    }
+
+    fn resolve(flags: &Flags, environment: impl Fn(&str) -> Option<String>) -> Result<Self, Error> {
+        let named = flags.record.record.config.clone();
+        let (path, file) = match named.or_else(|| environment(FILE_VARIABLE).map(PathBuf::from)) {
+            Some(path) => (path.clone(), Some(read(&path)?)),
+            None => (
+                PathBuf::from(DEFAULT_FILE),
+                Path::new(DEFAULT_FILE).exists().then(|| read(Path::new(DEFAULT_FILE))).transpose()?,
+            ),
+        };
+        let file = parse(&path, file.as_deref().unwrap_or(""))?;
+        let mut found = BTreeMap::new();
+        for &(name, default, _) in KNOWN {
+            let variable = format!("GAITWRIGHT_{}", name.to_uppercase());
+            let value = if let Some(value) = flags.get(name) {
+                (value, Origin::Flag)
+            } else if let Some(value) = environment(&variable) {
+                (value, Origin::Environment(variable))
+            } else if let Some(value) = file.get(name) {
+                (value.clone(), Origin::File(path.clone()))
+            } else {
+                (default.to_owned(), Origin::Default)
+            };
+            found.insert(name, value);
+        }
+        Ok(Self(found))
+    }
+
+    fn text(&self, name: &str) -> &str {
+        self.0.get(name).map_or("", |(value, _)| value)
+    }
+
+    fn parsed<T: FromStr>(&self, name: &str, allowed: &str) -> Result<T, Error> {
+        self.text(name).parse().map_err(|_| self.refused(name, allowed))
+    }
+
+    /// The error for a setting, with its origin.
+    pub(super) fn refused(&self, name: &str, allowed: &str) -> Error {
+        let origin = self.0.get(name).map_or(&Origin::Default, |(_, origin)| origin);
+        Error::invalid(&format!("{name} ({origin})"), self.text(name), allowed)
+    }
+
+    /// Prints every setting, its value and its origin.
+    pub(super) fn show(&self) -> Result<(), Error> {
+        for &(name, _, meaning) in KNOWN {
+            let origin = self.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
+            let value = without_password(self.text(name));
+            data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Environment variables that look like settings of this program but are not. They get a warning, not an error:
+/// Kubernetes announces services in variables that may start with our prefix.
+pub(super) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
+    let is_known = |name: &str| name == "CONFIG" || KNOWN.iter().any(|(known, ..)| known.to_uppercase() == *name);
+    let mut unknown: Vec<String> =
+        names.filter(|name| name.strip_prefix("GAITWRIGHT_").is_some_and(|rest| !is_known(rest))).collect();
+    unknown.sort();
+    unknown
+}
+
+/// The address without the user and password in it.
+fn without_password(text: &str) -> String {
+    let Some((scheme, rest)) = text.split_once("://") else { return text.to_owned() };
+    match rest.rsplit_once('@') {
+        Some((_, host)) => format!("{scheme}://...@{host}"),
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gaitwright_service::access::sign_in::SessionLimits;
+
+    fn settings(flags: &Flags, environment: &[(&str, &str)]) -> Result<Settings, Error> {
+        Settings::resolve(flags, |name| {
+            environment.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
+        })
+    }
+
+    #[test]
+    fn flags_come_before_environment_before_file_before_defaults() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("g.toml");
+        std::fs::write(&file, "workers = 3\nidle_minutes = 15\ndatabase = \"file.db\"\n").unwrap();
+        let record = RecordFlags { config: Some(file.clone()), database: None };
+        let flags = Flags { record: record.into(), workers: Some(5), ..Flags::default() };
+        let found = settings(&flags, &[("GAITWRIGHT_WORKERS", "4"), ("GAITWRIGHT_DATABASE", "env.db")]).unwrap();
+        assert_eq!(found.workers().unwrap(), Some(5));
+        assert_eq!(found.0["workers"].1, Origin::Flag);
+        assert_eq!(found.0["database"], ("env.db".to_owned(), Origin::Environment("GAITWRIGHT_DATABASE".to_owned())));
+        assert_eq!(found.0["idle_minutes"], ("15".to_owned(), Origin::File(file)));
+        assert_eq!(found.0["listen"].1, Origin::Default);
+        assert_eq!(
+            found.session_limits().unwrap(),
+            SessionLimits { idle_seconds: 900.0, lifetime_seconds: 12.0 * 3600.0 }
+        );
+    }
+
+    #[test]
+    fn invalid_values_are_refused_with_their_origin() {
+        let settings_of = settings(&Flags::default(), &[("GAITWRIGHT_WORKERS", "0")]).unwrap();
+        let refused = settings_of.workers().unwrap_err().to_string();
+        assert!(refused.contains("GAITWRIGHT_WORKERS") && refused.contains("1 to 64"), "{refused}");
+        let half = Flags { tls_key: Some("k.pem".to_owned()), ..Flags::default() };
+        assert!(settings(&half, &[]).unwrap().tls().is_err());
+        assert!(parse(Path::new("x.toml"), "colour = 1").unwrap_err().to_string().contains("colour is not a setting"));
+        assert!(parse(Path::new("x.toml"), "workers = [1]").is_err());
+        assert!(parse(Path::new("x.toml"), "workers = ").is_err());
+        let dotted = Flags { nats_queue: Some("a.b".to_owned()), ..Flags::default() };
+        assert!(settings(&dotted, &[]).unwrap().nats().unwrap_err().to_string().contains("letters, digits"));
+    }
+
+    #[test]
+    fn backup_settings_out_of_range_are_refused() {
+        for (name, value) in [("HOURS", "0"), ("HOURS", "1.5"), ("KEEP", "0"), ("FOLDER", "/no such folder")] {
+            let name = format!("GAITWRIGHT_BACKUP_{name}");
+            let refused = settings(&Flags::default(), &[(&name, value)]).unwrap().backups().unwrap_err().to_string();
+            assert!(refused.contains(&name), "{refused}");
+        }
+        assert!(settings(&Flags::default(), &[]).unwrap().backups().unwrap().is_none());
+    }
+
+    #[test]
+    fn invalid_log_settings_are_refused() {
+        let with =
+            |name, value| settings(&Flags::default(), &[(name, value)]).unwrap().log().map_err(|e| e.to_string());
+        assert!(with("GAITWRIGHT_LOG_FORMAT", "json").unwrap().1);
+        let refused = with("GAITWRIGHT_LOG_FORMAT", "xml").unwrap_err();
+        assert!(refused.contains("GAITWRIGHT_LOG_FORMAT") && refused.contains("text or json"), "{refused}");
+        let refused = with("GAITWRIGHT_LOG", "gaitwright=loud").unwrap_err();
+        assert!(refused.contains("gaitwright=loud") && refused.contains("targets and levels"), "{refused}");
+    }
+
+    #[test]
+    fn unknown_environment_variables_are_found() {
+        let names = ["GAITWRIGHT_WORKER", "GAITWRIGHT_WORKERS", "GAITWRIGHT_CONFIG", "HOME"];
+        assert_eq!(unknown_variables(names.into_iter().map(str::to_owned)), ["GAITWRIGHT_WORKER"]);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_settings_file_is_read_or_refused(text in "[a-z_]{0,12} ?=? ?\\PC{0,40}", bytes in "\\PC{0,200}") {
+            let _ = parse(Path::new("x.toml"), &text);
+            let _ = parse(Path::new("x.toml"), &bytes);
+            let _ = parse(Path::new("x.toml"), &format!("listen = {bytes:?}"));
+        }
+    }
+
+    #[test]
+    fn passwords_in_addresses_are_hidden() {
+        assert_eq!(without_password("nats://lab:s3@cret@broker:4222"), "nats://...@broker:4222");
+        assert_eq!(without_password("nats://broker:4222"), "nats://broker:4222");
+        assert_eq!(without_password("warn,gaitwright=info"), "warn,gaitwright=info");
+    }
+}

@@ -1,0 +1,60 @@
+//! Checks of a file before it is opened as a record: not another program's, not an earlier state, not an empty file in
+//! place of a record.
+
+use super::record_files::companion;
+use super::{StoreError, StoreResult, anchor, schema_versions};
+use sqlx::SqlitePool;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
+use std::path::{Path, PathBuf};
+
+/// Refuses a file of another program or a newer version, before a writing connection opens it.
+pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
+    if !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
+        return Ok(());
+    }
+    let options = SqliteConnectOptions::new().filename(path).read_only(true);
+    let Ok(pool) = SqlitePoolOptions::new().max_connections(1).connect_with(options).await else { return Ok(()) };
+    let checked = schema_versions::check_version(&pool, path).await;
+    pool.close().await;
+    match checked {
+        Err(refusal @ (StoreError::NotADatabase { .. } | StoreError::NewerSchema { .. })) => Err(refusal),
+        // A file that cannot be read without writing, such as one with a hot journal, is checked by the next
+        // connection.
+        _ => Ok(()),
+    }
+}
+
+/// Accepts an empty file as a new record, unless an anchor shows that there was one.
+pub(super) fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
+    let bytes = |file: &Path| std::fs::metadata(file).map_or(0, |file| file.len());
+    if bytes(path) > 0 {
+        return Ok(());
+    }
+    let log = companion(path, "-wal");
+    if bytes(&log) > 0 {
+        return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: log });
+    }
+    refuse_to_begin_anew(path, anchors)
+}
+
+/// Refuses a file that is not the record which its companions know: another program's, an earlier state, or an empty file
+/// in its place.
+pub(super) async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
+    if schema_versions::check_version(pool, path).await? == 0 {
+        return refuse_to_begin_anew(path, anchors);
+    }
+    for anchor in anchors {
+        anchor::check(&mut *pool.acquire().await?, path, anchor).await?;
+    }
+    Ok(())
+}
+
+/// Refuses a file without a schema if an anchor shows that its log was lost.
+fn refuse_to_begin_anew(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
+    for anchor in anchors {
+        if anchor::has_seen_rows(anchor)? {
+            return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: anchor.clone() });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,173 @@
+//! Lists of studies: those that a caller reaches, and those that the service works on.
+
+use super::{Study, StudyState, from_row};
+use crate::accessible_studies::Reach;
+use crate::members::{binds, reached};
+use crate::{Connection, Instant, StoreResult, StudyId, SubjectId};
+
+/// Which studies of those that a caller reaches.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Chosen {
+    /// Of this subject.
+    pub subject: Option<SubjectId>,
+    /// In this state.
+    pub state: Option<StudyState>,
+    /// Older than this one.
+    pub before: Option<StudyId>,
+    /// At most so many.
+    pub limit: u32,
+}
+
+impl Chosen {
+    /// The newest ones.
+    pub fn newest(limit: u32) -> Self {
+        Self { limit, ..Self::default() }
+    }
+}
+
+/// Studies that a caller reaches, newest first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn page(db: &mut Connection, reach: Reach, chosen: Chosen) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where ",
+        reached!("id"),
+        " and (?4 is null or id < ?4) and (?5 is null or subject_id = ?5) and (?6 is null or state = ?6) \
+         order by id desc limit ?7"
+    );
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(chosen.before).bind(chosen.subject);
+    let query = query.bind(chosen.state.map(StudyState::as_str)).bind(chosen.limit);
+    query.fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// The accessible studies with comparisons for raters, oldest first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn asking_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where state in ('running', 'waiting') and feedback_mode <> 'automatic' and ",
+        reached!("id"),
+        " order by priority desc, id"
+    );
+    sqlx::query(sql).bind(every).bind(open).bind(principal).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// Every study that the scheduler runs, oldest first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
+    let rows = sqlx::query("select * from studies where state in ('running', 'waiting') order by priority desc, id")
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The newest accessible studies that wait for an action of a person.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where state in ('waiting', 'paused', 'draft') and ",
+        reached!("id"),
+        " order by id desc limit ?4"
+    );
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(limit);
+    query.fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// SQL for the studies with a safety report.
+macro_rules! reported {
+    () => {
+        "select t.study_id from safety_reports r join trials t on t.id = r.trial_id \
+         union select m.study_id from assessments m where m.answer glob 'unsafe*' \
+         and m.id not in (select assessment_id from assessment_retractions) \
+         union select p.study_id from presentations p join presentation_answers a on a.presentation_id = p.id \
+         where a.answer glob 'unsafe*' \
+         union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
+         where a.answer glob 'unsafe*'"
+    };
+}
+
+/// The newest accessible studies with a safety report that was not retracted, without those of subjects who withdrew
+/// consent.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let rows = sqlx::query(concat!(
+        "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and ",
+        reached!("s.id"),
+        " and s.id in (",
+        reported!(),
+        ") order by s.id desc limit ?4",
+    ))
+    .bind(every)
+    .bind(open)
+    .bind(principal)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The studies of a study's subject that have a safety report, each with whether it has the same device. The study
+/// itself comes first, and is listed also if somebody could not tell which gait of a pair is better.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_subject_with_safety_reports(db: &mut Connection, study: StudyId) -> StoreResult<Vec<(StudyId, bool)>> {
+    let sql = concat!(
+        "select s.id, s.device_id = own.device_id from studies own join studies s on s.subject_id = own.subject_id \
+         where own.id = ?1 and (s.id in (",
+        reported!(),
+        ") or s.id = ?1 and (exists (select 1 from assessments where study_id = ?1) or exists (select 1 from presentations p \
+         join presentation_answers a on a.presentation_id = p.id where p.study_id = ?1 and a.answer = 'cannot_tell'))) \
+         order by s.id <> ?1, s.id"
+    );
+    Ok(sqlx::query_as(sql).bind(study).fetch_all(db).await?)
+}
+
+/// The newest accessible studies of a subject.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_subject(db: &mut Connection, reach: Reach, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!("select * from studies where subject_id = ?4 and ", reached!("id"), " order by id desc limit ?5");
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal);
+    query.bind(subject).bind(limit).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// The studies of a subject that have not ended.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn open_of(db: &mut Connection, subject: SubjectId) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where subject_id = ? and state not in ('finished', 'stopped') order by id")
+            .bind(subject)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// Studies that ended before an instant.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn ended_before(db: &mut Connection, at: Instant) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where state in ('finished', 'stopped') and updated_at < ? order by id")
+            .bind(at)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}

@@ -1,0 +1,270 @@
+//! Stored studies.
+
+mod lists;
+mod plan;
+mod state;
+
+pub use lists::{
+    Chosen, active, asking_raters, ended_before, of_subject, of_subject_with_safety_reports, open_of, page,
+    waiting_for_people, with_safety_reports,
+};
+pub use plan::{Evaluation, FeedbackMode, StudyPlan};
+pub use state::StudyState;
+
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
+use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body};
+use serde::Serialize;
+use serde_json::Value;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
+
+/// Study.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Study {
+    /// Identifier.
+    pub id: StudyId,
+    /// Set-up.
+    #[serde(flatten)]
+    pub plan: StudyPlan,
+    /// Parent, if the study is a fork.
+    pub forked_from: Option<StudyId>,
+    /// State.
+    pub state: StudyState,
+    /// Reason for the state; may be empty.
+    pub state_reason: String,
+    /// Revision, which increases with each change.
+    pub revision: i64,
+    /// Time of creation.
+    pub created_at: Instant,
+    /// Time of the last change.
+    pub updated_at: Instant,
+}
+
+/// Reads stored settings. Older settings without a weight on the curvature of activations mean 0, while new studies
+/// without it get the default.
+fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
+    let mut document: Value = json_columns::from_text("gait_settings", text)?;
+    if let Some(weights) = document.get_mut("regularisation").and_then(Value::as_object_mut) {
+        weights.entry("activation_bend").or_insert_with(|| 0.0.into());
+    }
+    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "gait_settings", reason: e.to_string() })
+}
+
+/// Solver settings of earlier versions whose value is now part of the method.
+const FORMER_SOLVER_SETTINGS: [&str; 23] = [
+    "dual_tolerance",
+    "divergence_limit",
+    "mu_warm",
+    "kappa_epsilon",
+    "kappa_mu",
+    "theta_mu",
+    "tau_min",
+    "bound_fraction",
+    "warm_bound_fraction",
+    "warm_multiplier_push",
+    "multiplier_limit",
+    "hessian_regularisation_min",
+    "hessian_regularisation_max",
+    "dual_regularisation",
+    "dual_regularisation_value",
+    "residual_target",
+    "residual_limit",
+    "max_refinements",
+    "watchdog_trigger",
+    "watchdog_trials",
+    "max_soft_steps",
+    "elastic_weight",
+    "max_restoration_phases",
+];
+
+/// Reads stored options of solves, without settings that the solver no longer has.
+fn recorded_options(text: &str) -> StoreResult<SolveOptions> {
+    let mut document: Value = json_columns::from_text("solve_options", text)?;
+    if let Some(solver) = document.get_mut("solver").and_then(Value::as_object_mut) {
+        solver.retain(|name, _| !FORMER_SOLVER_SETTINGS.contains(&name.as_str()));
+    }
+    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "solve_options", reason: e.to_string() })
+}
+
+/// Adds a study.
+///
+/// # Errors
+/// A violated constraint; errors of the database.
+pub async fn insert(
+    db: &mut Connection,
+    plan: &StudyPlan,
+    state: StudyState,
+    forked_from: Option<StudyId>,
+) -> StoreResult<Study> {
+    let at = now();
+    let id = StudyId::fresh();
+    sqlx::query(
+        "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
+         solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
+         seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at, \
+         height_m, body_mass_kg, repeat_results) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(&plan.name)
+    .bind(plan.subject_id)
+    .bind(plan.device_id)
+    .bind(plan.reference_gait_id)
+    .bind(plan.muscles)
+    .bind(json_columns::to_text("gait settings", &plan.gait_settings)?)
+    .bind(json_columns::to_text("solve options", &plan.solve_options)?)
+    .bind(json_columns::to_text("base bounds", &plan.base_bounds)?)
+    .bind(json_columns::to_text("search space", &plan.search_space)?)
+    .bind(json_columns::to_text("learner settings", &plan.learner)?)
+    .bind(plan.feedback_mode.as_str())
+    .bind(plan.trial_budget)
+    .bind(plan.parallel_trials)
+    .bind(plan.priority)
+    .bind(i64::try_from(plan.seed).unwrap_or(i64::MAX))
+    .bind(state.as_str())
+    .bind(plan.evaluation.as_str())
+    .bind(plan.solve_seconds_budget)
+    .bind(plan.unchanged_limit)
+    .bind(forked_from)
+    .bind(at)
+    .bind(at)
+    .bind(plan.body.map(|body| body.height_m))
+    .bind(plan.body.map(|body| body.body_mass_kg))
+    .bind(plan.repeat_results)
+    .execute(db)
+    .await?;
+    Ok(Study {
+        id,
+        plan: plan.clone(),
+        forked_from,
+        state,
+        state_reason: String::new(),
+        revision: 1,
+        created_at: at,
+        updated_at: at,
+    })
+}
+
+/// The study with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`]; errors of the database.
+pub async fn get(db: &mut Connection, id: StudyId) -> StoreResult<Study> {
+    let row = sqlx::query("select * from studies where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "study", id: id.to_string() })
+}
+
+/// The changeable fields of a study.
+#[derive(Debug, Clone)]
+pub struct StudyLimits {
+    /// Name shown to users.
+    pub name: String,
+    /// Priority. Higher values run first.
+    pub priority: i32,
+    /// Number of trials that run in parallel.
+    pub parallel_trials: u32,
+    /// Number of trials.
+    pub trial_budget: u32,
+}
+
+/// Updates the changeable fields.
+///
+/// # Errors
+/// A violated constraint; errors of the database.
+pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &StudyLimits) -> StoreResult<()> {
+    sqlx::query(
+        "update studies set name = ?, priority = ?, parallel_trials = ?, trial_budget = ?, revision = revision + 1, \
+         updated_at = ? where id = ?",
+    )
+    .bind(&limits.name)
+    .bind(limits.priority)
+    .bind(limits.parallel_trials)
+    .bind(limits.trial_budget)
+    .bind(now())
+    .bind(id)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// Changes the state of a study. Returns `false` if the state has changed since it was read.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn set_state(db: &mut Connection, study: &Study, state: StudyState, reason: &str) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "update studies set state = ?, state_reason = ?, revision = revision + 1, updated_at = ? \
+         where id = ? and state = ?",
+    )
+    .bind(state.as_str())
+    .bind(reason)
+    .bind(now())
+    .bind(study.id)
+    .bind(study.state.as_str())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+fn body_of(row: &SqliteRow) -> StoreResult<Option<Body>> {
+    let (height, mass): (Option<f64>, Option<f64>) = (row.try_get("height_m")?, row.try_get("body_mass_kg")?);
+    Ok(height.zip(mass).map(|(height_m, body_mass_kg)| Body { height_m, body_mass_kg }))
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Study> {
+    Ok(Study {
+        id: row.try_get("id")?,
+        plan: StudyPlan {
+            name: row.try_get("name")?,
+            subject_id: row.try_get("subject_id")?,
+            body: body_of(row)?,
+            device_id: row.try_get("device_id")?,
+            reference_gait_id: row.try_get("reference_gait_id")?,
+            muscles: row.try_get("muscles")?,
+            gait_settings: Box::new(recorded_settings(row.try_get("gait_settings")?)?),
+            solve_options: recorded_options(row.try_get("solve_options")?)?,
+            base_bounds: json_columns::column(row, "base_bounds")?,
+            search_space: json_columns::column(row, "search_space")?,
+            learner: json_columns::column(row, "learner")?,
+            feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
+            evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
+            trial_budget: row.try_get("trial_budget")?,
+            solve_seconds_budget: row.try_get("solve_seconds_budget")?,
+            unchanged_limit: row.try_get("unchanged_limit")?,
+            repeat_results: row.try_get::<Option<bool>, _>("repeat_results")?.unwrap_or(true),
+            parallel_trials: row.try_get("parallel_trials")?,
+            priority: row.try_get("priority")?,
+            seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),
+        },
+        forked_from: row.try_get("forked_from")?,
+        state: row.try_get::<&str, _>("state")?.parse()?,
+        state_reason: row.try_get("state_reason")?,
+        revision: row.try_get("revision")?,
+        created_at: row.try_get("created_at")?,
+        updated_at: row.try_get("updated_at")?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn former_solver_settings_are_skipped_and_unknown_ones_are_damage() {
+        let with =
+            |solver: &str| recorded_options(&format!(r#"{{"solver": {{"required_reduction": 0.5, {solver}}}}}"#));
+        let mut kept = SolveOptions::default();
+        kept.solver.required_reduction = 0.5;
+        assert_eq!(with(r#""watchdog_trials": 4, "dual_regularisation": "adaptive""#).unwrap(), kept);
+        assert!(matches!(with(r#""watchdog": 4"#), Err(StoreError::Damaged { .. })));
+    }
+
+    #[test]
+    fn older_settings_without_curvature_weight_mean_zero() {
+        let old = r#"{"mesh": {"ds2": 4, "ds3": 4, "ss2": 6, "ss1": 6}, "regularisation": {"power_smoothing_w": 1,
+            "torque": 0.003, "acceleration": 0.0001, "contact_force": 0.0001, "activation": 0.003, "fibre_velocity": 0.01}}"#;
+        assert_eq!(recorded_settings(old).unwrap(), GaitSettings::reference_problem());
+        let new = serde_json::to_string(&GaitSettings::default()).unwrap();
+        assert_eq!(recorded_settings(&new).unwrap(), GaitSettings::default());
+    }
+}

@@ -1,0 +1,144 @@
+//! Set-up of a study.
+
+use crate::{DeviceId, ReferenceGaitId, StoreError, StoreResult, SubjectId, openapi_schemas};
+use gait_learner::{LearnerSettings, SearchSpace};
+use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// Who answers comparisons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FeedbackMode {
+    /// Gait RMSE answers every comparison.
+    Automatic,
+    /// People answer, and the study waits for them.
+    Human,
+    /// Gait RMSE answers, and people can add answers.
+    Mixed,
+}
+
+impl FeedbackMode {
+    /// The name in the record and in REST.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Automatic => "automatic",
+            Self::Human => "human",
+            Self::Mixed => "mixed",
+        }
+    }
+}
+
+impl FromStr for FeedbackMode {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Automatic, Self::Human, Self::Mixed]
+            .into_iter()
+            .find(|mode| mode.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "feedback mode", reason: text.to_owned() })
+    }
+}
+
+/// Who evaluates trials.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Evaluation {
+    /// The service, by optimisation.
+    Optimizer,
+    /// Lab scripts, which ask for trials and report their outcomes.
+    Script,
+}
+
+impl Evaluation {
+    /// The name in the record and in REST.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Optimizer => "optimizer",
+            Self::Script => "script",
+        }
+    }
+}
+
+impl FromStr for Evaluation {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Optimizer, Self::Script]
+            .into_iter()
+            .find(|evaluation| evaluation.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "evaluation", reason: text.to_owned() })
+    }
+}
+
+/// Set-up of a study.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct StudyPlan {
+    /// Name shown to users.
+    pub name: String,
+    /// Subject of the study.
+    pub subject_id: SubjectId,
+    /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
+    /// entered first.
+    #[schema(value_type = Option<openapi_schemas::Body>)]
+    pub body: Option<Body>,
+    /// Device.
+    pub device_id: DeviceId,
+    /// Reference gait for Gait RMSE.
+    pub reference_gait_id: ReferenceGaitId,
+    /// Whether to solve with muscles (C1-C12) or without (C1-C4).
+    pub muscles: bool,
+    /// Settings of the gait problem.
+    #[schema(value_type = openapi_schemas::GaitSettings)]
+    pub gait_settings: Box<GaitSettings>,
+    /// Limits of one solve.
+    #[schema(value_type = openapi_schemas::SolveOptions)]
+    pub solve_options: SolveOptions,
+    /// Values of bounds that are not tuned.
+    #[schema(value_type = openapi_schemas::Bounds)]
+    pub base_bounds: TunedBounds,
+    /// Tuned bounds and their values, with each dimension named after its bound.
+    #[schema(value_type = openapi_schemas::SearchSpace)]
+    pub search_space: SearchSpace,
+    /// Settings of the learner.
+    #[schema(value_type = openapi_schemas::LearnerSettings)]
+    pub learner: LearnerSettings,
+    /// Who answers comparisons.
+    pub feedback_mode: FeedbackMode,
+    /// Who evaluates trials.
+    pub evaluation: Evaluation,
+    /// Number of trials.
+    pub trial_budget: u32,
+    /// Total solve time, s, after which no new trial starts.
+    pub solve_seconds_budget: Option<f64>,
+    /// The study finishes when the best action has not changed over this many results.
+    pub unchanged_limit: Option<u32>,
+    /// Whether a trial may have an action whose gait is known from another trial, as in the paper. Always true for
+    /// studies created by versions without this setting.
+    pub repeat_results: bool,
+    /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
+    pub parallel_trials: u32,
+    /// Priority, -10 to 10. Higher values run first.
+    pub priority: i32,
+    /// Seed for all random draws except allocations.
+    pub seed: u64,
+}
+
+impl StudyPlan {
+    /// Whether no trial may have an action whose gait is known. Scripts measure, so equal actions can give other results.
+    pub fn tries_new_gaits_only(&self) -> bool {
+        self.evaluation == Evaluation::Optimizer && !self.repeat_results
+    }
+
+    /// Whether a study with the other plan would try the same trials: same subject, problem, learner and seed. Name,
+    /// priority and parallel trials do not matter.
+    pub fn tries_the_same_as(&self, other: &Self) -> bool {
+        // Older studies without a body use the values entered first.
+        let bodies_differ = self.body.is_some() && other.body.is_some() && self.body != other.body;
+        if bodies_differ {
+            return false;
+        }
+        let own =
+            |plan: &Self| Self { name: String::new(), body: None, priority: 0, parallel_trials: 1, ..plan.clone() };
+        own(self) == own(other)
+    }
+}

@@ -1,0 +1,65 @@
+//! State of a trial.
+
+use crate::{StoreError, StoreResult};
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// State of a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TrialState {
+    /// Waiting for a worker.
+    Queued,
+    /// Being evaluated.
+    Running,
+    /// The solve found a gait. A result.
+    Converged,
+    /// The solve ended without a gait. Also a result.
+    NotConverged,
+    /// The program failed by a panic, an error or the time limit. Not a result.
+    Failed,
+    /// The workers stopped responding. Not a result.
+    Lost,
+    /// Cancelled by a person.
+    Cancelled,
+}
+
+impl TrialState {
+    /// Every state.
+    pub const ALL: [Self; 7] =
+        [Self::Queued, Self::Running, Self::Converged, Self::NotConverged, Self::Failed, Self::Lost, Self::Cancelled];
+
+    /// The name in the record and in REST.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Converged => "converged",
+            Self::NotConverged => "not_converged",
+            Self::Failed => "failed",
+            Self::Lost => "lost",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// Whether it is queued or running.
+    pub fn is_open(self) -> bool {
+        matches!(self, Self::Queued | Self::Running)
+    }
+
+    /// Whether it is a result for the learner: converged or not converged.
+    pub fn is_result(self) -> bool {
+        matches!(self, Self::Converged | Self::NotConverged)
+    }
+}
+
+impl FromStr for TrialState {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|state| state.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "trial state", reason: text.to_owned() })
+    }
+}
