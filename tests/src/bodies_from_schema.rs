@@ -49,10 +49,13 @@ impl Drawn {
     }
 
     fn value(&mut self, field: &str, schema: &Value) -> Value {
-        if let Some(known) = self.known.get(field).cloned() {
+        let schema = &self.resolved(schema);
+        // A field of words can have the name of a field with known values.
+        if let Some(known) = self.known.get(field).cloned()
+            && !(schema["enum"].is_array() && known.iter().all(Value::is_boolean))
+        {
             return self.one_of(&known);
         }
-        let schema = &self.resolved(schema);
         if let Some(branches) = schema["oneOf"].as_array() {
             let branch = self.one_of(branches);
             return self.value(field, &branch);

@@ -203,7 +203,10 @@ async fn cancelled_or_interrupted_backup_leaves_no_file() {
     assert_eq!(found(id).await["state"], "cancelled");
     let interrupted = found(interrupted).await;
     assert_eq!(interrupted["state"], "failed");
-    assert!(interrupted["reason"].as_str().unwrap().contains("ended before"), "{interrupted}");
+    assert!(
+        interrupted["reason"].as_str().unwrap().contains("stopped before the backup was complete"),
+        "{interrupted}"
+    );
     let files = cli::files(folder.path());
     assert!(!files.iter().any(|name| name.contains("backup-")), "{files:?}");
     service.stop().await;

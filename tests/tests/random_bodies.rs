@@ -24,7 +24,10 @@ use tower::ServiceExt;
 const DRAWS: usize = 8;
 
 /// Operations that hardly ever succeed with a drawn body, because a value must exist in the record.
-const SELDOM_FIT: [&str; 1] = ["post /studies/{id}/suggestions"];
+const SELDOM_FIT: [&str; 2] = ["post /studies/{id}/suggestions", SIMULATE];
+
+/// The service of this test simulates no walks, so that this operation ends with 503 after it has checked the body.
+const SIMULATE: &str = "post /trials/{id}/execution-report";
 
 /// A rater who can become a member.
 const MEMBER: &str = "a drawn member";
@@ -287,7 +290,9 @@ async fn bodies_are_accepted_if_and_only_if_they_match_the_description() {
                 let field = serde_json::from_str::<Value>(&answer.text).unwrap_or_default()["field"].clone();
                 let in_words = answer.status == StatusCode::UNPROCESSABLE_ENTITY
                     && is_said_in_words(&drawn, schema, field.as_str().unwrap_or_default());
-                if !(answer.status.is_success() || state || in_words) {
+                let without_simulator =
+                    answer.status == StatusCode::SERVICE_UNAVAILABLE && format!("{method} {path}") == SIMULATE;
+                if !(answer.status.is_success() || state || in_words || without_simulator) {
                     faults.push(format!("{method} {path}: {body} is refused: {}", answer.text));
                 }
                 accepted += usize::from(answer.status.is_success());

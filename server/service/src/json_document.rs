@@ -25,7 +25,12 @@ const SHOWN_VALUE: usize = 80;
 /// [`Error::Unreadable`] naming the field, [`Error::Malformed`] if the error has no field.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
-    let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|e| unreadable(e, bytes))?;
+    let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        // The parser reports a value of the wrong kind in place of a word as a syntax error.
+        let parsed = if error.inner().is_data() { None } else { serde_json::from_slice::<Value>(bytes).ok() };
+        let of_value = parsed.and_then(|parsed| serde_path_to_error::deserialize::<_, T>(Named(&parsed)).err());
+        unreadable(of_value.unwrap_or(error), bytes)
+    })?;
     reader.end().map_err(|e| Error::Malformed(format!("There is text after the JSON document: {e}.")))?;
     let parsed: Value = serde_json::from_slice(bytes).map_err(|e| Error::Malformed(e.to_string()))?;
     serde_path_to_error::deserialize::<_, T>(Named(&parsed)).map_err(|e| unreadable(e, bytes))?;
@@ -233,6 +238,14 @@ mod tests {
             Ok(_) => panic!("{text} was taken"),
             Err(error) => error.to_string(),
         }
+    }
+
+    #[test]
+    fn value_of_the_wrong_kind_in_place_of_a_word_is_not_called_a_syntax_error() {
+        let text = refusal::<gait_learner::LearnerSettings>(r#"{"start": false}"#);
+        assert!(text.starts_with("The field start is false (line 1, column ") && text.contains("it must be"), "{text}");
+        let broken = refusal::<gait_learner::LearnerSettings>(r#"{"start": fals}"#);
+        assert!(broken.starts_with("The field start is not JSON"), "{broken}");
     }
 
     #[test]
