@@ -14,6 +14,7 @@ use gait_optimizer::execution::ExecutionReport;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, WalksAsked};
+use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::job::JobId;
 use gaitwright_store::execution_reports::{GaitSimulated, KeptReport};
 use gaitwright_store::{Instant, TrialId, openapi_schemas};
@@ -89,6 +90,6 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    execution::ask(&mut writer, &app.scheduler, &request.actor, id, asked).await?;
+    execution_request::ask(&mut writer, &app.scheduler, &request.actor, id, asked).await?;
     Job::respond(&request, &app, writer, JobId::ExecutionReport(id)).await
 }

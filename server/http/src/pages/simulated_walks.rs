@@ -11,7 +11,8 @@ use axum::response::Redirect;
 use gait_optimizer::execution::{ExecutionReport, WalksOnGround};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::execution::{self, MOST_WALKS, Simulation, WalksAsked};
+use gaitwright_service::studies::execution::{MOST_WALKS, Simulation, WalksAsked};
+use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
 use gaitwright_store::execution_reports::{GaitSimulated, KeptReport};
 use gaitwright_store::{Instant, TrialId, commit};
@@ -147,7 +148,7 @@ pub(super) async fn post(
 ) -> Result<Redirect, PageError> {
     let asked = fields.asked()?;
     let mut writer = app.write().await?;
-    execution::ask(&mut writer, &app.scheduler, &authorized.caller.actor, id, asked).await?;
+    execution_request::ask(&mut writer, &app.scheduler, &authorized.caller.actor, id, asked).await?;
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}#simulated-walks")))

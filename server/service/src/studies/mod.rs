@@ -19,6 +19,7 @@ pub mod consent;
 pub mod device;
 pub mod equal_actions;
 pub mod execution;
+pub mod execution_request;
 mod explainer;
 pub mod explanation;
 pub mod history;

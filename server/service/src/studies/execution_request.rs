@@ -1,0 +1,46 @@
+//! Requests for the execution report of one trial's gait.
+
+use super::execution::{WalksAsked, gait_of, newest};
+use super::scheduler::Scheduler;
+use crate::error::Error;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::execution_reports::{self, KeptReport};
+use gaitwright_store::{TrialId, Writer, consents, trials};
+use serde_json::json;
+
+/// Requests the report of a trial's gait, unless its newest one is of the same walks.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field; [`Error::Conflict`] if the trial has no converged gait, a script evaluated it,
+/// the subject withdrew consent, or other walks with the gait are queued or running; [`Error::NotFound`] if the gait was
+/// pruned; [`Error::NotReady`] if this process simulates no walks; errors of the database.
+pub async fn ask(
+    writer: &mut Writer,
+    scheduler: &Scheduler,
+    actor: &Actor,
+    id: TrialId,
+    asked: WalksAsked,
+) -> Result<(), Error> {
+    asked.options()?;
+    let open = scheduler.simulating(id).open();
+    if let Some(WalksAsked { walks, seed }) = open.filter(|open| *open != asked) {
+        return Err(Error::conflict(format!(
+            "{walks} walks with seed {seed} are already queued or running for this gait. Wait for them, or cancel the job execution_report-{id}."
+        )));
+    }
+    let study = trials::get(writer, id).await?.study_id;
+    consents::may_be_shown(writer, study).await?;
+    let newest = newest(writer, id).await?.map(|KeptReport { simulated, .. }| simulated);
+    let exists = newest.is_some_and(|newest| (newest.walks, newest.seed) == (asked.walks, asked.seed));
+    if !exists {
+        gait_of(writer, id).await?;
+        if open.is_none() {
+            audit::append(writer, actor, execution_reports::REQUESTED, &format!("trial {id}"), &json!(asked)).await?;
+        }
+    }
+    if scheduler.simulate(id, (!exists).then_some(asked)) {
+        Ok(())
+    } else {
+        Err(Error::NotReady("This service simulates no walks.".to_owned()))
+    }
+}
