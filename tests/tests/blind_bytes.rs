@@ -188,11 +188,10 @@ fn named(headers: &HeaderMap) -> Vec<(String, String)> {
     kept.map(|(name, value)| (name.to_string(), token(value.to_str().unwrap()))).collect()
 }
 
-#[tokio::test]
-async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
-    let (_folder, service) = service().await;
-    let study = waiting(&service, 40).await;
-    let (rater, clinician) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Clinician).await);
+/// Answers every pair of a study and says of what kind each was, provided that all of them looked the same.
+async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<Kind> {
+    let study = waiting(service, 40).await;
+    let (rater, clinician) = (rater_of(service, &[study]).await, signed_in(service, Role::Clinician).await);
     let mut looks = BTreeSet::new();
     let mut kinds = Vec::new();
     for turn in 0..4000 {
@@ -200,7 +199,7 @@ async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
         if present.state == StudyState::Finished {
             break;
         }
-        let next = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await;
+        let next = post(service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await;
         let pair = next.json()["pair"].clone();
         if pair.is_null() {
             // The study is still processing the answer.
@@ -210,21 +209,21 @@ async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
         let shown = presentations::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
         let shown = shown.last().unwrap().clone();
         if shown.kind == Kind::New {
-            answer_too(&service, &clinician, study, &shown).await;
+            answer_too(service, &clinician, study, &shown).await;
         }
         kinds.push(shown.kind);
         let token = pair["token"].as_str().unwrap();
-        let page = get(&service, &rater, &format!("/rate/pair/{token}")).await;
-        let motion = get(&service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/first")).await;
+        let page = get(service, &rater, &format!("/rate/pair/{token}")).await;
+        let motion = get(service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/first")).await;
         let path = format!("/rate/pair/{token}");
         let answered = if turn % 2 == 0 {
             let path = format!("/api/v1/blind-pairs/{token}/answer");
-            post(&service, &rater, &path, &json!({"answer": "first"})).await
+            post(service, &rater, &path, &json!({"answer": "first"})).await
         } else {
-            send(&service, &rater, &Method::POST, &path, FORM, "answer=first").await
+            send(service, &rater, &Method::POST, &path, FORM, "answer=first").await
         };
-        let again = get(&service, &rater, &path).await;
-        let saved = get(&service, &rater, &format!("/rate?saved={token}")).await;
+        let again = get(service, &rater, &path).await;
+        let saved = get(service, &rater, &format!("/rate?saved={token}")).await;
         let saved = saved.text.split_once("Saved ").unwrap().1.split_once("UTC").unwrap().1;
         let saved = saved.split_once("</div>").unwrap().0.replace(token, "TOKEN");
         looks.insert(format!(
@@ -237,11 +236,25 @@ async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
         ));
         looks.insert(format!("{} {:?}", turn % 2, masked(&answered, &pair)));
     }
-    let count = |kind| kinds.iter().filter(|k| **k == kind).count();
-    assert!(count(Kind::Repeat) > 0, "{kinds:?}");
     // One look of a pair, and one of an answer for each way of giving it.
     assert_eq!(looks.len(), 3, "{looks:#?}");
-    service.stop().await;
+    kinds
+}
+
+#[tokio::test]
+async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
+    let (_folder, service) = service().await;
+    // The operating system draws which pairs are repeats, one in ten, so a study has none with a chance of 2 %, and
+    // eight studies have none with a chance of 1e-13.
+    for _ in 0..8 {
+        let kinds = kinds_of_pairs_that_look_the_same(&service).await;
+        assert!(kinds.len() > 30, "{kinds:?}");
+        if kinds.contains(&Kind::Repeat) {
+            service.stop().await;
+            return;
+        }
+    }
+    panic!("no pair was a repeat in eight studies");
 }
 
 /// A clinician answers the comparison that a rater was shown.
