@@ -18,6 +18,7 @@ pub mod every_table;
 pub mod explained;
 pub mod large;
 pub mod measured;
+pub mod people;
 pub mod read_allocations;
 pub mod scripted;
 pub mod service;

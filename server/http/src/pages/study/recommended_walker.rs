@@ -11,12 +11,17 @@ use gaitwright_store::{TrialId, gaits, reference_gaits};
 /// The walker of a trial, which a script moves.
 pub(super) struct RecommendedWalker {
     pub(super) trial: TrialId,
+    pub(super) number: u32,
     pub(super) svg: String,
 }
 
 impl RecommendedWalker {
     /// `None` if the gait is not stored, or too malformed to draw.
-    pub(super) async fn read(app: &mut AppState, study: &Study, trial: TrialId) -> Result<Option<Self>, Error> {
+    pub(super) async fn read(
+        app: &mut AppState,
+        study: &Study,
+        (trial, number): (TrialId, u32),
+    ) -> Result<Option<Self>, Error> {
         let mut reader = app.read().await?;
         let Some(gait) = gaits::find(&mut reader, trial).await? else { return Ok(None) };
         let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
@@ -28,6 +33,6 @@ impl RecommendedWalker {
             Ok::<_, Error>(figure.ok().map(|figure| figure.svg("The recommended gait")))
         };
         let svg = app.compute(draw).await.map_err(Error::from)??;
-        Ok(svg.map(|svg| Self { trial, svg }))
+        Ok(svg.map(|svg| Self { trial, number, svg }))
     }
 }
