@@ -1,7 +1,7 @@
 //! How long the utility of the recommended gait over the answers takes: all of it, as after a restart, and again after one more
 //! answer.
 //!
-//! `cargo run --release -p gaitwright-tests --example utility_history -- [ANSWERS]...`
+//! `cargo run -p gaitwright-tests --example utility_history -- [ANSWERS]...`
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -44,7 +44,8 @@ const walkerOf = (shown) => shown.querySelector("[data-walker]");
  */
 async function updateWalker(shown, fresh) {
   const [walker, next] = [walkerOf(shown), walkerOf(fresh)];
-  if (!walker || !next || next.dataset.shown === walker.dataset.shown || walker.contains(document.activeElement)) return;
+  if (!walker || next?.dataset.shown === walker.dataset.shown || walker.contains(document.activeElement)) return;
+  if (!next) return walker.remove();
   walker.replaceWith(next);
   const box = /** @type {HTMLElement | null} */ (next.querySelector(".walker"));
   if (box) (await import("./gait.mjs")).startWalker(box);

@@ -66,7 +66,7 @@ impl Link {
     /// Opens the link. Not in the order of the keyboard: a table of the page has the same links.
     pub(super) fn open(&self, svg: &mut String) -> std::fmt::Result {
         let (address, name) = (escape(&self.address), escape(&self.name));
-        write!(svg, "<a href=\"{address}\" tabindex=\"-1\" aria-label=\"{name}\"><title>{name}</title>")
+        write!(svg, "<a href=\"{address}\" tabindex=\"-1\" aria-label=\"{name}\">")
     }
 }
 

@@ -137,7 +137,7 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
     assert_eq!((page.count(&format!("{chart} .band")).await, page.count("[data-part=history] svg.chart").await), (1, 1));
     assert_eq!(page.count("[data-part=course] svg.chart").await, 1);
     // The same figures as on the page Analysis.
-    let sentence = "document.querySelector('[data-part=best] table').previousElementSibling.textContent.match(/\\d+ %/)?.[0]";
+    let sentence = "document.querySelector('[data-part=best] table').previousElementSibling.textContent.match(/\\d+\\s%/)?.[0].replace(/\\s/, ' ')";
     let sure = page.value(sentence).await;
     assert!(page.text("[data-part=best]").await.contains("After 4 comparisons, the learner is")
         || page.text("[data-part=best]").await.contains("after 4 comparisons, the learner is only"));
@@ -252,7 +252,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     let recommended = site.service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     assert_eq!(page.text("#best tbody tr:first-child a").await, recommended["number"].to_string(), "{recommended}");
     assert!(page.text("#best tr.best").await.contains("recommended"));
-    let means = "[...document.querySelectorAll('#best tbody tr')].map(r => Number(r.cells[2].textContent.split(' ')[0].replace('\u2212', '-')))";
+    let means = "[...document.querySelectorAll('#best tbody tr')].map(r => Number(r.cells[2].textContent.split(' ')[0].replace('\u{2212}', '-')))";
     assert_eq!(page.value(&format!("{means}.every((mean, i, all) => i === 0 || mean <= all[i - 1])")).await, "true");
     assert_eq!(page.count("#best meter").await, 0);
     let bars = "[...document.querySelectorAll('#bounds meter')].map(m => m.value)";

@@ -48,7 +48,8 @@ fn believed(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
         return Some("It is the only gait that can be recommended, so there is nothing to compare it with.".to_owned());
     };
     let (difference, number) = (next.behind?, snapshot.trial(*next.trials.first()?)?.number);
-    let sure = percent(difference.probability_above_zero());
+    // Without a line break before the sign.
+    let sure = percent(difference.probability_above_zero()).replace(' ', "\u{a0}");
     let gaits = belief.gaits.len();
     Some(if is_told(&difference) {
         format!(

@@ -8,7 +8,7 @@ mod without_gait;
 
 use self::answers::{AnswerRow, answers};
 pub(super) use self::answers::{answer_in_words, assessment_in_words};
-use self::recommended_walker::RecommendedWalker;
+use self::recommended_walker::Walker;
 use self::time_left::time_left;
 use self::trials_table::{Choice, TrialRow, TrialsTable};
 use self::without_gait::WithoutGait;
@@ -47,7 +47,7 @@ use gaitwright_store::assessments::{self};
 use gaitwright_store::devices::{self, Device};
 use gaitwright_store::feedback::{self};
 use gaitwright_store::imports::{self, Import};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
 use gaitwright_store::{
@@ -105,8 +105,10 @@ struct Live {
     never_active: String,
     /// Number of results, and number of planned trials.
     progress: [String; 2],
-    /// Expected remaining time; empty if unknown.
+    /// Expected remaining time; empty unless the study runs.
     pace: String,
+    /// Why the next solve has not started; empty if one runs.
+    queued: String,
     running: Vec<RunningRow>,
     best: Option<Best>,
     /// How sure the recommendation is; `None` without one, and for a large study.
@@ -129,32 +131,6 @@ struct Live {
     /// The trial whose certificate the next comparison waits for.
     question_after: Option<(TrialId, u32)>,
     can_compare: bool,
-}
-
-/// The recommended gait on the page.
-enum Walker {
-    /// No gait is or will be stored.
-    None,
-    /// A trial that is still to converge.
-    Expected,
-    /// The page shows it already.
-    Shown(TrialId),
-    Walks(RecommendedWalker),
-}
-
-impl Walker {
-    /// The trial in its place; empty if there is none yet.
-    fn trial(&self) -> String {
-        match self {
-            Self::None | Self::Expected => String::new(),
-            Self::Shown(trial) => trial.to_string(),
-            Self::Walks(walker) => walker.trial.to_string(),
-        }
-    }
-
-    fn has_place(&self) -> bool {
-        !matches!(self, Self::None)
-    }
 }
 
 impl Live {
@@ -417,9 +393,10 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let mut live = view(snapshot, counts, found, running, table, answers, caller.may(Run::NEEDED));
     live.never_active = inactive.join(", ");
     live.pace = pace;
-    live.walker = walker(app, &live, &shown).await?;
+    let best = live.best.as_ref().map(|best| (best.id, best.number, best.has_gait));
+    live.walker = Walker::read(app, &live.study, best, &shown).await?;
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
-        live.pace = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
+        live.queued = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
     }
     Ok(live)
 }
@@ -443,21 +420,6 @@ fn learned(
     }
     let certainty = certainty(snapshot, &*beliefs.of(pool, snapshot)?);
     Ok(Learned { outcome, certainty, utility: utility(pool, snapshot, beliefs)? })
-}
-
-/// The recommended gait, drawn unless the page shows it already.
-async fn walker(app: &mut AppState, live: &Live, shown: &str) -> Result<Walker, Error> {
-    match &live.best {
-        Some(best) if best.has_gait && best.id.to_string() == shown => Ok(Walker::Shown(best.id)),
-        Some(best) if best.has_gait => {
-            let walker = RecommendedWalker::read(app, &live.study, (best.id, best.number)).await?;
-            Ok(walker.map_or(Walker::None, Walker::Walks))
-        }
-        None if !live.study.state.has_ended() && live.study.plan.evaluation == Evaluation::Optimizer => {
-            Ok(Walker::Expected)
-        }
-        _ => Ok(Walker::None),
-    }
 }
 
 fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
@@ -535,6 +497,7 @@ fn view(
         may_extend: acts.contains(&Act::Extend),
         acts: acts.into_iter().filter_map(button).collect(),
         pace: String::new(),
+        queued: String::new(),
         without_gait,
         never_active: String::new(),
         progress: [counts.results(), snapshot.study.plan.trial_budget].map(|trials| format::count(trials.into())),
