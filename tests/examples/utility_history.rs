@@ -8,7 +8,7 @@
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::StudyId;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::FeedbackMode;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::people::answer_once;
 use gaitwright_tests::service::Service;
@@ -23,12 +23,10 @@ async fn main() {
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
         let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (390, FeedbackMode::Human)).await;
         for _ in 0..answers {
-            service.wait_for(study, &[StudyState::Waiting]).await;
             answer_once(&service, study).await;
         }
         let beliefs = Arc::new(Beliefs::default());
         let (all, points) = history(&service, study, &beliefs).await;
-        service.wait_for(study, &[StudyState::Waiting]).await;
         answer_once(&service, study).await;
         let (again, _) = history(&service, study, &beliefs).await;
         println!("{answers} answers: {points} points in {all:.2?}, after one more answer in {again:.2?}");

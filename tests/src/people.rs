@@ -6,13 +6,21 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::{StudyId, TrialId};
 use serde_json::json;
+use std::time::Duration;
 
-/// The comparison that a study waits for, with the newest gait first.
+/// The comparison that a study waits for, with the newest gait first. Waits until there is one.
 pub async fn asked(service: &Service, study: StudyId) -> (TrialId, TrialId) {
-    let study = service.wait_for(study, &[StudyState::Waiting]).await;
-    let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-    let question = service.store.clone().compute(move |pool| open_question(pool, &snapshot)).await.unwrap();
-    question.unwrap().trials().unwrap()
+    for _ in 0..2000 {
+        // After an answer a study is waiting for a moment longer.
+        let study = service.wait_for(study, &[StudyState::Waiting]).await;
+        let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
+        let question = service.store.clone().compute(move |pool| open_question(pool, &snapshot)).await.unwrap();
+        if let Some(trials) = question.unwrap().trials() {
+            return trials;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    panic!("the study asks nothing");
 }
 
 /// Answers it as Gait RMSE would: the lower one is better.

@@ -125,7 +125,7 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
     for _ in 0..4 {
         people::answer_once(&site.service, study).await;
     }
-    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    people::asked(&site.service, study).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.resize(1280, 800).await;
     // The first button of the page.
