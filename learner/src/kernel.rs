@@ -200,12 +200,12 @@ impl Kernel {
             let n = table.order();
             (0..n).map(|i| table.row(i).iter().sum::<f64>()).sum::<f64>() / (n * n) as f64
         };
-        self.combine(one.iter().zip(other).zip(self.factors.iter().zip(&self.broad)).map(|(levels, (factor, broad))| {
-            match levels {
+        self.combine(one.iter().zip(other).zip(self.factors.iter().zip(&self.broad)).map(
+            |(levels, (factor, broad))| match levels {
                 (Some(i), Some(j)) => (factor.at(*i, *j), broad.at(*i, *j)),
                 _ => (mean(factor), mean(broad)),
-            }
-        }))
+            },
+        ))
     }
 
     /// Prior covariances of one action with many, all given by their levels.

@@ -78,10 +78,7 @@ impl Posterior {
         let marginal = |(level, &value): (usize, &f64)| {
             let view = self.average_view(dimension, level);
             let variance = view.covariance(&view, &self.utility);
-            Marginal {
-                value,
-                average: Prediction { mean: view.mean, standard_deviation: variance.max(0.0).sqrt() },
-            }
+            Marginal { value, average: Prediction { mean: view.mean, standard_deviation: variance.max(0.0).sqrt() } }
         };
         Ok(self.dimension(dimension)?.values.iter().enumerate().map(marginal).collect())
     }

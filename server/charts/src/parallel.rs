@@ -1,5 +1,5 @@
 //! Parallel coordinates: one axis for each tuned bound and one for the outcome, and a line for each trial. The better the
-//! outcome, the darker the line. The last axis shows the outcome itself, so no information is in the colour alone.
+//! outcome, the stronger the line. The last axis shows the outcome itself, so no information is in the colour alone.
 
 use super::axis::Axis;
 use super::chart::escape;
@@ -70,7 +70,7 @@ impl Parallel {
     pub fn legend(&self) -> Vec<(String, String)> {
         let mut legend = Vec::new();
         if self.lines.iter().any(|line| line.outcome.is_some()) {
-            legend.push(("key c0 solid".to_owned(), "trial with a gait: the better, the darker".to_owned()));
+            legend.push(("key c0 solid".to_owned(), "trial with a gait: the better, the stronger".to_owned()));
         }
         if self.lines.iter().any(|line| line.outcome.is_none()) {
             legend.push(("key c1 dashed".to_owned(), "trial without a gait".to_owned()));
@@ -171,7 +171,12 @@ impl Parallel {
             }
         }
         if worse > 0 {
-            write!(svg, "<text class=\"tick y over\" x=\"{:.1}\" y=\"{:.1}\">no gait</text>", last - 9.0, NO_GAIT + 5.0)?;
+            write!(
+                svg,
+                "<text class=\"tick y over\" x=\"{:.1}\" y=\"{:.1}\">no gait</text>",
+                last - 9.0,
+                NO_GAIT + 5.0
+            )?;
         }
         Ok(())
     }
@@ -202,10 +207,8 @@ mod tests {
     }
 
     #[test]
-    fn better_lines_are_darker_and_drawn_last() {
-        let order = |drawing: &Parallel| {
-            drawing.ranked().iter().map(|line| line.link.name.clone()).collect::<Vec<_>>()
-        };
+    fn better_lines_are_stronger_and_drawn_last() {
+        let order = |drawing: &Parallel| drawing.ranked().iter().map(|line| line.link.name.clone()).collect::<Vec<_>>();
         assert_eq!(order(&drawing(true)), ["trial 2", "trial 1", "trial 3"]);
         assert_eq!(order(&drawing(false)), ["trial 2", "trial 3", "trial 1"]);
         let svg = drawing(true).svg();

@@ -286,7 +286,8 @@ impl Tab {
         let element = self.page.find_element(selector).await.unwrap();
         // Scrolling, of which a page hears one frame later, hides what it shows at the pointer.
         element.scroll_into_view().await.unwrap();
-        self.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done('drawn'))))").await;
+        self.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done('drawn'))))")
+            .await;
         element.hover().await.unwrap();
     }
 

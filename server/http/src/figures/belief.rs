@@ -99,9 +99,7 @@ pub(crate) fn chosen(belief: &Belief, choice: &AxisChoice) -> Result<Option<(usi
         None => Ok(None),
         Some(name) => {
             let found = names.iter().position(|known| known == name);
-            found
-                .map(Some)
-                .ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
+            found.map(Some).ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
         }
     };
     let (x, y) = (place("x", &choice.x)?, place("y", &choice.y)?);

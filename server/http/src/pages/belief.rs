@@ -163,10 +163,9 @@ fn gait_row(gait: &GaitBelief, snapshot: &StudySnapshot) -> GaitRow {
         trials: trials.take(NAMED).map(|trial| (trial.id, trial.number)).collect(),
         more_trials: gait.trials.len().saturating_sub(NAMED),
         utility: format::utility(&gait.utility),
-        worse: gait.behind.map(|behind| Worse {
-            percent: percent(behind.probability_above_zero()),
-            is_told: is_told(&behind),
-        }),
+        worse: gait
+            .behind
+            .map(|behind| Worse { percent: percent(behind.probability_above_zero()), is_told: is_told(&behind) }),
     }
 }
 

@@ -132,8 +132,7 @@ impl Beliefs {
     /// When the learner cannot work with the log.
     pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Belief>, LearnerError> {
         let version = (snapshot.version, snapshot.safety);
-        self.shown
-            .get_or(snapshot.study.id, version, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
+        self.shown.get_or(snapshot.study.id, version, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
     }
 
     /// The utility of the recommended gait after each answer of a person. Only the answers since the last call are

@@ -31,11 +31,7 @@ mod tests {
 
     #[test]
     fn seeds_depend_on_study_and_counter_alone() {
-        let seeds = [
-            derive(1, Purpose::Proposal, 1),
-            derive(2, Purpose::Proposal, 1),
-            derive(1, Purpose::Proposal, 2),
-        ];
+        let seeds = [derive(1, Purpose::Proposal, 1), derive(2, Purpose::Proposal, 1), derive(1, Purpose::Proposal, 2)];
         for (i, a) in seeds.iter().enumerate() {
             assert!(seeds[i + 1..].iter().all(|b| a != b));
         }

@@ -408,12 +408,7 @@ struct Learned {
     utility: Option<Figure>,
 }
 
-fn learned(
-    pool: &OnPool,
-    snapshot: &StudySnapshot,
-    large: bool,
-    beliefs: &Beliefs,
-) -> Result<Learned, LearnerError> {
+fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, beliefs: &Beliefs) -> Result<Learned, LearnerError> {
     let outcome = Outcome::of(pool, snapshot, large, beliefs)?;
     if large || outcome.best.is_none() {
         return Ok(Learned { outcome, certainty: None, utility: None });
