@@ -35,8 +35,9 @@ async fn main() {
 }
 
 async fn history(service: &Service, study: StudyId, beliefs: &Arc<Beliefs>) -> (Duration, usize) {
-    let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), service.get(study).await);
-    let (snapshot, beliefs) = (snapshot.await.unwrap(), Arc::clone(beliefs));
+    let study = service.get(study).await;
+    let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    let beliefs = Arc::clone(beliefs);
     let begun = Instant::now();
     let points = service.store.clone().compute(move |pool| beliefs.utility_history(pool, &snapshot)).await;
     (begun.elapsed(), points.unwrap().unwrap().len())

@@ -15,7 +15,7 @@ use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
-use gait_learner::Agreement;
+use gait_learner::{Agreement, Prediction};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
@@ -23,8 +23,9 @@ use gaitwright_service::studies::belief::{Belief, Surprise};
 use gaitwright_service::studies::gait_beliefs::{GaitBelief, is_told};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::Study;
+use gaitwright_store::studies::{FeedbackMode, Study};
 use gaitwright_store::{StudyId, TrialId, studies};
+use std::cmp::Ordering;
 
 /// So many gaits and answers are listed.
 const LISTED: usize = 24;
@@ -71,13 +72,8 @@ struct GaitRow {
     more_trials: usize,
     rmse: String,
     utility: String,
-    /// The probability that the recommended gait is better; `None` for the recommended gait.
-    worse: Option<Worse>,
-}
-
-struct Worse {
-    percent: String,
-    is_told: bool,
+    /// Whether the recommended gait is better; `None` for the recommended gait.
+    worse: Option<String>,
 }
 
 /// How much a bound matters.
@@ -141,7 +137,7 @@ fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisCho
         agreement: belief.agreement,
         certainty: certainty(snapshot, belief),
         recommends,
-        gaits: belief.gaits.iter().take(LISTED).map(|gait| gait_row(gait, snapshot)).collect(),
+        gaits: belief.gaits.iter().take(LISTED).map(|gait| gait_row(gait, belief, snapshot)).collect(),
         more_gaits: belief.gaits.len().saturating_sub(LISTED),
         bounds: bounds(belief),
         legend: shared_legend(&mut marginals),
@@ -156,7 +152,7 @@ fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisCho
     })
 }
 
-fn gait_row(gait: &GaitBelief, snapshot: &StudySnapshot) -> GaitRow {
+fn gait_row(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> GaitRow {
     let trials = gait.trials.iter().filter_map(|id| snapshot.trial(*id));
     GaitRow {
         rmse: figure(trials.clone().next().and_then(|trial| trial.gait_rmse_rad)),
@@ -165,8 +161,27 @@ fn gait_row(gait: &GaitBelief, snapshot: &StudySnapshot) -> GaitRow {
         utility: format::utility(&gait.utility),
         worse: gait
             .behind
-            .map(|behind| Worse { percent: percent(behind.probability_above_zero()), is_told: is_told(&behind) }),
+            .map(|behind| worse(gait, belief, snapshot).map_or_else(|| believed_worse(&behind), str::to_owned)),
     }
+}
+
+/// What Gait RMSE says of a gait beside the recommended one. `None` if it does not answer the comparisons alone.
+fn worse(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Option<&'static str> {
+    if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
+        return None;
+    }
+    let rmse = |gait: &GaitBelief| snapshot.trial(*gait.trials.first()?)?.gait_rmse_rad;
+    let (own, recommended) = (rmse(gait)?, rmse(belief.gaits.first()?)?);
+    Some(match own.total_cmp(&recommended) {
+        Ordering::Greater => "yes, by Gait RMSE",
+        Ordering::Equal => "equal Gait RMSE",
+        Ordering::Less => "no, by Gait RMSE",
+    })
+}
+
+fn believed_worse(behind: &Prediction) -> String {
+    let percent = percent(behind.probability_above_zero());
+    if is_told(behind) { format!("yes, with {percent}") } else { format!("too few comparisons to tell ({percent})") }
 }
 
 /// The bounds with several values, the one that matters most first.

@@ -88,14 +88,17 @@ fn surprises(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<Surp
     Ok(surprises)
 }
 
+/// What is kept of the studies used last, the one used last at the end.
+type Recent<T> = Mutex<VecDeque<(StudyId, Arc<Mutex<T>>)>>;
+
 /// Cache of recent posteriors and of the learners that computed them.
 #[derive(Debug, Default)]
 pub struct Beliefs {
-    learners: Mutex<VecDeque<(StudyId, Arc<Mutex<Learner>>)>>,
+    learners: Recent<Learner>,
     posteriors: Kept<LogVersion, Posterior>,
     // A safety report changes which gaits can be recommended.
     shown: Kept<(LogVersion, SafetyVersion), Belief>,
-    histories: Mutex<VecDeque<(StudyId, Arc<Mutex<UtilityHistory>>)>>,
+    histories: Recent<UtilityHistory>,
 }
 
 impl Beliefs {
@@ -152,11 +155,7 @@ impl Beliefs {
 }
 
 /// The value of a study in a list of those used last, or a new one.
-fn kept_or_new<T: Default>(
-    list: &Mutex<VecDeque<(StudyId, Arc<Mutex<T>>)>>,
-    study: StudyId,
-    limit: usize,
-) -> Arc<Mutex<T>> {
+fn kept_or_new<T: Default>(list: &Recent<T>, study: StudyId, limit: usize) -> Arc<Mutex<T>> {
     let mut list = list.lock().unwrap_or_else(PoisonError::into_inner);
     let kept = list.iter().position(|(id, _)| *id == study).and_then(|at| list.remove(at));
     let (study, value) = kept.unwrap_or_else(|| (study, Arc::default()));

@@ -31,7 +31,7 @@ pub(super) fn gait_beliefs(snapshot: &StudySnapshot, posterior: &Posterior) -> R
     let mut pools: Vec<Vec<&Trial>> = Vec::new();
     for trial in ranked {
         let is_same = |other: &&Trial| other.action_index == trial.action_index || is_same_gait(other, trial);
-        match pools.iter_mut().find(|pool| pool.iter().any(|other| is_same(other))) {
+        match pools.iter_mut().find(|pool| pool.iter().any(&is_same)) {
             Some(pool) => pool.push(trial),
             None => pools.push(vec![trial]),
         }
