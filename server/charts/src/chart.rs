@@ -1,6 +1,7 @@
 //! Line charts as SVG.
 
 use super::axis::{Axis, power_of_ten};
+use super::escaped_text::escape;
 use super::series::{Band, Link, Series, Stroke};
 use std::fmt::Write;
 
@@ -320,10 +321,6 @@ fn numbers(places: &[f64]) -> Vec<(f64, String)> {
         groups.push(group);
     }
     groups.into_iter().map(|(from, to)| (middle(from, to), text(from, to))).collect()
-}
-
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 mod axis;
 mod chart;
 pub mod csv_table;
+mod escaped_text;
 mod figure;
 pub mod gait_charts;
 pub mod gait_series;

@@ -2,7 +2,7 @@
 //! outcome, the stronger the line. The last axis shows the outcome itself, so no information is in the colour alone.
 
 use super::axis::Axis;
-use super::chart::escape;
+use super::escaped_text::escape;
 use super::series::Link;
 use std::fmt::Write;
 

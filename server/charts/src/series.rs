@@ -1,6 +1,6 @@
 //! Lines and areas of a chart.
 
-use super::chart::escape;
+use super::escaped_text::escape;
 use super::simplified::simplified;
 use std::fmt::Write;
 

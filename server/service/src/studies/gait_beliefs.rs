@@ -1,8 +1,8 @@
 //! What the learner believes about the gaits of a study, identical gaits pooled.
 
+use super::ranking::ranking;
 use super::same_motion::is_same_gait;
 use super::snapshot::StudySnapshot;
-use super::trial_choice::ranking;
 use gait_learner::{LearnerError, Posterior, Prediction};
 use gaitwright_store::TrialId;
 use gaitwright_store::trials::Trial;

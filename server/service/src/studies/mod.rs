@@ -35,6 +35,7 @@ mod next_step;
 mod planning_tasks;
 pub mod preference;
 mod prefetch;
+pub mod ranking;
 pub mod reference_import;
 pub mod retention;
 pub mod safety_report;
