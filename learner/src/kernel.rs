@@ -193,18 +193,19 @@ impl Kernel {
         ))
     }
 
-    /// Prior variance of the average over all levels of the dimensions that are `None` in `profile`.
-    pub(crate) fn average_variance(&self, profile: &[Option<usize>]) -> f64 {
+    /// Prior covariance of two averages, each over all levels of the dimensions that are `None` in its profile. Both
+    /// average over the same dimensions.
+    pub(crate) fn average_covariance(&self, one: &[Option<usize>], other: &[Option<usize>]) -> f64 {
         let mean = |table: &Square| {
             let n = table.order();
             (0..n).map(|i| table.row(i).iter().sum::<f64>()).sum::<f64>() / (n * n) as f64
         };
-        self.combine(profile.iter().zip(self.factors.iter().zip(&self.broad)).map(|(level, (factor, broad))| {
-            match *level {
-                Some(i) => (factor.at(i, i), broad.at(i, i)),
-                None => (mean(factor), mean(broad)),
-            }
-        }))
+        self.combine(one.iter().zip(other).zip(self.factors.iter().zip(&self.broad)).map(
+            |(levels, (factor, broad))| match levels {
+                (Some(i), Some(j)) => (factor.at(*i, *j), broad.at(*i, *j)),
+                _ => (mean(factor), mean(broad)),
+            },
+        ))
     }
 
     /// Prior covariances of one action with many, all given by their levels.

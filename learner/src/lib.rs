@@ -74,7 +74,7 @@ pub use learner::{Learner, posterior};
 pub use likelihood::Link;
 pub use posterior::agreement::Agreement;
 pub use posterior::best_action::BestProbability;
-pub use posterior::marginals::{Marginal, Slice};
+pub use posterior::marginals::{MainEffect, Marginal, Slice};
 pub use posterior::{Posterior, Prediction};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch, propose_outside};
 pub use search_space::{Dimension, SearchSpace};

@@ -1,5 +1,6 @@
 //! The posterior over the utility: predictions, the best action, and joint samples.
 
+use std::cmp::Ordering;
 use std::collections::HashSet;
 
 use crate::action::ActionIndex;
@@ -10,6 +11,7 @@ use crate::linalg::Cholesky;
 use crate::random::Random;
 use crate::search_space::{Dimension, SearchSpace};
 use crate::settings::LearnerSettings;
+use crate::special_functions;
 
 pub(crate) mod agreement;
 pub(crate) mod answer_probabilities;
@@ -25,6 +27,20 @@ pub struct Prediction {
     pub mean: f64,
     /// Posterior standard deviation.
     pub standard_deviation: f64,
+}
+
+impl Prediction {
+    /// Probability that the value is above 0.
+    pub fn probability_above_zero(&self) -> f64 {
+        if self.standard_deviation > 0.0 {
+            return special_functions::normal_cdf(self.mean / self.standard_deviation);
+        }
+        match self.mean.total_cmp(&0.0) {
+            Ordering::Less => 0.0,
+            Ordering::Equal => 0.5,
+            Ordering::Greater => 1.0,
+        }
+    }
 }
 
 /// The posterior over the utility of all actions, given a log.
@@ -76,6 +92,18 @@ impl Posterior {
         self.space.check(action)?;
         let view = self.utility.view(action, self.space.levels(action));
         Ok(Prediction { mean: view.mean, standard_deviation: self.utility.variance(&view).sqrt() })
+    }
+
+    /// How much higher the utility of `a` is than that of `b`.
+    ///
+    /// # Errors
+    /// If an action is not in the space.
+    pub fn difference(&self, a: ActionIndex, b: ActionIndex) -> Result<Prediction> {
+        self.space.check(a)?;
+        self.space.check(b)?;
+        let view = |action| self.utility.view(action, self.space.levels(action));
+        let (mean, variance) = self.utility.difference(&view(a), &view(b));
+        Ok(Prediction { mean, standard_deviation: variance.sqrt() })
     }
 
     /// The recommended action: the visited one with the highest posterior mean, the earliest of several.

@@ -3,22 +3,27 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_learner::SearchSpace;
+use gait_learner::{Agreement, SearchSpace, posterior};
 use gait_optimizer::{Gait, TunedBounds};
 use gaitwright::cli::archive_commands::prune;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::belief::{Belief, Beliefs};
+use gaitwright_service::studies::same_motion::is_same_gait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::studies::trial_choice::ranking_to_show;
+use gaitwright_service::studies::utility_history::UtilityPoint;
 use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::feedback::Source;
 use gaitwright_store::gaits;
-use gaitwright_store::studies::StudyState;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId, certificates, commit};
-use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::certified::{Verdicts, certificate};
+use gaitwright_tests::people;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
+use std::sync::Arc;
 use std::time::Duration;
 
 async fn certified(service: &Service, trial: TrialId, passed: bool) {
@@ -53,7 +58,7 @@ async fn study_without_a_gait_has_no_recommendation() {
     assert_eq!(service.fetch(&format!("{api}/history")).await.items(), json!([]));
     assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    assert!(!page.contains("the best so far") && !page.contains(">best<"), "{page}");
+    assert!(!page.contains("data-best") && !page.contains(">best<"), "{page}");
     // The figures of a last iterate are not those of a gait.
     assert!(trials.iter().all(|trial| trial.report.is_some() && trial.gait_rmse_rad.is_none()), "{trials:?}");
     let table = service.fetch(&format!("{api}/trials.csv")).await.text;
@@ -224,5 +229,90 @@ async fn requested_recommendation_of_a_running_study_is_certified_during_its_sol
     assert_eq!(service.get(study).await.state, StudyState::Running);
     service.post(&format!("/api/v1/studies/{study}/stop"), &json!({"reason": "enough"})).await;
     assert_eq!(settled(&service, study).await["certificate"], "passed");
+    service.stop().await;
+}
+
+async fn snapshot(service: &Service, study: StudyId) -> StudySnapshot {
+    let study = service.get(study).await;
+    StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap()
+}
+
+async fn utility_history(service: &Service, study: StudyId, beliefs: &Arc<Beliefs>) -> Vec<UtilityPoint> {
+    let (snapshot, beliefs) = (snapshot(service, study).await, Arc::clone(beliefs));
+    service.store.clone().compute(move |pool| beliefs.utility_history(pool, &snapshot)).await.unwrap().unwrap()
+}
+
+#[tokio::test]
+async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+    let beliefs = Arc::new(Beliefs::default());
+    for answers in 0..5 {
+        people::asked(&service, study).await;
+        assert_eq!(utility_history(&service, study, &beliefs).await.len(), answers);
+        people::answer_once(&service, study).await;
+    }
+    people::asked(&service, study).await;
+    let points = utility_history(&service, study, &beliefs).await;
+    assert_eq!(points.iter().map(|point| point.answers).collect::<Vec<_>>(), [1, 2, 3, 4, 5]);
+    // The points that were kept are those that a new cache computes.
+    assert_eq!(points, utility_history(&service, study, &Arc::default()).await);
+
+    // The last point is the present recommendation, and an earlier one the posterior of the log until the next answer.
+    let now = snapshot(&service, study).await;
+    let (space, settings) = (&now.study.plan.search_space, &now.study.plan.learner);
+    let estimate = posterior(space, &now.log(), settings).unwrap();
+    let last = points.last().unwrap();
+    assert_eq!(last.trial, ranked(&service, study).await[0]);
+    assert_eq!(last.utility, estimate.predict(now.trial(last.trial).unwrap().action_index).unwrap());
+    let fourth = now.feedback.iter().enumerate().filter(|(_, row)| row.source == Source::Clinician).nth(3).unwrap().0;
+    let mut before = now.clone();
+    before.feedback.truncate(fourth);
+    let estimate = posterior(space, &before.log(), settings).unwrap();
+    let third = points[2];
+    assert_eq!(third.utility, estimate.predict(now.trial(third.trial).unwrap().action_index).unwrap());
+
+    // An answer that was retracted does not count, as if it had not been given.
+    let first = now.feedback.iter().find(|row| row.source == Source::Clinician).unwrap().id;
+    let retracted = service.post(&format!("/api/v1/preferences/{first}/retract"), &json!({"reason": "a slip"})).await;
+    assert!(retracted.status.is_success(), "{}", retracted.text);
+    let fewer = utility_history(&service, study, &beliefs).await;
+    assert_eq!(fewer.len(), 4);
+    assert_eq!(fewer, utility_history(&service, study, &Arc::default()).await);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_doubts() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let plan = |new: &mut NewStudy| {
+        (new.trial_budget, new.feedback_mode, new.repeat_results) = (6, FeedbackMode::Mixed, Some(true));
+        new.search_space = Some(inactive_bound().into());
+    };
+    let study = service.study(plan).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let belief = async || {
+        let (snapshot, beliefs) = (snapshot(&service, study).await, Beliefs::default());
+        service.store.clone().compute(move |pool| beliefs.of(pool, &snapshot)).await.unwrap().unwrap()
+    };
+    let before = belief().await;
+    let trials = service.trials(study).await;
+    let pooled: Vec<TrialId> = before.gaits.iter().flat_map(|gait| gait.trials.clone()).collect();
+    assert_eq!(pooled.len(), trials.len(), "each trial is in one row");
+    assert!(before.gaits.iter().any(|gait| gait.trials.len() > 1), "{:?}", before.gaits);
+    for (place, gait) in before.gaits.iter().enumerate() {
+        let find = |id| trials.iter().find(|trial| trial.id == id).unwrap();
+        assert!(gait.trials.iter().all(|id| is_same_gait(find(gait.trials[0]), find(*id))));
+        assert!(before.gaits[..place].iter().all(|other| !is_same_gait(find(other.trials[0]), find(gait.trials[0]))));
+    }
+    assert!(before.gaits.windows(2).all(|pair| pair[0].utility.mean >= pair[1].utility.mean));
+    assert!(before.surprises.iter().all(|surprise| surprise.probability.is_none_or(|p| p < 0.5)));
+    let doubted = |belief: &Belief| {
+        let Agreement { comparisons, comparisons_agreeing, ties, ties_agreeing, .. } = belief.agreement;
+        comparisons - comparisons_agreeing + ties - ties_agreeing
+    };
+    assert_eq!(before.surprises.len(), doubted(&before));
     service.stop().await;
 }

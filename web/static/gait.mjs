@@ -198,7 +198,8 @@ class Player {
 
   /** @param {number} now */
   tick(now) {
-    if (!this.playing) return;
+    // A walker that the page has replaced stops.
+    if (!this.playing || !this.scrub.isConnected) return;
     // The first frame may be of a moment before the button was pressed.
     this.clocks.at += (Math.max(now - this.last, 0) / 1000) * Number(this.speed.value);
     this.last = now;
@@ -236,7 +237,11 @@ const load = async (trial) => {
   return answer.json();
 };
 
-for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker:not([data-controls])"))) {
+/**
+ * Makes the figures of a box walk.
+ * @param {HTMLElement} box
+ */
+export function startWalker(box) {
   const figures = /** @type {NodeListOf<SVGSVGElement>} */ (box.querySelectorAll("[data-trial] svg.gait-figure"));
   const controls = addControls(box, figures.length > 1);
   for (const hint of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-drag]"))) hint.hidden = false;
@@ -248,3 +253,5 @@ for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelector
       controls.textContent = `The animation cannot be loaded (${error.message}). Reload the page to try again.`;
     });
 }
+
+for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker:not([data-controls])"))) startWalker(box);

@@ -62,19 +62,29 @@ function nearest(chart, at) {
   ];
 }
 
+/** @param {string[]} lines @param {PointerEvent} event */
+function say(lines, event) {
+  readout.replaceChildren(...lines.map((line) => Object.assign(document.createElement("div"), { textContent: line })));
+  readout.hidden = false;
+  const room = document.documentElement.clientWidth - readout.offsetWidth - 8;
+  readout.style.left = `${Math.max(Math.min(event.pageX + 14, room), 4)}px`;
+  readout.style.top = `${event.pageY + 18}px`;
+}
+
 /** @param {PointerEvent} event */
 function show(event) {
+  const link = /** @type {Element} */ (event.target).closest?.("svg.chart a")?.getAttribute("aria-label");
+  if (link) {
+    here.remove();
+    return say([link], event);
+  }
   const chart = /** @type {SVGSVGElement | null} */ (/** @type {Element} */ (event.target).closest?.("svg[data-right]"));
   const matrix = chart?.getScreenCTM();
   if (!chart || !matrix) return hide();
   const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
   const lines = chart.dataset.cycles ? acrossLines(chart, at.x) : nearest(chart, at);
   if (lines.length === 0) return hide();
-  readout.replaceChildren(...lines.map((line) => Object.assign(document.createElement("div"), { textContent: line })));
-  readout.hidden = false;
-  const room = document.documentElement.clientWidth - readout.offsetWidth - 8;
-  readout.style.left = `${Math.max(Math.min(event.pageX + 14, room), 4)}px`;
-  readout.style.top = `${event.pageY + 18}px`;
+  say(lines, event);
 }
 
 for (const kind of ["pointermove", "pointerdown"]) document.addEventListener(kind, (event) => show(/** @type {PointerEvent} */ (event)));

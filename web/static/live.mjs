@@ -34,14 +34,21 @@ function replace(part, next) {
   }
 }
 
+/** @type {(shown: ParentNode) => HTMLElement | null} The place of the recommended gait. */
+const walkerOf = (shown) => shown.querySelector("[data-walker]");
+
 /**
- * Removes the walker of a gait that is no longer the recommended one.
+ * Shows another gait walking when it becomes the recommended one, but not while somebody uses the controls.
  * @param {HTMLElement} shown
+ * @param {Document} fresh
  */
-function removeFormerWalker(shown) {
-  const walker = /** @type {HTMLElement | null} */ (shown.querySelector("[data-shown]"));
-  const best = /** @type {HTMLElement | null} */ (shown.querySelector("[data-best]"));
-  if (walker && walker.dataset.shown !== best?.dataset.best) walker.remove();
+async function updateWalker(shown, fresh) {
+  const [walker, next] = [walkerOf(shown), walkerOf(fresh)];
+  if (!walker || next?.dataset.shown === walker.dataset.shown || walker.contains(document.activeElement)) return;
+  if (!next) return walker.remove();
+  walker.replaceWith(next);
+  const box = /** @type {HTMLElement | null} */ (next.querySelector(".walker"));
+  if (box) (await import("./gait.mjs")).startWalker(box);
 }
 
 /**
@@ -87,10 +94,13 @@ if (live) {
     }
     pending = true;
     try {
-      const answer = await fetch(`/studies/${study}/live${location.search}`);
+      const query = new URLSearchParams(location.search);
+      query.set("shown", walkerOf(live)?.dataset.shown ?? "");
+      const answer = await fetch(`/studies/${study}/live?${query}`);
       if (answer.ok) {
-        update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
-        removeFormerWalker(live);
+        const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
+        update(live, fresh);
+        await updateWalker(live, fresh);
       }
       if (state() !== last) {
         last = state();

@@ -29,40 +29,48 @@ pub struct Agreement {
 impl Posterior {
     /// Counts the feedback that the posterior agrees with.
     pub fn agreement(&self) -> Agreement {
-        let mean = |action: ActionIndex| self.utility.mean(action, &self.space().levels(action));
         let mut agreement = Agreement::default();
         for &feedback in self.feedback() {
-            match feedback {
-                Feedback::Preference { winner, loser } | Feedback::Suggestion { suggested: winner, over: loser } => {
-                    agreement.comparisons += 1;
-                    let agrees = match self.decided_by_labels(winner, loser) {
-                        Some(converges) => converges == winner,
-                        None => mean(winner) > mean(loser),
-                    };
-                    agreement.comparisons_agreeing += usize::from(agrees);
+            let (all, agreeing) = match feedback {
+                Feedback::Preference { .. } | Feedback::Suggestion { .. } => {
+                    (&mut agreement.comparisons, &mut agreement.comparisons_agreeing)
                 }
-                Feedback::Tie { a, b } => {
-                    agreement.ties += 1;
-                    let alike = (mean(a) - mean(b)).abs() <= self.settings().tie_width;
-                    agreement.ties_agreeing += usize::from(alike && self.decided_by_labels(a, b).is_none());
+                Feedback::Tie { .. } => (&mut agreement.ties, &mut agreement.ties_agreeing),
+                Feedback::Label { .. } => (&mut agreement.labels, &mut agreement.labels_agreeing),
+            };
+            *all += 1;
+            *agreeing += usize::from(self.agrees_with(feedback));
+        }
+        agreement
+    }
+
+    /// Whether the posterior agrees with a piece of feedback, as [`Agreement`] counts it. The actions must be in the space.
+    pub fn agrees_with(&self, feedback: Feedback) -> bool {
+        let mean = |action: ActionIndex| self.utility.mean(action, &self.space().levels(action));
+        let settings = self.settings();
+        match feedback {
+            Feedback::Preference { winner, loser } | Feedback::Suggestion { suggested: winner, over: loser } => {
+                match self.decided_by_labels(winner, loser) {
+                    Some(converges) => converges == winner,
+                    None => mean(winner) > mean(loser),
                 }
-                Feedback::Label { action, category } => {
-                    let settings = self.settings();
-                    let within = |at: f64, interval: Interval| at >= interval.low && at <= interval.high;
-                    let agrees = match &self.feasibility {
-                        None => within(mean(action), settings.label_interval(category)),
-                        Some(process) => {
-                            let at = process.mean(action, &self.space().levels(action));
-                            let grade = settings.grade_interval(category);
-                            within(at, settings.feasibility_interval(category))
-                                && grade.is_none_or(|interval| within(mean(action), interval))
-                        }
-                    };
-                    agreement.labels += 1;
-                    agreement.labels_agreeing += usize::from(agrees);
+            }
+            Feedback::Tie { a, b } => {
+                let alike = (mean(a) - mean(b)).abs() <= settings.tie_width;
+                alike && self.decided_by_labels(a, b).is_none()
+            }
+            Feedback::Label { action, category } => {
+                let within = |at: f64, interval: Interval| at >= interval.low && at <= interval.high;
+                match &self.feasibility {
+                    None => within(mean(action), settings.label_interval(category)),
+                    Some(process) => {
+                        let at = process.mean(action, &self.space().levels(action));
+                        let grade = settings.grade_interval(category);
+                        within(at, settings.feasibility_interval(category))
+                            && grade.is_none_or(|interval| within(mean(action), interval))
+                    }
                 }
             }
         }
-        agreement
     }
 }

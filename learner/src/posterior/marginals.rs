@@ -1,9 +1,10 @@
-//! The utility as a function of one or two dimensions.
+//! The utility as a function of one or two dimensions, and how much a dimension matters.
 
 use serde::{Deserialize, Serialize};
 
 use crate::action::ActionIndex;
 use crate::error::{LearnerError, Result};
+use crate::gaussian_process::GaussianProcess;
 use crate::linalg::dot;
 use crate::posterior::{Posterior, Prediction};
 
@@ -28,31 +29,81 @@ pub struct Slice {
     pub predictions: Vec<Vec<Prediction>>,
 }
 
+/// How much the utility depends on a dimension, averaged over all levels of the other dimensions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MainEffect {
+    /// Value with the highest marginal utility, in the unit of the dimension.
+    pub best: f64,
+    /// Value with the lowest marginal utility.
+    pub worst: f64,
+    /// The difference of their marginal utilities.
+    pub difference: Prediction,
+}
+
+/// The average of the utility at one level of a dimension, with what its covariances need.
+struct AverageView {
+    profile: Vec<Option<usize>>,
+    prior: Vec<f64>,
+    left: Vec<f64>,
+    right: Vec<f64>,
+    mean: f64,
+}
+
+impl AverageView {
+    fn covariance(&self, other: &Self, process: &GaussianProcess) -> f64 {
+        process.kernel.average_covariance(&self.profile, &other.profile) - dot(&self.prior, &other.prior)
+            + dot(&self.left, &other.right)
+    }
+}
+
 impl Posterior {
+    fn average_view(&self, dimension: usize, level: usize) -> AverageView {
+        let process = &self.utility;
+        let observed = process.observed();
+        let profile: Vec<Option<usize>> =
+            (0..self.space().dimensions().len()).map(|d| (d == dimension).then_some(level)).collect();
+        let mut prior: Vec<f64> =
+            observed.levels.iter().map(|point| process.kernel.average_with(&profile, point)).collect();
+        let mean = dot(&prior, &process.approximation().weights);
+        observed.prior.solve_lower(&mut prior);
+        let (left, right) = process.approximation().project(&observed.prior, &prior);
+        AverageView { profile, prior, left, right, mean }
+    }
+
     /// The marginal utility of each level of a dimension: its average over all levels of the other dimensions.
     ///
     /// # Errors
     /// If the dimension does not exist.
     pub fn marginal(&self, dimension: usize) -> Result<Vec<Marginal>> {
-        let chosen = self.dimension(dimension)?;
-        let process = &self.utility;
-        let observed = process.observed();
-        (0..chosen.values.len())
-            .map(|level| {
-                let profile: Vec<Option<usize>> =
-                    (0..self.space().dimensions().len()).map(|d| (d == dimension).then_some(level)).collect();
-                let mut column: Vec<f64> =
-                    observed.levels.iter().map(|point| process.kernel.average_with(&profile, point)).collect();
-                let mean = dot(&column, &process.approximation().weights);
-                observed.prior.solve_lower(&mut column);
-                let (left, right) = process.approximation().project(&observed.prior, &column);
-                let variance = process.kernel.average_variance(&profile) - dot(&column, &column) + dot(&left, &right);
-                Ok(Marginal {
-                    value: chosen.values[level],
-                    average: Prediction { mean, standard_deviation: variance.max(0.0).sqrt() },
-                })
-            })
-            .collect()
+        let marginal = |(level, &value): (usize, &f64)| {
+            let view = self.average_view(dimension, level);
+            let variance = view.covariance(&view, &self.utility);
+            Marginal { value, average: Prediction { mean: view.mean, standard_deviation: variance.max(0.0).sqrt() } }
+        };
+        Ok(self.dimension(dimension)?.values.iter().enumerate().map(marginal).collect())
+    }
+
+    /// The difference between the highest and the lowest marginal utility of a dimension.
+    ///
+    /// # Errors
+    /// If the dimension does not exist.
+    pub fn main_effect(&self, dimension: usize) -> Result<MainEffect> {
+        let values = &self.dimension(dimension)?.values;
+        let views: Vec<AverageView> = (0..values.len()).map(|level| self.average_view(dimension, level)).collect();
+        let (mut best, mut worst) = (0, 0);
+        for (level, view) in views.iter().enumerate() {
+            if view.mean > views[best].mean {
+                best = level;
+            }
+            if view.mean < views[worst].mean {
+                worst = level;
+            }
+        }
+        let covariance = |a: usize, b: usize| views[a].covariance(&views[b], &self.utility);
+        let variance = covariance(best, best) + covariance(worst, worst) - 2.0 * covariance(best, worst);
+        let mean = views[best].mean - views[worst].mean;
+        let difference = Prediction { mean, standard_deviation: variance.max(0.0).sqrt() };
+        Ok(MainEffect { best: values[best], worst: values[worst], difference })
     }
 
     /// Predictions over the levels of two dimensions. The other dimensions are fixed at the levels of `through`.

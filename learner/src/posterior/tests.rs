@@ -57,6 +57,55 @@ fn marginals_are_averages_of_the_means_over_other_dimensions() {
 }
 
 #[test]
+fn main_effect_is_the_difference_of_two_averages_over_the_grid() {
+    for (additive_share, pairwise_share) in [(0.0, 0.0), (0.3, 0.4)] {
+        let settings = LearnerSettings { additive_share, pairwise_share, ..LearnerSettings::of(Method::Eubo) };
+        let estimate = posterior(&space(), &log(), &settings).unwrap();
+        for dimension in 0..3 {
+            let marginals = estimate.marginal(dimension).unwrap();
+            let effect = estimate.main_effect(dimension).unwrap();
+            let at = |value: f64| marginals.iter().position(|m| m.value == value).unwrap();
+            let (best, worst) = (at(effect.best), at(effect.worst));
+            assert!(marginals.iter().all(|m| m.average.mean <= marginals[best].average.mean));
+            assert!(marginals.iter().all(|m| m.average.mean >= marginals[worst].average.mean));
+            // Over every pair of actions, without the nugget.
+            let process = &estimate.utility;
+            let of = |level| (0..24).map(ActionIndex).filter(move |a| space().levels(*a)[dimension] == level);
+            let unseen = |a: ActionIndex| {
+                let mut view = process.view(a, estimate.space().levels(a));
+                if process.observed().slot(a).is_some() {
+                    view = process.view(ActionIndex(u64::MAX), estimate.space().levels(a));
+                }
+                view
+            };
+            let covariance = |a: usize, b: usize| {
+                let (a, b): (Vec<_>, Vec<_>) = (of(a).map(unseen).collect(), of(b).map(unseen).collect());
+                let sum: f64 = a.iter().flat_map(|x| b.iter().map(|y| process.covariance(x, y))).sum();
+                sum / (a.len() * b.len()) as f64
+            };
+            let variance = covariance(best, best) + covariance(worst, worst) - 2.0 * covariance(best, worst);
+            let mean = marginals[best].average.mean - marginals[worst].average.mean;
+            assert!((effect.difference.mean - mean).abs() < 1e-12);
+            assert!((effect.difference.standard_deviation.powi(2) - variance).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn difference_has_the_probability_of_a_noiseless_preference() {
+    let settings = LearnerSettings { preference_noise: 1e-3, ..LearnerSettings::published(Method::Eubo) };
+    let estimate = posterior(&space(), &log(), &settings).unwrap();
+    for (a, b) in [(0, 7), (7, 0), (2, 23)] {
+        let difference = estimate.difference(ActionIndex(a), ActionIndex(b)).unwrap();
+        let preferred = estimate.preference_probability(ActionIndex(a), ActionIndex(b)).unwrap();
+        assert!((difference.probability_above_zero() - preferred).abs() < 2e-3, "{difference:?} {preferred}");
+    }
+    let nothing = estimate.difference(ActionIndex(0), ActionIndex(0)).unwrap();
+    assert!(nothing.mean == 0.0 && (nothing.probability_above_zero() - 0.5).abs() < 1e-12);
+    assert!(estimate.difference(ActionIndex(0), ActionIndex(24)).is_err());
+}
+
+#[test]
 fn best_of_two_has_the_probability_of_a_noiseless_preference() {
     for nugget in [1e-5, 0.1, 1.0] {
         let (winner, loser) = (ActionIndex(0), ActionIndex(20));

@@ -1,7 +1,8 @@
 //! Line charts as SVG.
 
 use super::axis::{Axis, power_of_ten};
-use super::series::{Band, Series, Stroke};
+use super::escaped_text::escape;
+use super::series::{Band, Link, Series, Stroke};
 use std::fmt::Write;
 
 /// A named interval of the x axis.
@@ -100,7 +101,15 @@ impl Chart {
     /// Adds a line.
     #[must_use]
     pub fn with(mut self, label: &str, colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
-        self.series.push(Series { label: label.to_owned(), points, colour, stroke });
+        self.series.push(Series { label: label.to_owned(), points, colour, stroke, links: Vec::new() });
+        self
+    }
+
+    /// Adds points that are links on a page.
+    #[must_use]
+    pub fn with_links(mut self, label: &str, colour: usize, points: Vec<((f64, f64), Link)>) -> Self {
+        let (points, links) = points.into_iter().unzip();
+        self.series.push(Series { label: label.to_owned(), points, colour, stroke: Stroke::Points, links });
         self
     }
 
@@ -117,7 +126,9 @@ impl Chart {
     /// The chart as an SVG element.
     pub fn svg(&self) -> String {
         let name = escape(&format!("{}: {} over {}", self.title, self.y_label, self.x_label));
-        let body = self.body();
+        let body = self.drawn(true);
+        // The content of a picture cannot have links.
+        let role = if self.series.iter().any(|series| !series.links.is_empty()) { "group" } else { "img" };
         let (x, y) = self.axes();
         // Position and range of the axes, for the script that reads values under the pointer.
         let plot = format!(
@@ -132,7 +143,7 @@ impl Chart {
         );
         let labels = format!("data-across=\"{}\" data-along=\"{}\"", escape(&self.x_label), escape(&self.y_label));
         format!(
-            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name}\" {plot} {labels}{}>{body}</svg>",
+            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"{role}\" aria-label=\"{name}\" {plot} {labels}{}>{body}</svg>",
             self.cursor_data(&x, &y)
         )
     }
@@ -157,12 +168,16 @@ impl Chart {
         cycles + &attribute("moments", self.moments.iter().map(moments).collect())
     }
 
-    /// The elements of the drawing.
+    /// The elements of a self-contained figure, without links.
     pub(super) fn body(&self) -> String {
+        self.drawn(false)
+    }
+
+    fn drawn(&self, with_links: bool) -> String {
         let (x, y) = self.axes();
         let mut svg = String::with_capacity(16 * 1024);
         // Writing to a String cannot fail.
-        let _ = self.draw(&mut svg, &x, &y);
+        let _ = self.draw(&mut svg, &x, &y, with_links);
         svg
     }
 
@@ -200,7 +215,7 @@ impl Chart {
         lines.chain(bands).chain(marks).collect()
     }
 
-    fn draw(&self, svg: &mut String, x: &Axis, y: &Axis) -> std::fmt::Result {
+    fn draw(&self, svg: &mut String, x: &Axis, y: &Axis, with_links: bool) -> std::fmt::Result {
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
         let px = |value: f64| LEFT + x.place(value) * (right - LEFT);
         let at_height = |height: f64| bottom - y.place(height) * (bottom - TOP);
@@ -223,7 +238,7 @@ impl Chart {
             band.draw(svg, &px, &py)?;
         }
         for series in &self.series {
-            series.draw(svg, &px, &py)?;
+            series.draw(svg, &px, &py, with_links)?;
         }
         self.draw_marks(svg, &px)?;
         write!(
@@ -308,10 +323,6 @@ fn numbers(places: &[f64]) -> Vec<(f64, String)> {
     groups.into_iter().map(|(from, to)| (middle(from, to), text(from, to))).collect()
 }
 
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -335,6 +346,16 @@ mod tests {
         for part in ["data-right=\"74 ", " 2 4\"", "data-logarithmic=\"false\"", "data-across=\"time, s\""] {
             assert!(svg.contains(part), "{part}: {svg}");
         }
+    }
+
+    #[test]
+    fn points_are_links_on_a_page_but_not_in_a_file() {
+        let link = Link { address: "/trials/1".to_owned(), name: "trial <1>".to_owned() };
+        let chart = Chart::new("", "", "").with_links("trials", 0, vec![((0.0, 1.0), link)]);
+        let svg = chart.svg();
+        assert!(svg.contains("<a href=\"/trials/1\" tabindex=\"-1\" aria-label=\"trial &lt;1&gt;\">"), "{svg}");
+        assert!(svg.contains("role=\"group\"") && svg.matches("</a>").count() == 1);
+        assert!(!chart.body().contains("<a") && chart.body().contains("<circle"));
     }
 
     #[test]

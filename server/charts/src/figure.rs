@@ -3,6 +3,7 @@
 use super::chart::Chart;
 use super::gait_tiles;
 use super::heat_map::HeatMap;
+use super::parallel::Parallel;
 use super::standalone::{self, Inside};
 use super::tree::Tree;
 use super::walker::Animation;
@@ -29,6 +30,8 @@ pub enum Drawing {
     Animation(String, Animation),
     /// A heat map.
     Map(HeatMap),
+    /// Parallel coordinates.
+    Parallel(Parallel),
     /// The warm-start tree.
     Tree(Tree),
 }
@@ -42,6 +45,11 @@ impl Figure {
     /// A heat map. `group` distinguishes maps with the same title.
     pub fn map(group: &str, map: HeatMap) -> Self {
         Self { name: file_name(group, &map.title), drawing: Drawing::Map(map) }
+    }
+
+    /// Parallel coordinates.
+    pub fn parallel(parallel: Parallel) -> Self {
+        Self { name: file_name("", &parallel.title), drawing: Drawing::Parallel(parallel) }
     }
 
     /// The warm-start tree.
@@ -65,6 +73,7 @@ impl Figure {
             Drawing::Chart(chart) => &chart.title,
             Drawing::Tiles(title, _) | Drawing::Animation(title, _) => title,
             Drawing::Map(map) => &map.title,
+            Drawing::Parallel(parallel) => &parallel.title,
             Drawing::Tree(tree) => &tree.title,
         }
     }
@@ -88,6 +97,10 @@ impl Figure {
                 let inside = Inside { class: "chart map", size: map.size(), body: map.body() };
                 standalone::svg(self.title(), &inside, &[])
             }
+            Drawing::Parallel(parallel) => {
+                let inside = Inside { class: "chart parallel", size: Parallel::SIZE, body: parallel.body() };
+                standalone::svg(self.title(), &inside, &parallel.legend())
+            }
             Drawing::Tree(tree) => {
                 let inside = Inside { class: "tree", size: tree.size(), body: tree.body() };
                 standalone::svg(self.title(), &inside, &[])
@@ -102,6 +115,7 @@ impl Figure {
             Drawing::Tiles(_, figures) => tiles_csv(figures),
             Drawing::Animation(_, animation) => tiles_csv(animation.figures()),
             Drawing::Map(map) => map_csv(map),
+            Drawing::Parallel(parallel) => parallel_csv(parallel),
             Drawing::Tree(tree) => tree_csv(tree),
         };
         table.into_text()
@@ -120,6 +134,19 @@ fn chart_csv(chart: &Chart) -> CsvTable {
             table.row(cells![&band.label, x, low]);
             table.row(cells![&band.label, x, high]);
         }
+    }
+    table
+}
+
+fn parallel_csv(parallel: &Parallel) -> CsvTable {
+    let bounds = parallel.axes.iter().map(|axis| format!("{}: {}", axis.name, axis.meaning));
+    let columns = ["trial".to_owned()].into_iter().chain(bounds).chain([parallel.outcome.clone()]);
+    let mut table = CsvTable::new(columns);
+    for line in &parallel.lines {
+        let mut row = cells![&line.link.name];
+        row.extend(parallel.axes.iter().zip(&line.levels).map(|(axis, level)| axis.values.get(*level).into()));
+        row.extend(cells![line.outcome]);
+        table.row(row);
     }
     table
 }

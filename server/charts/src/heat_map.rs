@@ -1,7 +1,7 @@
 //! Heat maps: tables of values over two quantities, shaded by value. Every cell also has its value as text, so no
 //! information is in the shade alone.
 
-use super::chart::escape;
+use super::escaped_text::escape;
 use std::fmt::Write;
 
 /// One cell.

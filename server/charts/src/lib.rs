@@ -9,12 +9,14 @@
 mod axis;
 mod chart;
 pub mod csv_table;
+mod escaped_text;
 mod figure;
 pub mod gait_charts;
 pub mod gait_series;
 pub mod gait_table;
 mod gait_tiles;
 mod heat_map;
+mod parallel;
 #[cfg(feature = "png")]
 mod png;
 mod reference_band;
@@ -30,11 +32,12 @@ pub use chart::{Chart, LegCycle, Span};
 pub use figure::{Drawing, Figure};
 pub use gait_tiles::gait_tiles;
 pub use heat_map::{Cell, HeatMap};
+pub use parallel::{Parallel, ParallelAxis, ParallelLine};
 #[cfg(feature = "png")]
 pub use png::PngError;
 pub(crate) use reference_band::over_reference_of_leg;
 pub use reference_band::{band_in_words, over_reference};
-pub use series::{Band, Series, Stroke};
+pub use series::{Band, Link, Series, Stroke};
 pub use sparkline::sparkline;
 pub use standalone::STYLE_SHEET;
 pub use tree::{Node, Tree};

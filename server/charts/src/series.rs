@@ -1,5 +1,6 @@
 //! Lines and areas of a chart.
 
+use super::escaped_text::escape;
 use super::simplified::simplified;
 use std::fmt::Write;
 
@@ -48,6 +49,25 @@ pub struct Series {
     pub colour: usize,
     /// Style.
     pub stroke: Stroke,
+    /// What each point leads to on a page; empty if the points are no links.
+    pub links: Vec<Link>,
+}
+
+/// A link of a page.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Link {
+    /// Address.
+    pub address: String,
+    /// Name.
+    pub name: String,
+}
+
+impl Link {
+    /// Opens the link. Not in the order of the keyboard: a table of the page has the same links.
+    pub(super) fn open(&self, svg: &mut String) -> std::fmt::Result {
+        let (address, name) = (escape(&self.address), escape(&self.name));
+        write!(svg, "<a href=\"{address}\" tabindex=\"-1\" aria-label=\"{name}\">")
+    }
 }
 
 impl Stroke {
@@ -89,6 +109,7 @@ impl Series {
         svg: &mut String,
         px: &impl Fn(f64) -> f64,
         py: &impl Fn(f64) -> f64,
+        with_links: bool,
     ) -> std::fmt::Result {
         let colour = self.colour % 10;
         if self.stroke != Stroke::Points {
@@ -111,8 +132,15 @@ impl Series {
             write!(svg, "\"/>")?;
         }
         if !Stroke::APART.contains(&self.stroke) {
-            for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
-                write!(svg, "<circle class=\"dot c{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\"/>", px(x), py(y))?;
+            let links = self.links.iter().map(Some).chain(std::iter::repeat(None));
+            let drawn = self.points.iter().zip(links).filter(|((x, y), _)| x.is_finite() && y.is_finite());
+            for (&(x, y), link) in drawn {
+                let link = link.filter(|_| with_links);
+                let radius = if link.is_some() { 5 } else { 3 };
+                link.map_or(Ok(()), |link| link.open(svg))?;
+                let (x, y) = (px(x), py(y));
+                write!(svg, "<circle class=\"dot c{colour}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"/>")?;
+                svg.push_str(if link.is_some() { "</a>" } else { "" });
             }
         }
         Ok(())

@@ -23,7 +23,7 @@ pub fn sparkline(label: &str, points: &[(f64, f64)], end: f64) -> Option<String>
     Some(format!(
         "<svg class=\"sparkline\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\"><path d=\"{path}H{x:.1}\"/>\
          <circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\"/></svg>",
-        super::chart::escape(label)
+        super::escaped_text::escape(label)
     ))
 }
 

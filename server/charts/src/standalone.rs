@@ -1,7 +1,7 @@
 //! Makes a drawing self-contained: adds size, white background, title, legend, and the rules of the style sheet for
 //! drawings, in its light colours.
 
-use super::chart::escape;
+use super::escaped_text::escape;
 use std::collections::HashMap;
 use std::fmt::Write;
 

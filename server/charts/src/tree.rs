@@ -1,6 +1,6 @@
 //! The warm-start tree, drawn from left to right.
 
-use super::chart::escape;
+use super::escaped_text::escape;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 

@@ -1,5 +1,6 @@
 //! Numbers and names as pages show them.
 
+use gait_learner::Prediction;
 use gait_optimizer::TunedBounds;
 use gaitwright_charts::power_of_ten;
 use gaitwright_service::access::Role;
@@ -182,6 +183,11 @@ pub(crate) fn percent(probability: f64) -> String {
 pub(crate) fn signed(value: f64) -> String {
     // Zero has no minus sign.
     minus(&format!("{:+.2}", if value.abs() < 0.005 { 0.0 } else { value }))
+}
+
+/// A utility with its standard deviation: `+0.55 ± 0.68`.
+pub(crate) fn utility(utility: &Prediction) -> String {
+    format!("{} ± {:.2}", signed(utility.mean), utility.standard_deviation)
 }
 
 /// What a bound limits, with its unit; empty for any other name.

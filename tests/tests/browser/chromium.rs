@@ -283,7 +283,12 @@ impl Tab {
     /// Moves the mouse over an element.
     pub(crate) async fn point_at(&self, selector: &str) {
         self.wait_for(selector).await;
-        self.page.find_element(selector).await.unwrap().hover().await.unwrap();
+        let element = self.page.find_element(selector).await.unwrap();
+        // Scrolling, of which a page hears one frame later, hides what it shows at the pointer.
+        element.scroll_into_view().await.unwrap();
+        self.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done('drawn'))))")
+            .await;
+        element.hover().await.unwrap();
     }
 
     /// Emulates a touch screen from here on.

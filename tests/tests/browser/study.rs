@@ -5,6 +5,7 @@ use crate::site::Site;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
+use gaitwright_tests::people;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -18,7 +19,7 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     page.fill("#trial_budget", "3").await;
     page.click("button[type=submit]").await;
     // The page follows the study by itself.
-    page.wait_for("[data-trial]").await;
+    page.wait_for(".running[data-trial]").await;
     page.wait_for("[data-part=state] .state.finished").await;
     page.wait_until("document.querySelectorAll('.trials tbody tr').length === 3").await;
     assert!(!page.text("#trials").await.contains("No trials yet") && page.count("#trials form.filter").await == 1);
@@ -55,10 +56,18 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     let phase = "document.querySelector('.outcome [data-phase]').textContent";
     let before = page.value(phase).await;
     page.wait_until(&format!("{phase} !== {before:?}")).await;
-    // Another gait is recommended once this one is reported as unsafe.
+    // The sentence about certainty states what the recommendation says.
+    let sure = page.text("[data-part=best]").await;
+    assert!(sure.contains("Its Gait RMSE is measured, not believed: it is the lowest of"), "{sure}");
+    // Another gait walks once this one is reported as unsafe.
     let report = format!("/api/v1/trials/{}/safety-reports", best["trial_id"].as_str().unwrap());
     assert!(site.service.post(&report, &serde_json::json!({"note": "fell"})).await.status.is_success());
-    page.wait_until("!document.querySelector('.outcome .walker')").await;
+    let other = site.service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
+    let shown = "document.querySelector('.outcome [data-trial]')?.dataset.trial";
+    page.wait_until(&format!("{shown} === {:?}", other["trial_id"].as_str().unwrap())).await;
+    page.wait_for(".outcome fieldset:enabled [data-phase]").await;
+    let before = page.value(phase).await;
+    page.wait_until(&format!("{phase} !== {before:?}")).await;
     page.is_clean(&site.origin).await;
     let plain = browser.open_without_scripts(&address).await;
     assert_eq!(plain.count(".outcome svg.gait-figure").await, 1);
@@ -71,13 +80,102 @@ async fn browser_follows_a_running_solve() {
     let site = Site::start(Analytic::slow(Duration::from_millis(400))).await;
     let study = site.service.study(|new| new.trial_budget = 1).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
-    page.wait_for("[data-trial] [data-chart] svg.chart").await;
-    let text = "document.querySelector('[data-trial] [data-text]')?.textContent ?? ''";
-    let drawing = "document.querySelector('[data-trial] .chart .line')?.getAttribute('d') ?? ''";
+    page.wait_for(".running [data-chart] svg.chart").await;
+    let text = "document.querySelector('.running [data-text]')?.textContent ?? ''";
+    let drawing = "document.querySelector('.running .chart .line')?.getAttribute('d') ?? ''";
     let (early, drawn) = (page.value(text).await, page.value(drawing).await);
     page.wait_until(&format!("({text}) !== {early:?} && ({drawing}) !== {drawn:?}")).await;
     page.wait_for("[data-part=state] .state.finished").await;
-    assert_eq!(page.count("[data-trial]").await, 0);
+    assert_eq!(page.count(".running").await, 0);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
+    let study = site.service.study(|new| new.trial_budget = 200).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    page.resize(1280, 800).await;
+    assert!(page.text("[data-walker]").await.contains("walks here after the first converged trial"));
+    // The first gait walks without a reload, and the better one after it.
+    page.run("window.same = true").await;
+    page.wait_for(".outcome fieldset:enabled [data-phase]").await;
+    let shown = "document.querySelector('.outcome [data-trial]').dataset.trial";
+    let first = page.value(shown).await;
+    page.wait_until(&format!("{shown} !== {first:?}")).await;
+    page.wait_for(".outcome fieldset:enabled [data-phase]").await;
+    page.wait_until("/^About .+ left for \\d+ trials/m.test(document.querySelector('[data-part=state]').innerText)")
+        .await;
+    assert_eq!(page.value("window.same ?? false").await, "true");
+    let (bottom, ..) = page.lowest(".outcome svg.gait-figure").await;
+    assert!(bottom <= 800.0, "{bottom}");
+    page.is_clean(&site.origin).await;
+    let fresh = site.service.study(|new| new.trial_budget = 2).await;
+    let told = site.service.fetch(&format!("/studies/{fresh}")).await.text;
+    assert!(told.contains("No estimate of the time left yet: it needs 3 more solves."), "{told}");
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over_the_answers() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+    for _ in 0..4 {
+        people::answer_once(&site.service, study).await;
+    }
+    people::asked(&site.service, study).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    page.resize(1280, 800).await;
+    // The first button of the page.
+    assert_eq!(page.text("main .button").await, "Answer the comparison");
+    let (bottom, ..) = page.lowest(".lead .button").await;
+    assert!(bottom <= 400.0, "{bottom}");
+    let chart = "[data-part=history] svg.chart[data-along='utility, no unit']";
+    assert_eq!(page.count(&format!("{chart} .dot")).await, 4);
+    assert_eq!(
+        (page.count(&format!("{chart} .band")).await, page.count("[data-part=history] svg.chart").await),
+        (1, 1)
+    );
+    assert_eq!(page.count("[data-part=course] svg.chart").await, 1);
+    // The same figures as on the page Analysis.
+    let sentence = "document.querySelector('[data-part=best] table').previousElementSibling.textContent.match(/\\d+\\s%/)?.[0].replace(/\\s/, ' ')";
+    let sure = page.value(sentence).await;
+    assert!(
+        page.text("[data-part=best]").await.contains("After 4 comparisons, the learner is")
+            || page.text("[data-part=best]").await.contains("after 4 comparisons, the learner is only")
+    );
+    let analysis = browser.open(&site.at(&format!("/studies/{study}/belief"))).await;
+    assert!(analysis.text("#best tbody tr:nth-child(2)").await.contains(&sure), "{sure}");
+    // A new answer adds a point without a reload.
+    people::answer_once(&site.service, study).await;
+    page.wait_until(&format!("document.querySelectorAll(`{chart} .dot`).length === 5")).await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_reaches_each_section_of_a_study_from_its_index_with_the_keyboard() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.trial_budget = 4).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    let order = "[...document.querySelectorAll('nav.index a')].map(a => document.querySelector(a.getAttribute('href')).offsetTop)";
+    assert_eq!(page.value(&format!("{order}.length")).await, "6");
+    let in_order = format!("{order}.every((top, i, all) => i === 0 || all[i - 1] < top)");
+    assert_eq!(page.value(&in_order).await, "true", "sections stand in the order of the index");
+    for name in ["trials", "answers", "analysis", "figures", "lab", "export"] {
+        page.run(&format!("document.querySelector('nav.index a[href=\"#{name}\"]').focus()")).await;
+        page.press("Enter").await;
+        page.wait_until(&format!("location.hash === '#{name}'")).await;
+        let seen = format!(
+            "(() => {{ const r = document.querySelector('#{name} h2').getBoundingClientRect(); return r.top >= 0 && r.bottom <= innerHeight }})()"
+        );
+        page.wait_until(&seen).await;
+    }
     page.is_clean(&site.origin).await;
     browser.close().await;
 }
@@ -158,15 +256,42 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     // Four clearances by six leans, twice.
     assert_eq!(page.count("#maps svg.map .cell").await, 48);
     assert_eq!(page.count("#maps svg.map .framed").await, 2);
-    let shares = "[...document.querySelectorAll('#best meter')].reduce((sum, m) => sum + m.value, 0)";
-    let total: f64 = page.value(shares).await.parse().unwrap();
-    assert!((total - 1.0).abs() < 1e-9, "{total}");
+    // The recommended gait is the first row, and the means fall.
     let recommended = site.service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
-    assert_eq!(page.text("#best tr.best a").await, recommended["number"].to_string(), "{recommended}");
-    assert!(page.count("#answers tbody tr").await > 0);
+    assert_eq!(page.text("#best tbody tr:first-child a").await, recommended["number"].to_string(), "{recommended}");
+    assert!(page.text("#best tr.best").await.contains("recommended"));
+    let means = "[...document.querySelectorAll('#best tbody tr')].map(r => Number(r.cells[2].textContent.split(' ')[0].replace('\u{2212}', '-')))";
+    assert_eq!(page.value(&format!("{means}.every((mean, i, all) => i === 0 || mean <= all[i - 1])")).await, "true");
+    // Where Gait RMSE answers, it decides, and not the belief beside it.
+    let by_rmse = "[...document.querySelectorAll('#best tbody tr')].slice(1).every((row, i, all) => \
+        row.cells[3].textContent === (Number(row.cells[1].textContent) > Number(document.querySelector('#best tr.best').cells[1].textContent) \
+        ? 'yes, by Gait RMSE' : 'no, by Gait RMSE'))";
+    assert_eq!(page.value(by_rmse).await, "true");
+    let bars = "[...document.querySelectorAll('#bounds meter')].map(m => m.value)";
+    assert_eq!(
+        page.value(&format!(
+            "{bars}.length === 8 && {bars}[0] === 1 && {bars}.every((v, i, all) => i === 0 || v <= all[i - 1])"
+        ))
+        .await,
+        "true"
+    );
+    // One legend for all charts of the marginals.
+    assert_eq!((page.count("#marginals .legend.shared span").await, page.count("#marginals figcaption").await), (2, 0));
+    // Each dot leads to its trial.
+    let results = site.service.trials(study).await.iter().filter(|trial| trial.state.is_result()).count();
+    assert_eq!(page.count("#every-trial svg.parallel a").await, results);
+    let dots = page.count("#maps svg.chart:not(.map) a circle.dot").await;
+    assert!(dots > 4, "{dots}");
+    page.run("document.querySelector('#maps svg.chart:not(.map) a').id = 'dot'").await;
+    let trial = page.value("document.querySelector('#dot').getAttribute('href')").await;
+    // Answers that the learner agrees with are no surprise.
+    let doubted = "[...document.querySelectorAll('#answers tbody td:last-child')].every(cell => parseInt(cell.textContent) <= 50)";
+    assert_eq!(page.value(doubted).await, "true");
     page.is_clean(&site.origin).await;
     let wrong = site.service.fetch(&format!("/studies/{study}/belief?x=a5&y=a5")).await;
     assert!(wrong.status.is_client_error(), "{}", wrong.status);
+    page.click("#dot circle").await;
+    page.wait_until(&format!("location.pathname === {trial:?}")).await;
 
     let other = site.service.study(|new| (new.trial_budget, new.muscles) = (4, false)).await;
     site.service.wait_for(other, &[StudyState::Finished]).await;

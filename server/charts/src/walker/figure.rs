@@ -3,7 +3,7 @@
 use super::body::{Part, human_parts, parts};
 use super::muscle_paths::{MusclePath, is_left, muscle_paths};
 use super::segment::UNITS_PER_M;
-use crate::chart::escape;
+use crate::escaped_text::escape;
 use crate::gait_series::{MUSCLES, points};
 use gait_optimizer::body::{GRAVITY, WalkerModel};
 use gait_optimizer::walking::stick_figure::{LegPoints, StickFigure, stick_figure, stick_figures};

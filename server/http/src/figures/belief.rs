@@ -1,5 +1,6 @@
 //! The figures of what the learner believes about the search space of a study.
 
+use super::trials_by_bound::{by_bound, parallel};
 use crate::format::{meaning, percent, signed};
 use crate::shared_state::AppState;
 use gait_learner::{Dimension, LearnerError, Marginal, SearchSpace};
@@ -42,9 +43,13 @@ pub(crate) struct DimensionChoice {
 pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: AxisChoice) -> Result<Vec<Figure>, Error> {
     let Believed::There(snapshot, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
     let draw = move |_: &OnPool| {
-        let chosen = chosen(belief.posterior.space(), &choice)?;
+        let chosen = chosen(&belief, &choice)?;
         let mut figures = marginals(&belief);
         figures.extend(maps(&belief, &snapshot, chosen).map_err(Error::Learner)?.figures);
+        figures.extend(parallel(&snapshot, &belief).map_err(Error::Learner)?);
+        for dimension in 0..belief.posterior.space().dimensions().len() {
+            figures.extend(by_bound(&snapshot, &belief, dimension).map_err(Error::Learner)?);
+        }
         Ok(figures)
     };
     app.compute(draw).await?
@@ -83,24 +88,37 @@ pub(crate) async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed
     app.compute(think).await?.map_err(Error::Learner)
 }
 
-/// The two dimensions of the maps: the requested ones, by default the first two; `None` if there is only one dimension.
-pub(crate) fn chosen(space: &SearchSpace, choice: &AxisChoice) -> Result<Option<(usize, usize)>, Error> {
-    let names: Vec<&str> = space.dimensions().iter().map(|d| d.name.as_str()).collect();
+/// The two dimensions of the maps: the requested ones, by default those that matter most; `None` if there is only one
+/// dimension.
+pub(crate) fn chosen(belief: &Belief, choice: &AxisChoice) -> Result<Option<(usize, usize)>, Error> {
+    let names: Vec<&str> = belief.posterior.space().dimensions().iter().map(|d| d.name.as_str()).collect();
     if names.len() < 2 {
         return Ok(None);
     }
-    let place = |field: &str, asked: &Option<String>, default: usize| match asked {
-        None => Ok(default),
+    let place = |field: &str, asked: &Option<String>| match asked {
+        None => Ok(None),
         Some(name) => {
             let found = names.iter().position(|known| known == name);
-            found.ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
+            found.map(Some).ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
         }
     };
-    let (x, y) = (place("x", &choice.x, 0)?, place("y", &choice.y, 1)?);
+    let (x, y) = (place("x", &choice.x)?, place("y", &choice.y)?);
+    let ranked = ranked(belief);
+    let other_than = |taken: Option<usize>| ranked.iter().copied().find(|place| Some(*place) != taken).unwrap_or(0);
+    let x = x.unwrap_or_else(|| other_than(y));
+    let y = y.unwrap_or_else(|| other_than(Some(x)));
     if x == y {
         return Err(Error::invalid("y", names[y], &format!("a bound other than {}", names[x])));
     }
     Ok(Some((x, y)))
+}
+
+/// The dimensions by how much they matter, the most important first.
+pub(crate) fn ranked(belief: &Belief) -> Vec<usize> {
+    let mut ranked: Vec<usize> = (0..belief.main_effects.len()).collect();
+    let effect = |place: usize| belief.main_effects[place].difference.mean;
+    ranked.sort_by(|a, b| effect(*b).total_cmp(&effect(*a)));
+    ranked
 }
 
 /// All on one scale: what matters is which bound matters.

@@ -9,7 +9,10 @@ pub(crate) mod study;
 mod study_progress;
 mod study_results;
 pub(crate) mod trial;
+pub(crate) mod trials_by_bound;
+mod utility;
 
 pub(crate) use outcome::Outcome;
 pub(crate) use study_progress::{COURSE, course, warm_starts};
 pub(crate) use study_results::{StudyResults, have_one_reference_gait};
+pub(crate) use utility::utility;

@@ -3,7 +3,7 @@
 use gait_learner::LearnerError;
 use gaitwright_compute::OnPool;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::comparison::open_question;
+use gaitwright_service::studies::comparison::{Question, open_question};
 use gaitwright_service::studies::history::{self, Milestone};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::{last_believed, ranking_to_show};
@@ -23,6 +23,8 @@ pub(crate) struct Outcome {
     history: Vec<Milestone>,
     /// Whether people are asked to compare two gaits.
     pub(crate) question: bool,
+    /// The trial whose certificate the next comparison waits for.
+    pub(crate) question_after: Option<TrialId>,
 }
 
 impl Outcome {
@@ -43,15 +45,22 @@ impl Outcome {
             let question = snapshot.study.state == StudyState::Waiting;
             return Ok(Self { best, ranking, history, question, ..Self::default() });
         }
-        let question = snapshot.study.plan.feedback_mode != FeedbackMode::Automatic
-            && open_question(pool, snapshot)?.trials().is_some();
+        let open = match snapshot.study.plan.feedback_mode {
+            FeedbackMode::Automatic => Question::None,
+            FeedbackMode::Human | FeedbackMode::Mixed => open_question(pool, snapshot)?,
+        };
+        let question = open.trials().is_some();
+        let question_after = match open {
+            Question::AfterCertificate(trial) => Some(trial),
+            Question::None | Question::Pair(_) => None,
+        };
         if snapshot.waits_for_first_answer() {
-            return Ok(Self { unanswered: true, question, ..Self::default() });
+            return Ok(Self { unanswered: true, question, question_after, ..Self::default() });
         }
         let ranking = ranking_to_show(pool, snapshot, beliefs)?;
         let best = ranking.first().copied();
         let history = history::of(snapshot, best);
-        Ok(Self { best, ranking, history, question, ..Self::default() })
+        Ok(Self { best, ranking, history, question, question_after, ..Self::default() })
     }
 
     /// Gait RMSE of the best action by iteration.

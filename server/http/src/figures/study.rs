@@ -31,14 +31,14 @@ pub(crate) struct StudyFigures {
     /// Names of the studies without a gait to draw.
     pub(crate) without_gait: Vec<String>,
     pub(crate) sections: Vec<Section>,
-    /// The warm-start tree, which the study page shows.
-    tree: Option<Figure>,
+    /// The warm-start tree and the utility of the recommended gait, which the study page shows.
+    on_study_page: Vec<Figure>,
 }
 
 impl StudyFigures {
     /// All of them.
     pub(crate) fn into_figures(self) -> Vec<Figure> {
-        self.sections.into_iter().flat_map(|section| section.figures).chain(self.tree).collect()
+        self.sections.into_iter().flat_map(|section| section.figures).chain(self.on_study_page).collect()
     }
 }
 
@@ -46,6 +46,8 @@ impl StudyFigures {
 struct Best {
     results: StudyResults,
     outcome: Outcome,
+    /// The utility of the recommended gait over the answers of people.
+    utility: Option<Figure>,
     trial: Option<(TrialId, u32)>,
     gait: Option<Gait>,
 }
@@ -56,10 +58,11 @@ impl Best {
         let results = StudyResults::read(&mut *app.read().await?, id).await?;
         let draw = move |pool: &OnPool| {
             let outcome = results.outcome(pool, &beliefs);
-            (results, outcome)
+            let utility = results.utility(pool, &beliefs);
+            (results, outcome, utility)
         };
-        let (results, outcome) = app.compute(draw).await?;
-        let outcome = outcome?;
+        let (results, outcome, utility) = app.compute(draw).await?;
+        let (outcome, utility) = (outcome?, utility?);
         let mut reader = app.read().await?;
         let trial = match outcome.best {
             Some(id) => Some((id, trials::get(&mut reader, id).await?.number)),
@@ -71,7 +74,7 @@ impl Best {
         };
         drop(reader);
         let gait = app.compute(move |pool| gait.map(|gait| gait.unpack(pool)).transpose()).await??;
-        Ok(Self { results, outcome, trial, gait })
+        Ok(Self { results, outcome, utility, trial, gait })
     }
 
     fn name(&self) -> &str {
@@ -100,7 +103,13 @@ pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<Stud
     let without_gait = shown.iter().filter(|best| best.gait.is_none()).map(|best| best.name().to_owned()).collect();
     let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
     let tree = warm_starts(&first.results.snapshot, first.outcome.best);
-    Ok(StudyFigures { best: first.trial, study: first.results.snapshot.study, without_gait, sections: sections?, tree })
+    Ok(StudyFigures {
+        best: first.trial,
+        study: first.results.snapshot.study,
+        without_gait,
+        sections: sections?,
+        on_study_page: tree.into_iter().chain(first.utility).collect(),
+    })
 }
 
 fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {

@@ -1,13 +1,15 @@
 //! A study with its trials, as charts of one or of several studies show it.
 
 use super::outcome::Outcome;
+use super::utility::utility;
+use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::TrialCounts;
-use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
+use gaitwright_store::{Connection, StudyId, consents, feedback, reference_gaits, studies, subjects, trials};
 
 /// How many of the newest trials of a large study are drawn.
 const NEWEST: u32 = 200;
@@ -24,6 +26,8 @@ pub(crate) struct StudyResults {
     /// Name of the reference gait.
     pub(crate) reference_gait: String,
     pub(crate) counts: TrialCounts,
+    /// Number of entries of the feedback log.
+    feedback: usize,
 }
 
 impl StudyResults {
@@ -38,10 +42,19 @@ impl StudyResults {
         } else {
             StudySnapshot::read(db, study).await?
         };
-        Ok(Self { snapshot, subject, reference_gait, counts })
+        let feedback = feedback::count(db, id).await? as usize;
+        Ok(Self { snapshot, subject, reference_gait, counts, feedback })
     }
 
     pub(crate) fn outcome(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Outcome, Error> {
         Outcome::of(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
+    }
+
+    /// The utility of the recommended gait over the answers of people; `None` of a large study.
+    pub(crate) fn utility(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Option<Figure>, Error> {
+        if self.counts.total as usize >= MANY || self.feedback > MOST_ANSWERS {
+            return Ok(None);
+        }
+        utility(pool, &self.snapshot, beliefs).map_err(Error::Learner)
     }
 }

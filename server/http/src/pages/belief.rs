@@ -1,31 +1,36 @@
-//! What the learner believes about the search space of a study.
+//! The page *Analysis*: what the learner believes about the gaits and the bounds of a study, beside what was measured.
 
-use super::page_chart::Drawn;
+use super::certainty::certainty;
+use super::page_chart::{Drawn, shared_legend};
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::figures::belief::{
-    AxisChoice, Believed, DimensionChoice, MAP_NOTES, Maps, believed, chosen, maps, marginals,
+    AxisChoice, Believed, DimensionChoice, MAP_NOTES, Maps, believed, chosen, maps, marginals, ranked,
 };
-use crate::format::{self, percent, signed};
+use crate::figures::trials_by_bound::{DRAWN, by_bound, parallel};
+use crate::format::{self, figure, meaning, percent};
 use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
-use gait_learner::{Agreement, LearnerError};
+use gait_learner::{Agreement, Prediction};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Belief, Comparison};
+use gaitwright_service::studies::belief::{Belief, Surprise};
+use gaitwright_service::studies::gait_beliefs::{GaitBelief, is_told};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::ranking_to_show;
-use gaitwright_store::studies::Study;
+use gaitwright_store::feedback::FeedbackContent;
+use gaitwright_store::studies::{FeedbackMode, Study};
 use gaitwright_store::{StudyId, TrialId, studies};
-use std::sync::Arc;
+use std::cmp::Ordering;
 
-/// So many actions and answers are listed.
-const LISTED: usize = 12;
+/// So many gaits and answers are listed.
+const LISTED: usize = 24;
+/// So many trials of one gait are named.
+const NAMED: usize = 6;
 
 #[derive(Template)]
 #[template(path = "belief.html")]
@@ -38,32 +43,55 @@ struct BeliefPage {
 
 struct Everything {
     agreement: Agreement,
+    /// How sure the recommendation is; `None` without one.
+    certainty: Option<String>,
+    /// Whether a gait is recommended.
+    recommends: bool,
+    gaits: Vec<GaitRow>,
+    /// So many gaits are not in that list.
+    more_gaits: usize,
+    bounds: Vec<BoundRow>,
     marginals: Vec<Drawn>,
+    legend: Vec<(String, String)>,
     maps: Maps,
     /// The maps as shown.
     charts: Vec<Drawn>,
-    best: Vec<BestRow>,
-    /// So many trials are not in that list.
-    others: usize,
-    answers: Vec<AnswerRow>,
-    more_answers: usize,
+    /// The trials by the two bounds of the maps.
+    by_bound: Vec<Drawn>,
+    parallel: Option<Drawn>,
+    /// Whether some trials are not drawn.
+    newest_only: bool,
+    surprises: Vec<SurpriseRow>,
+    more_surprises: usize,
 }
 
-struct BestRow {
-    id: TrialId,
-    number: u32,
-    percent: String,
-    probability: f64,
+/// A gait, which one or several trials have.
+struct GaitRow {
+    trials: Vec<(TrialId, u32)>,
+    /// So many trials are not named.
+    more_trials: usize,
+    rmse: String,
     utility: String,
-    /// Whether it is the one that the study recommends.
-    recommended: bool,
+    /// Whether the recommended gait is better; `None` for the recommended gait.
+    worse: Option<String>,
 }
 
-struct AnswerRow {
+/// How much a bound matters.
+struct BoundRow {
+    name: String,
+    limited: &'static str,
+    /// Share of the largest effect.
+    share: f64,
+    effect: String,
+    best: f64,
+    worst: f64,
+    is_told: bool,
+}
+
+struct SurpriseRow {
     text: String,
     source: &'static str,
     percent: String,
-    agrees: bool,
 }
 
 /// `GET /studies/{id}/belief`.
@@ -77,103 +105,113 @@ pub(super) async fn get(
     page(&match believed(&mut app, id).await? {
         Believed::Absent(why) => BeliefPage { study, absent: Some(why), shown: None },
         Believed::There(snapshot, belief) => {
-            let beliefs = Arc::clone(&app.beliefs);
-            let draw = move |pool: &OnPool| {
-                // As on the page of the study: nothing before people have answered.
-                let silent = snapshot.waits_for_first_answer();
-                let ranking = if silent {
-                    Vec::new()
-                } else {
-                    ranking_to_show(pool, &snapshot, &beliefs).map_err(Error::Learner)?
-                };
-                let recommended = ranking.first().copied();
-                show(id, &snapshot, &belief, recommended, &choice)
-            };
+            let draw = move |_: &OnPool| show(id, &snapshot, &belief, &choice);
             let shown = app.compute(draw).await.map_err(Error::from)??;
             BeliefPage { study, absent: None, shown: Some(shown) }
         }
     })
 }
 
-fn show(
-    id: StudyId,
-    snapshot: &StudySnapshot,
-    belief: &Belief,
-    recommended: Option<TrialId>,
-    choice: &AxisChoice,
-) -> Result<Everything, Error> {
-    let chosen = chosen(belief.posterior.space(), choice)?;
+fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisChoice) -> Result<Everything, Error> {
+    let pair = chosen(belief, choice)?;
     let files = format!("/api/v1/studies/{id}/belief/figures");
-    let maps = maps(belief, snapshot, chosen).map_err(Error::Learner)?;
+    let maps = maps(belief, snapshot, pair).map_err(Error::Learner)?;
     let names =
         |asked: fn(&DimensionChoice) -> bool| maps.dimensions.iter().find(|d| asked(d)).map(|d| d.name.as_str());
     let query = match (names(|d| d.x), names(|d| d.y)) {
         (Some(x), Some(y)) => format!("?x={x}&y={y}"),
         _ => String::new(),
     };
+    let drawn = |figure: &_| Drawn::of(figure, &files, "");
+    let dimensions = pair.map_or_else(|| vec![0], |(x, y)| vec![x, y]);
+    let by_bound = dimensions.into_iter().map(|dimension| by_bound(snapshot, belief, dimension));
+    let by_bound: Vec<_> = by_bound.collect::<Result<Vec<_>, _>>().map_err(Error::Learner)?;
     let charts = maps.figures.iter().zip(MAP_NOTES);
-    let (best, others) = best(belief, snapshot, recommended).map_err(Error::Learner)?;
+    let charts = charts.map(|(figure, note)| Drawn { note, ..Drawn::of(figure, &files, &query) }).collect();
+    let parallel = parallel(snapshot, belief).map_err(Error::Learner)?;
+    let mut marginals: Vec<Drawn> = marginals(belief).iter().map(drawn).collect();
+    let results = snapshot.trials.iter().filter(|trial| trial.state.is_result()).count();
+    // As on the page of the study: no recommendation before people have answered.
+    let recommends = !snapshot.waits_for_first_answer();
     Ok(Everything {
         agreement: belief.agreement,
-        marginals: marginals(belief).iter().map(|figure| Drawn::of(figure, &files, "")).collect(),
-        charts: charts.map(|(figure, note)| Drawn { note, ..Drawn::of(figure, &files, &query) }).collect(),
+        certainty: certainty(snapshot, belief),
+        recommends,
+        gaits: belief.gaits.iter().take(LISTED).map(|gait| gait_row(gait, belief, snapshot)).collect(),
+        more_gaits: belief.gaits.len().saturating_sub(LISTED),
+        bounds: bounds(belief),
+        legend: shared_legend(&mut marginals),
+        marginals,
+        charts,
         maps,
-        best,
-        others,
-        answers: belief.comparisons.iter().take(LISTED).filter_map(|c| answer_row(c, snapshot)).collect(),
-        more_answers: belief.comparisons.len().saturating_sub(LISTED),
+        by_bound: by_bound.iter().flatten().map(drawn).collect(),
+        parallel: parallel.as_ref().map(drawn),
+        newest_only: results > DRAWN,
+        surprises: belief.surprises.iter().take(LISTED).filter_map(|s| surprise_row(s, snapshot)).collect(),
+        more_surprises: belief.surprises.len().saturating_sub(LISTED),
     })
 }
 
-/// The trials that are most likely the best, the recommended one always among them; and how many others there are.
-fn best(
-    belief: &Belief,
-    snapshot: &StudySnapshot,
-    recommended: Option<TrialId>,
-) -> Result<(Vec<BestRow>, usize), LearnerError> {
-    let tried: Vec<_> =
-        belief.best.iter().filter_map(|entry| Some((entry, snapshot.trial_of(entry.action)?))).collect();
-    let marked = tried.iter().position(|(_, trial)| recommended == Some(trial.id));
-    let row = |place: usize| {
-        let (entry, trial) = tried[place];
-        let prediction = belief.posterior.predict(entry.action)?;
-        Ok(BestRow {
-            id: trial.id,
-            number: trial.number,
-            percent: percent(entry.probability),
-            probability: entry.probability,
-            utility: format!("{} ± {:.2}", signed(prediction.mean), prediction.standard_deviation),
-            recommended: marked == Some(place),
-        })
-    };
-    let places = listed(tried.len(), marked);
-    let rows = places.iter().map(|&place| row(place)).collect::<Result<Vec<_>, _>>()?;
-    Ok((rows, tried.len() - places.len()))
-}
-
-/// The places of a long list that are shown: the first ones, and the one that must not be missing.
-fn listed(length: usize, always: Option<usize>) -> Vec<usize> {
-    (0..length.min(LISTED)).chain(always.filter(|&place| place >= LISTED)).collect()
-}
-
-fn answer_row(comparison: &Comparison, snapshot: &StudySnapshot) -> Option<AnswerRow> {
-    Some(AnswerRow {
-        text: answer_in_words(&comparison.given, snapshot)?,
-        source: format::source(&comparison.given),
-        percent: percent(comparison.probability),
-        agrees: comparison.probability > 0.5,
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{LISTED, listed};
-
-    #[test]
-    fn recommended_trial_is_always_listed() {
-        assert_eq!(listed(3, Some(1)), [0, 1, 2]);
-        assert_eq!(listed(LISTED + 5, Some(0)).len(), LISTED);
-        let long = listed(LISTED + 5, Some(LISTED + 2));
-        assert_eq!((long.len(), long.last()), (LISTED + 1, Some(&(LISTED + 2))));
+fn gait_row(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> GaitRow {
+    let trials = gait.trials.iter().filter_map(|id| snapshot.trial(*id));
+    GaitRow {
+        rmse: figure(trials.clone().next().and_then(|trial| trial.gait_rmse_rad)),
+        trials: trials.take(NAMED).map(|trial| (trial.id, trial.number)).collect(),
+        more_trials: gait.trials.len().saturating_sub(NAMED),
+        utility: format::utility(&gait.utility),
+        worse: gait
+            .behind
+            .map(|behind| worse(gait, belief, snapshot).map_or_else(|| believed_worse(&behind), str::to_owned)),
     }
+}
+
+/// What Gait RMSE says of a gait beside the recommended one. `None` if it does not answer the comparisons alone.
+fn worse(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Option<&'static str> {
+    if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
+        return None;
+    }
+    let rmse = |gait: &GaitBelief| snapshot.trial(*gait.trials.first()?)?.gait_rmse_rad;
+    let (own, recommended) = (rmse(gait)?, rmse(belief.gaits.first()?)?);
+    Some(match own.total_cmp(&recommended) {
+        Ordering::Greater => "yes, by Gait RMSE",
+        Ordering::Equal => "equal Gait RMSE",
+        Ordering::Less => "no, by Gait RMSE",
+    })
+}
+
+fn believed_worse(behind: &Prediction) -> String {
+    let percent = percent(behind.probability_above_zero());
+    if is_told(behind) { format!("yes, with {percent}") } else { format!("too few comparisons to tell ({percent})") }
+}
+
+/// The bounds with several values, the one that matters most first.
+fn bounds(belief: &Belief) -> Vec<BoundRow> {
+    let dimensions = belief.posterior.space().dimensions();
+    let ranked = ranked(belief);
+    let largest = ranked.first().map_or(0.0, |place| belief.main_effects[*place].difference.mean);
+    let row = |place: usize| {
+        let effect = &belief.main_effects[place];
+        let name = &dimensions[place].name;
+        BoundRow {
+            limited: meaning(name),
+            name: name.clone(),
+            share: if largest > 0.0 { effect.difference.mean / largest } else { 0.0 },
+            effect: format!("{:.2} ± {:.2}", effect.difference.mean, effect.difference.standard_deviation),
+            best: effect.best,
+            worst: effect.worst,
+            is_told: is_told(&effect.difference),
+        }
+    };
+    ranked.into_iter().filter(|place| dimensions[*place].values.len() > 1).map(row).collect()
+}
+
+fn surprise_row(surprise: &Surprise, snapshot: &StudySnapshot) -> Option<SurpriseRow> {
+    let text = match surprise.given.content {
+        FeedbackContent::Suggestion { over, .. } => {
+            format!("the suggested bounds are better than those of trial {}", snapshot.trial(over)?.number)
+        }
+        _ => answer_in_words(&surprise.given, snapshot)?,
+    };
+    let percent = surprise.probability.map_or_else(|| "–".to_owned(), percent);
+    Some(SurpriseRow { text, source: format::source(&surprise.given), percent })
 }

@@ -4,6 +4,7 @@ mod access_log;
 mod api_reference;
 mod audit;
 mod belief;
+mod certainty;
 mod certificate;
 mod compare;
 mod devices;

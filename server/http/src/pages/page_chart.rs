@@ -42,9 +42,10 @@ impl Drawn {
             // Pages show the walker itself, which a script moves.
             Drawing::Animation(..) => (String::new(), Vec::new()),
             Drawing::Map(map) => (map.svg(), Vec::new()),
+            Drawing::Parallel(parallel) => (parallel.svg(), parallel.legend()),
             Drawing::Tree(tree) => (tree.svg(), Vec::new()),
         };
-        let is_wide = matches!(figure.drawing, Drawing::Tiles(..) | Drawing::Map(_));
+        let is_wide = matches!(figure.drawing, Drawing::Tiles(..) | Drawing::Map(_) | Drawing::Parallel(_));
         Self { title: figure.title().to_owned(), note: "", svg, is_wide, legend, files }
     }
 }

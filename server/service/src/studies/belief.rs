@@ -1,16 +1,16 @@
-//! Computes and caches the learner's posterior of a study, with marginals, probabilities of being best and agreement.
+//! Computes and caches the learner's posterior of a study, with marginals, the pooled gaits and agreement.
 
-use super::seed::{Purpose, derive};
+use super::gait_beliefs::{GaitBelief, gait_beliefs};
 use super::snapshot::StudySnapshot;
-use gait_learner::{ActionIndex, Agreement, BestProbability, Learner, LearnerError, Marginal, Posterior};
+use super::utility_history::{UtilityHistory, UtilityPoint};
+use gait_learner::{Agreement, Feedback, Learner, LearnerError, MainEffect, Marginal, Posterior};
 use gaitwright_compute::OnPool;
 use gaitwright_store::StudyId;
-use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion};
+use gaitwright_store::feedback::{FeedbackRow, LogVersion};
+use gaitwright_store::safety_reviews::SafetyVersion;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Joint draws for the probabilities of being best. Their standard error is below 1.6 %.
-const DRAWS: usize = 1000;
 /// Above this number of answers a page cannot wait for the posterior: its computing time grows with the third power.
 pub const MOST_ANSWERS: usize = 1500;
 /// Number of studies whose results are cached.
@@ -27,21 +27,23 @@ pub struct Belief {
     pub posterior: Arc<Posterior>,
     /// For each dimension, the utility of its levels, averaged over all other dimensions.
     pub marginals: Vec<Vec<Marginal>>,
-    /// The tried actions, by decreasing probability of being best.
-    pub best: Vec<BestProbability>,
+    /// For each dimension, how much it matters.
+    pub main_effects: Vec<MainEffect>,
+    /// The gaits that can be recommended, by decreasing utility, identical ones pooled.
+    pub gaits: Vec<GaitBelief>,
     /// How many answers the posterior agrees with.
     pub agreement: Agreement,
-    /// Every comparison that was not retracted, the most surprising first.
-    pub comparisons: Vec<Comparison>,
+    /// The answers that it does not agree with, the most surprising first.
+    pub surprises: Vec<Surprise>,
 }
 
-/// An answered comparison and its probability under the posterior.
+/// An answer that the posterior does not agree with.
 #[derive(Debug)]
-pub struct Comparison {
+pub struct Surprise {
     /// The answer.
     pub given: FeedbackRow,
-    /// The probability of the same answer to the same question.
-    pub probability: f64,
+    /// For a preference or suggestion, the probability that its order of utilities is right; `None` for a tie.
+    pub probability: Option<f64>,
 }
 
 impl Belief {
@@ -50,40 +52,53 @@ impl Belief {
         let plan = &snapshot.study.plan;
         let dimensions = 0..plan.search_space.dimensions().len();
         let marginals = dimensions.map(|d| posterior.marginal(d)).collect::<Result<_, _>>()?;
-        let mut comparisons = Vec::new();
-        for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
-            let Some((winner, loser)) = preferred(snapshot, row) else { continue };
-            let probability = posterior.preference_probability(winner, loser)?;
-            comparisons.push(Comparison { given: row.clone(), probability });
-        }
-        comparisons.sort_by(|a, b| a.probability.total_cmp(&b.probability));
+        let main_effects = (0..plan.search_space.dimensions().len()).map(|d| posterior.main_effect(d));
         Ok(Self {
             marginals,
-            best: posterior.best_of_visited(DRAWS, derive(plan.seed, Purpose::Belief, 0))?,
+            main_effects: main_effects.collect::<Result<_, _>>()?,
+            gaits: gait_beliefs(snapshot, &posterior)?,
             agreement: posterior.agreement(),
+            surprises: surprises(snapshot, &posterior)?,
             posterior,
-            comparisons,
         })
     }
 }
 
-/// Winner and loser of a preference between two trials with different actions.
-fn preferred(snapshot: &StudySnapshot, row: &FeedbackRow) -> Option<(ActionIndex, ActionIndex)> {
-    let action = |id| snapshot.trial(id).map(|trial| trial.action_index);
-    match row.content {
-        FeedbackContent::Preference { winner, loser } => {
-            Some((action(winner)?, action(loser)?)).filter(|(winner, loser)| winner != loser)
+/// The comparisons that the posterior does not agree with, the most surprising first; ties last.
+fn surprises(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<Surprise>, LearnerError> {
+    let mut surprises = Vec::new();
+    for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
+        let Some(feedback) = snapshot.heard(&row.content) else { continue };
+        let order = match feedback {
+            Feedback::Label { .. } => continue,
+            Feedback::Preference { winner, loser } => Some((winner, loser)),
+            Feedback::Suggestion { suggested, over } => Some((suggested, over)),
+            Feedback::Tie { .. } => None,
+        };
+        if posterior.agrees_with(feedback) {
+            continue;
         }
-        _ => None,
+        let probability = match order {
+            Some((winner, loser)) => Some(posterior.difference(winner, loser)?.probability_above_zero()),
+            None => None,
+        };
+        surprises.push(Surprise { given: row.clone(), probability });
     }
+    surprises.sort_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
+    Ok(surprises)
 }
+
+/// What is kept of the studies used last, the one used last at the end.
+type Recent<T> = Mutex<VecDeque<(StudyId, Arc<Mutex<T>>)>>;
 
 /// Cache of recent posteriors and of the learners that computed them.
 #[derive(Debug, Default)]
 pub struct Beliefs {
-    learners: Mutex<VecDeque<(StudyId, Arc<Mutex<Learner>>)>>,
-    posteriors: Kept<Posterior>,
-    shown: Kept<Belief>,
+    learners: Recent<Learner>,
+    posteriors: Kept<LogVersion, Posterior>,
+    // A safety report changes which gaits can be recommended.
+    shown: Kept<(LogVersion, SafetyVersion), Belief>,
+    histories: Recent<UtilityHistory>,
 }
 
 impl Beliefs {
@@ -100,8 +115,9 @@ impl Beliefs {
             *learner = Learner::default();
             learner
         });
-        let posterior =
-            self.posteriors.get_or(snapshot, || learner.posterior(&plan.search_space, &snapshot.log(), &plan.learner));
+        let posterior = self.posteriors.get_or(snapshot.study.id, snapshot.version, || {
+            learner.posterior(&plan.search_space, &snapshot.log(), &plan.learner)
+        });
         if snapshot.trials.len() > MOST_KEPT_TRIALS {
             *learner = Learner::default();
         }
@@ -110,14 +126,7 @@ impl Beliefs {
 
     /// The cached learner of a study, or a new one.
     fn learner(&self, study: StudyId) -> Arc<Mutex<Learner>> {
-        let mut learners = self.learners.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = learners.iter().position(|(id, _)| *id == study).and_then(|at| learners.remove(at));
-        let (study, learner) = kept.unwrap_or_else(|| (study, Arc::default()));
-        learners.push_back((study, Arc::clone(&learner)));
-        if learners.len() > KEPT_LEARNERS {
-            learners.pop_front();
-        }
-        learner
+        kept_or_new(&self.learners, study, KEPT_LEARNERS)
     }
 
     /// The belief of a study, recomputed if the log has changed. CPU-bound.
@@ -125,27 +134,55 @@ impl Beliefs {
     /// # Errors
     /// When the learner cannot work with the log.
     pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Belief>, LearnerError> {
-        self.shown.get_or(snapshot, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
+        let version = (snapshot.version, snapshot.safety);
+        self.shown.get_or(snapshot.study.id, version, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
     }
+
+    /// The utility of the recommended gait after each answer of a person. Only the answers since the last call are
+    /// computed. CPU-bound.
+    ///
+    /// # Errors
+    /// When the learner cannot work with the log.
+    pub fn utility_history(&self, _: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<UtilityPoint>, LearnerError> {
+        let history = kept_or_new(&self.histories, snapshot.study.id, KEPT);
+        let mut history = history.lock().unwrap_or_else(|poisoned| {
+            let mut history = poisoned.into_inner();
+            *history = UtilityHistory::default();
+            history
+        });
+        history.of(snapshot)
+    }
+}
+
+/// The value of a study in a list of those used last, or a new one.
+fn kept_or_new<T: Default>(list: &Recent<T>, study: StudyId, limit: usize) -> Arc<Mutex<T>> {
+    let mut list = list.lock().unwrap_or_else(PoisonError::into_inner);
+    let kept = list.iter().position(|(id, _)| *id == study).and_then(|at| list.remove(at));
+    let (study, value) = kept.unwrap_or_else(|| (study, Arc::default()));
+    list.push_back((study, Arc::clone(&value)));
+    if list.len() > limit {
+        list.pop_front();
+    }
+    value
 }
 
 /// A cache of values that derive from the log of a study.
 #[derive(Debug)]
-struct Kept<T>(Mutex<VecDeque<(StudyId, LogVersion, Arc<T>)>>);
+struct Kept<V, T>(Mutex<VecDeque<(StudyId, V, Arc<T>)>>);
 
-impl<T> Default for Kept<T> {
+impl<V, T> Default for Kept<V, T> {
     fn default() -> Self {
         Self(Mutex::default())
     }
 }
 
-impl<T> Kept<T> {
+impl<V: Copy + PartialEq, T> Kept<V, T> {
     fn get_or(
         &self,
-        snapshot: &StudySnapshot,
+        study: StudyId,
+        version: V,
         compute: impl FnOnce() -> Result<T, LearnerError>,
     ) -> Result<Arc<T>, LearnerError> {
-        let (study, version) = (snapshot.study.id, snapshot.version);
         // The list is consistent between statements, so a poisoned lock is usable.
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, _, found)) = kept().iter().find(|(id, at, _)| (*id, *at) == (study, version)) {

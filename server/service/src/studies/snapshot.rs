@@ -94,10 +94,7 @@ impl StudySnapshot {
 
     /// Whether people answer the comparisons, and have given no valid answer yet.
     pub fn waits_for_first_answer(&self) -> bool {
-        let answered = |row: &FeedbackRow| {
-            row.retraction.is_none() && !matches!(row.source, Source::Convergence | Source::GaitRmse)
-        };
-        self.study.plan.feedback_mode == FeedbackMode::Human && !self.feedback.iter().any(answered)
+        self.study.plan.feedback_mode == FeedbackMode::Human && !self.feedback.iter().any(is_answer_of_a_person)
     }
 
     /// Number of queued or running trials.
@@ -163,6 +160,11 @@ impl StudySnapshot {
         log
     }
 
+    /// What the learner hears of an entry of the log. `None` if both trials have the same action.
+    pub fn heard(&self, content: &FeedbackContent) -> Option<Feedback> {
+        heard(content, |id| self.trial(id).map(|trial| trial.action_index))
+    }
+
     /// Actions that must not be proposed although the study has no result of them: being solved, failed, or, in a study
     /// of a lab script, with bounds of a gait that was reported as unsafe.
     pub fn barred_without_result(&self) -> Vec<ActionIndex> {
@@ -172,6 +174,11 @@ impl StudySnapshot {
         let closed = closed.filter_map(|bounds| search_space::action_of(&plan.search_space, plan.base_bounds, bounds));
         open.chain(closed).collect()
     }
+}
+
+/// Whether a person or a script answered, and the answer was not retracted.
+pub(super) fn is_answer_of_a_person(row: &FeedbackRow) -> bool {
+    row.retraction.is_none() && !matches!(row.source, Source::Convergence | Source::GaitRmse)
 }
 
 /// Converts an answer about trials to one about actions. `None` if both trials have the same action.

@@ -2,6 +2,7 @@
 
 use super::belief::Beliefs;
 use super::equal_actions::equal_actions;
+use super::ranking::{by_mean, ranking};
 use super::search_space;
 use super::seed::{Purpose, derive};
 use super::snapshot::StudySnapshot;
@@ -9,7 +10,7 @@ use gait_learner::{LearnerError, Posterior, ProposalReason, propose, propose_out
 use gait_optimizer::ModelError;
 use gaitwright_compute::OnPool;
 use gaitwright_store::TrialId;
-use gaitwright_store::trials::{NewTrial, Trial, TrialState};
+use gaitwright_store::trials::{NewTrial, TrialState};
 use thiserror::Error;
 
 /// Why no trial could be chosen.
@@ -70,28 +71,6 @@ pub fn best_converged(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Op
 /// As [`best_converged`].
 pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
     Ok(ranking(snapshot, belief)?.first().copied())
-}
-
-/// The gaits of a study without an open safety report, by decreasing posterior mean. The first is recommended.
-///
-/// # Errors
-/// As [`best_converged`].
-pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial))
-}
-
-/// Converged trials by decreasing posterior mean; ties by number.
-fn by_mean(
-    snapshot: &StudySnapshot,
-    belief: &Posterior,
-    counts: impl Fn(&Trial) -> bool,
-) -> Result<Vec<TrialId>, LearnerError> {
-    let mut ranked = Vec::new();
-    for trial in snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
-        ranked.push((belief.mean(trial.action_index)?, trial.id));
-    }
-    ranked.sort_by(|(mean_a, _), (mean_b, _)| mean_b.total_cmp(mean_a));
-    Ok(ranked.into_iter().map(|(_, id)| id).collect())
 }
 
 /// From this number of trials on, pages show the last known best trial instead of computing the posterior.

@@ -2,20 +2,23 @@
 
 mod answers;
 mod recommended_walker;
+mod time_left;
 mod trials_table;
 mod without_gait;
 
 use self::answers::{AnswerRow, answers};
 pub(super) use self::answers::{answer_in_words, assessment_in_words};
-use self::recommended_walker::RecommendedWalker;
+use self::recommended_walker::Walker;
+use self::time_left::time_left;
 use self::trials_table::{Choice, TrialRow, TrialsTable};
 use self::without_gait::WithoutGait;
+use super::certainty::certainty;
 use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
-use crate::figures::{COURSE, Outcome, course, warm_starts};
+use crate::figures::{COURSE, Outcome, course, utility, warm_starts};
 use crate::format::{self, Bound, words};
 use crate::page_error::{Page, PageError, page};
 use crate::visible::Visible;
@@ -23,12 +26,13 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
+use gait_learner::LearnerError;
 use gaitwright_charts::Figure;
 use gaitwright_charts::gait_charts;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::MOST_ANSWERS;
+use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
 use gaitwright_service::studies::certified_best::{self, CertificateState, Judged};
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
@@ -43,11 +47,12 @@ use gaitwright_store::assessments::{self};
 use gaitwright_store::devices::{self, Device};
 use gaitwright_store::feedback::{self};
 use gaitwright_store::imports::{self, Import};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
 use gaitwright_store::{
-    Instant, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, reference_gaits, studies, trials,
+    Instant, LabSessionId, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, lab_sessions,
+    reference_gaits, studies, trials,
 };
 use serde::Deserialize;
 use std::sync::Arc;
@@ -60,8 +65,10 @@ struct StudyPage {
     device: Device,
     reference: String,
     live: String,
-    /// Whether the recommended gait is shown walking.
+    /// Whether a recommended gait walks, or will.
     walks: bool,
+    /// The lab sessions, by number.
+    sessions: Vec<(LabSessionId, u32)>,
     last_event: i64,
     variant: &'static str,
     answers_by: &'static str,
@@ -98,15 +105,22 @@ struct Live {
     never_active: String,
     /// Number of results, and number of planned trials.
     progress: [String; 2],
-    /// Expected remaining time; empty if unknown.
+    /// Expected remaining time; empty unless the study runs.
     pace: String,
+    /// Why the next solve has not started; empty if one runs.
+    queued: String,
     running: Vec<RunningRow>,
     best: Option<Best>,
-    /// The recommended gait of a study that has ended.
-    walker: Option<RecommendedWalker>,
+    /// How sure the recommendation is; `None` without one, and for a large study.
+    certainty: Option<String>,
+    /// The recommended gait, or its place.
+    walker: Walker,
     unanswered: bool,
     /// Whether only people answer comparisons.
     people_answer: bool,
+    /// The utility of the recommended gait over the answers of people.
+    utility: Option<Drawn>,
+    /// Gait RMSE of the best action by iteration.
     chart: Option<Drawn>,
     table: TrialsTable,
     /// Warm-start tree.
@@ -114,6 +128,8 @@ struct Live {
     answers: Vec<AnswerRow>,
     unsafe_gaits: Vec<UnsafeGait>,
     question: bool,
+    /// The trial whose certificate the next comparison waits for.
+    question_after: Option<(TrialId, u32)>,
     can_compare: bool,
 }
 
@@ -122,9 +138,9 @@ impl Live {
         self.best.as_ref().is_some_and(|best| best.id == row.id)
     }
 
-    /// Whether nothing waits for a person, so that the recommended gait comes before the state.
+    /// Whether the study has ended and nothing waits for a person, so that the recommended gait comes before the state.
     fn leads_with_outcome(&self) -> bool {
-        self.unsafe_gaits.is_empty() && !self.question
+        self.unsafe_gaits.is_empty() && !self.question && self.study.state.has_ended()
     }
 
     /// Whether answers are missing from the list.
@@ -219,12 +235,10 @@ pub(super) async fn get(
     let device = devices::get(&mut reader, study.plan.device_id).await?;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     let imports = imports::of_study(&mut reader, id).await?;
+    let sessions = lab_sessions::of_study(&mut reader, id).await?;
     drop(reader);
-    let mut live = read_live(&mut app, &authorized.caller, id, choice).await?;
-    if let Some(best) = live.best.as_ref().filter(|best| best.has_gait && study.state.has_ended()) {
-        live.walker = RecommendedWalker::read(&mut app, &study, best.id).await?;
-    }
-    let walks = live.walker.is_some();
+    let live = read_live(&mut app, &authorized.caller, id, choice).await?;
+    let walks = live.walker.has_place();
     let live = live.render().map_err(|e| Error::Internal(e.to_string()))?;
     let may_administer = authorized.caller.may(Administer::NEEDED);
     let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
@@ -235,6 +249,7 @@ pub(super) async fn get(
         reference,
         live,
         walks,
+        sessions: sessions.iter().map(|session| (session.id, session.number)).collect(),
         last_event,
         variant,
         answers_by,
@@ -336,16 +351,17 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     } else {
         StudySnapshot::read(&mut reader, study).await?
     };
+    let shown = choice.shown.clone();
     let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
     let assessments = assessments::of_study(&mut reader, id).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
     let draw = move |pool: &OnPool| {
-        let outcome = Outcome::of(pool, &snapshot, large, &beliefs);
+        let outcome = learned(pool, &snapshot, large, &beliefs);
         (snapshot, outcome)
     };
-    let (snapshot, outcome) = app.compute(draw).await?;
-    let outcome = outcome.map_err(Error::Learner)?;
+    let (snapshot, learned) = app.compute(draw).await?;
+    let Learned { outcome, certainty, utility } = learned.map_err(Error::Learner)?;
     let mut reader = app.read().await?;
     let mut judged = certified_best::judged(&mut reader, &outcome.ranking).await?;
     let without_gait = WithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
@@ -370,15 +386,35 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let mut answers = answers(&snapshot, &assessments);
     answers.truncate(SHOWN as usize);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let found = Found { outcome, judged, simulated_walks, has_gait, without_gait };
+    let found = Found { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait };
+    let pace = time_left(&snapshot, counts.results(), app.scheduler.workers());
     // The newest trials do not say it of all.
     let inactive = if large { Vec::new() } else { never_active(&snapshot) };
     let mut live = view(snapshot, counts, found, running, table, answers, caller.may(Run::NEEDED));
     live.never_active = inactive.join(", ");
+    live.pace = pace;
+    let best = live.best.as_ref().map(|best| (best.id, best.number, best.has_gait));
+    live.walker = Walker::read(app, &live.study, best, &shown).await?;
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
-        live.pace = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
+        live.queued = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
     }
     Ok(live)
+}
+
+/// What the learner says of a study.
+struct Learned {
+    outcome: Outcome,
+    certainty: Option<String>,
+    utility: Option<Figure>,
+}
+
+fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, beliefs: &Beliefs) -> Result<Learned, LearnerError> {
+    let outcome = Outcome::of(pool, snapshot, large, beliefs)?;
+    if large || outcome.best.is_none() {
+        return Ok(Learned { outcome, certainty: None, utility: None });
+    }
+    let certainty = certainty(snapshot, &*beliefs.of(pool, snapshot)?);
+    Ok(Learned { outcome, certainty, utility: utility(pool, snapshot, beliefs)? })
 }
 
 fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
@@ -404,6 +440,8 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
 /// What a study has found, and what the record says of it.
 struct Found {
     outcome: Outcome,
+    certainty: Option<String>,
+    utility: Option<Figure>,
     /// The states of the certificates.
     judged: Judged,
     /// How many simulated walks with the best gait were complete.
@@ -422,7 +460,7 @@ fn view(
     answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
-    let Found { outcome, judged, simulated_walks, has_gait, without_gait } = found;
+    let Found { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait } = found;
     let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| Best {
         id: trial.id,
         number: trial.number,
@@ -453,22 +491,30 @@ fn view(
         may_stop: acts.contains(&Act::Stop),
         may_extend: acts.contains(&Act::Extend),
         acts: acts.into_iter().filter_map(button).collect(),
-        pace: pace(&snapshot, counts),
+        pace: String::new(),
+        queued: String::new(),
         without_gait,
         never_active: String::new(),
         progress: [counts.results(), snapshot.study.plan.trial_budget].map(|trials| format::count(trials.into())),
         counts,
         running,
         best,
-        walker: None,
+        certainty,
+        walker: Walker::None,
         unanswered: outcome.unanswered,
         people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
+        utility: utility.map(|figure| Drawn::of(&figure, &files, "")),
         chart: course(&[(&snapshot, &outcome)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
         tree: warm_starts(&snapshot, outcome.best).map(|figure| Drawn::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
         question: outcome.question && snapshot.study.state != StudyState::Stopped,
+        question_after: outcome
+            .question_after
+            .filter(|_| !snapshot.study.state.has_ended())
+            .and_then(|id| snapshot.trial(id))
+            .map(|trial| (trial.id, trial.number)),
         can_compare: converged >= 2,
         study: snapshot.study,
     }
@@ -484,23 +530,4 @@ fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
             format!("The next solve is queued. Running: {} of other studies; queued: {} more.", solves(running), others)
         }
     }
-}
-
-/// The expected remaining time of the study, from the median of its own solves.
-fn pace(snapshot: &StudySnapshot, counts: TrialCounts) -> String {
-    let study = &snapshot.study;
-    if study.state != StudyState::Running {
-        return String::new();
-    }
-    let mut seconds: Vec<f64> = snapshot.trials.iter().filter_map(|trial| trial.seconds_total).collect();
-    seconds.sort_by(f64::total_cmp);
-    let Some(median) = seconds.get(seconds.len() / 2) else {
-        if counts.results() > 0 || study.plan.evaluation == Evaluation::Script {
-            return String::new();
-        }
-        return "The first trial has a cold start and takes the longest, up to a minute.".to_owned();
-    };
-    let left = study.plan.trial_budget.saturating_sub(counts.results());
-    let people = format::besides_solves(study.plan.feedback_mode);
-    format!("About {} left{people}.", format::duration(median * f64::from(left)))
 }

@@ -22,6 +22,9 @@ pub(crate) struct Choice {
     state: String,
     pub(super) contains: String,
     page: u32,
+    /// The trial whose gait the page shows walking, which the script sends.
+    #[serde(skip_serializing)]
+    pub(super) shown: String,
 }
 
 impl Default for Choice {
@@ -32,6 +35,7 @@ impl Default for Choice {
             state: String::new(),
             contains: String::new(),
             page: 1,
+            shown: String::new(),
         }
     }
 }

@@ -1,0 +1,65 @@
+//! How sure a study is of its recommended gait, as one sentence. It uses the figures of the page *Analysis*.
+
+use crate::format::{figure, percent};
+use gaitwright_service::studies::belief::Belief;
+use gaitwright_service::studies::gait_beliefs::is_told;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::trials::Trial;
+
+/// The sentence about the recommended gait. `None` without a recommendation.
+pub(super) fn certainty(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
+    if snapshot.waits_for_first_answer() {
+        return None;
+    }
+    match snapshot.study.plan.feedback_mode {
+        FeedbackMode::Automatic => measured(snapshot, belief),
+        FeedbackMode::Human | FeedbackMode::Mixed => believed(snapshot, belief),
+    }
+}
+
+fn measured(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
+    let recommended = snapshot.trial(*belief.gaits.first()?.trials.first()?)?;
+    let own = recommended.gait_rmse_rad?;
+    let others = belief.gaits.iter().skip(1).flat_map(|gait| &gait.trials).filter_map(|id| snapshot.trial(*id));
+    let rmse = |trial: &&Trial| trial.gait_rmse_rad.unwrap_or(f64::INFINITY);
+    let lowest = others.min_by(|a, b| rmse(a).total_cmp(&rmse(b)));
+    Some(match (lowest, belief.gaits.len()) {
+        (None, _) => "Its Gait RMSE is measured, not believed. It is the only gait so far.".to_owned(),
+        (Some(other), _) if rmse(&other) < own => format!(
+            "Gait RMSE is measured, not believed: that of trial {} is lower, {} rad. The learner recommends by utility, \
+             which it also infers from gaits with similar bounds.",
+            other.number,
+            figure(other.gait_rmse_rad)
+        ),
+        (Some(_), gaits) => {
+            format!("Its Gait RMSE is measured, not believed: it is the lowest of {gaits} different gaits.")
+        }
+    })
+}
+
+fn believed(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
+    belief.gaits.first()?;
+    let comparisons = match belief.agreement.comparisons + belief.agreement.ties {
+        1 => "1 comparison".to_owned(),
+        all => format!("{all} comparisons"),
+    };
+    let Some(next) = belief.gaits.get(1) else {
+        return Some("It is the only gait that can be recommended, so there is nothing to compare it with.".to_owned());
+    };
+    let (difference, number) = (next.behind?, snapshot.trial(*next.trials.first()?)?.number);
+    // Without a line break before the sign.
+    let sure = percent(difference.probability_above_zero()).replace(' ', "\u{a0}");
+    let gaits = belief.gaits.len();
+    Some(if is_told(&difference) {
+        format!(
+            "After {comparisons}, the learner is {sure} sure that this gait is better than that of trial {number}, the \
+             next best of {gaits} different gaits."
+        )
+    } else {
+        format!(
+            "Too few comparisons to tell: after {comparisons}, the learner is only {sure} sure that this gait is better \
+             than that of trial {number}, the next best of {gaits} different gaits."
+        )
+    })
+}

@@ -1,0 +1,60 @@
+//! How long a running study still takes, from its own finished solves.
+
+use crate::format;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::studies::{Evaluation, StudyState};
+
+/// With fewer finished solves there is no estimate: the first one starts cold and takes longer than the others.
+const FEWEST_SOLVES: usize = 3;
+
+/// A sentence about the time left; empty unless the study runs. `results` is the number of trials with a result, `workers` the
+/// number of solves that can run at a time.
+pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) -> String {
+    let study = &snapshot.study;
+    if study.state != StudyState::Running {
+        return String::new();
+    }
+    if study.plan.evaluation == Evaluation::Script {
+        return "The time left depends on the script that evaluates the trials.".to_owned();
+    }
+    let solves: Vec<f64> = snapshot.trials.iter().filter_map(|trial| trial.seconds_total).collect();
+    let Some(median) = median(&solves) else {
+        let missing = FEWEST_SOLVES - solves.len();
+        let solves = if missing == 1 { "1 more solve".to_owned() } else { format!("{missing} more solves") };
+        return format!("No estimate of the time left yet: it needs {solves}.");
+    };
+    let left = study.plan.trial_budget.saturating_sub(results);
+    let parallel = (study.plan.parallel_trials as usize).min(workers).max(1);
+    let mut seconds = median * f64::from(left) / parallel as f64;
+    if let Some(budget) = study.plan.solve_seconds_budget {
+        let spent: f64 = solves.iter().sum();
+        seconds = seconds.min((budget - spent).max(0.0) / parallel as f64);
+    }
+    let at_most = if study.plan.unchanged_limit.is_some() { "At most about" } else { "About" };
+    let trials = if left == 1 { "1 trial".to_owned() } else { format!("{left} trials") };
+    let people = format::besides_solves(study.plan.feedback_mode);
+    format!(
+        "{at_most} {} left for {trials}{people}; half of the solves so far took less than {}.",
+        format::duration(seconds),
+        format::duration(median)
+    )
+}
+
+/// `None` of too few values.
+fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= FEWEST_SOLVES)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn median_needs_three_values_and_ignores_a_slow_cold_start() {
+        assert_eq!(median(&[]), None);
+        assert_eq!(median(&[40.0, 3.0]), None);
+        assert_eq!(median(&[40.0, 3.0, 4.0]), Some(4.0));
+    }
+}

@@ -1,0 +1,127 @@
+//! The utility of the recommended gait after each answer of a person, recomputed from the log.
+
+use super::snapshot::{StudySnapshot, is_answer_of_a_person};
+use gait_learner::{FeedbackLog, Learner, LearnerError, Posterior, Prediction};
+use gaitwright_store::TrialId;
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
+use gaitwright_store::safety_reviews::SafetyVersion;
+use gaitwright_store::trials::{Trial, TrialState};
+use std::collections::HashSet;
+
+/// Largest number of points: each one costs a fit of all answers before it.
+const MOST_POINTS: usize = 64;
+
+/// The recommended gait after a number of answers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UtilityPoint {
+    /// Number of answers of people that count.
+    pub answers: u32,
+    /// The recommended trial after them.
+    pub trial: TrialId,
+    /// Its utility after them.
+    pub utility: Prediction,
+}
+
+/// The history of a study, and the entries of the log that it was computed from.
+#[derive(Debug, Default)]
+pub(super) struct UtilityHistory {
+    /// Sequence numbers of the entries that count.
+    entries: Vec<i64>,
+    safety: Option<SafetyVersion>,
+    /// Points, and how many entries each is computed from.
+    points: Vec<(usize, UtilityPoint)>,
+}
+
+impl UtilityHistory {
+    /// The points of a snapshot. A point is computed again only if an entry before it was added or retracted.
+    pub(super) fn of(&mut self, snapshot: &StudySnapshot) -> Result<Vec<UtilityPoint>, LearnerError> {
+        let rows: Vec<&FeedbackRow> = snapshot.feedback.iter().filter(|row| counts(row)).collect();
+        let entries: Vec<i64> = rows.iter().map(|row| row.seq).collect();
+        let unchanged = entries.iter().zip(&self.entries).take_while(|(new, old)| new == old).count();
+        if self.safety != Some(snapshot.safety) {
+            self.points.clear();
+        }
+        self.points.retain(|(used, _)| *used <= unchanged);
+        (self.entries, self.safety) = (entries, Some(snapshot.safety));
+        let mut learner = Learner::default();
+        let mut points = Vec::new();
+        for (answers, used) in prefixes(&rows) {
+            let known = self.points.iter().find(|(own, point)| (*own, point.answers) == (used, answers));
+            let point = match known {
+                Some((_, point)) => Some(*point),
+                None => point(snapshot, &mut learner, answers, &rows[..used])?,
+            };
+            points.extend(point.map(|point| (used, point)));
+        }
+        self.points = points;
+        Ok(self.points.iter().map(|(_, point)| *point).collect())
+    }
+}
+
+/// Whether the learner hears an entry. A label stays even if it were retracted: its trial was visited.
+fn counts(row: &FeedbackRow) -> bool {
+    row.retraction.is_none() || matches!(row.content, FeedbackContent::Label { .. })
+}
+
+/// Numbers of answers of people, and of the entries before the next answer. Of many answers, every second, fourth, ... and the
+/// last, so that earlier points stay as the log grows.
+fn prefixes(rows: &[&FeedbackRow]) -> Vec<(u32, usize)> {
+    let answers: Vec<usize> = (0..rows.len()).filter(|place| is_answer_of_a_person(rows[*place])).collect();
+    let mut stride = 1;
+    while answers.len() / stride > MOST_POINTS {
+        stride *= 2;
+    }
+    let shown = (1..=answers.len()).filter(|count| count % stride == 0 || *count == answers.len());
+    shown
+        .filter_map(|count| {
+            let used = answers.get(count).copied().unwrap_or(rows.len());
+            Some((u32::try_from(count).ok()?, used))
+        })
+        .collect()
+}
+
+/// `None` if no gait could be recommended then.
+fn point(
+    snapshot: &StudySnapshot,
+    learner: &mut Learner,
+    answers: u32,
+    rows: &[&FeedbackRow],
+) -> Result<Option<UtilityPoint>, LearnerError> {
+    let plan = &snapshot.study.plan;
+    let mut log = FeedbackLog::default();
+    let mut labelled = HashSet::new();
+    for row in rows {
+        if let FeedbackContent::Label { trial, .. } = row.content
+            && let Some(trial) = snapshot.trial(trial)
+        {
+            log.visited.push(trial.action_index);
+            labelled.insert(trial.id);
+        }
+        if row.retraction.is_none() {
+            log.feedback.extend(snapshot.heard(&row.content));
+        }
+    }
+    let posterior = learner.posterior(&plan.search_space, &log, &plan.learner)?;
+    let gaits = snapshot.trials.iter().filter(|trial| {
+        labelled.contains(&trial.id)
+            && trial.state == TrialState::Converged
+            && !snapshot.grounds.safety_reports.closes(trial)
+    });
+    let Some(best) = highest(gaits, &posterior)? else { return Ok(None) };
+    Ok(Some(UtilityPoint { answers, trial: best.id, utility: posterior.predict(best.action_index)? }))
+}
+
+/// The trial with the highest mean, the earliest of several, as the recommendation has it.
+fn highest<'a>(
+    trials: impl Iterator<Item = &'a Trial>,
+    posterior: &Posterior,
+) -> Result<Option<&'a Trial>, LearnerError> {
+    let mut best: Option<(f64, &Trial)> = None;
+    for trial in trials {
+        let mean = posterior.mean(trial.action_index)?;
+        if best.is_none_or(|(highest, _)| mean > highest) {
+            best = Some((mean, trial));
+        }
+    }
+    Ok(best.map(|(_, trial)| trial))
+}
