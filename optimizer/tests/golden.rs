@@ -148,14 +148,23 @@ struct PerturbedStart {
     iterations: f64,
 }
 
-/// Mean and variance of the iterations of a cold start under different rounding errors.
+/// Mean of the iterations of a cold start under different rounding errors, and their variance, which is that of all
+/// starts of the variant: the perturbations of a single start can miss another way to the same gait.
 fn spread(rows: &[PerturbedStart], subject: u32, muscles: bool, guess: &str) -> (f64, f64) {
-    let of_start = |row: &&PerturbedStart| (row.subject, row.muscles, row.guess.as_str()) == (subject, muscles, guess);
-    let counts: Vec<f64> = rows.iter().filter(of_start).map(|row| row.iterations).collect();
-    assert!(counts.len() > 30, "{subject} {muscles} {guess}: {}", counts.len());
-    let mean = counts.iter().sum::<f64>() / counts.len() as f64;
-    let squares: f64 = counts.iter().map(|count| (count - mean).powi(2)).sum();
-    (mean, squares / (counts.len() - 1) as f64)
+    let start = |row: &PerturbedStart| (row.subject, row.guess.clone());
+    let mut starts: Vec<(u32, String)> = rows.iter().filter(|row| row.muscles == muscles).map(start).collect();
+    starts.sort();
+    starts.dedup();
+    let mean_and_variance = |wanted: &(u32, String)| {
+        let of_start = rows.iter().filter(|row| row.muscles == muscles && start(row) == *wanted);
+        let counts: Vec<f64> = of_start.map(|row| row.iterations).collect();
+        assert!(counts.len() > 30, "{wanted:?} {muscles}: {}", counts.len());
+        let mean = counts.iter().sum::<f64>() / counts.len() as f64;
+        let squares: f64 = counts.iter().map(|count| (count - mean).powi(2)).sum();
+        (mean, squares / (counts.len() - 1) as f64)
+    };
+    let variances = starts.iter().map(|start| mean_and_variance(start).1).sum::<f64>() / starts.len() as f64;
+    (mean_and_variance(&(subject, guess.to_owned())).0, variances)
 }
 
 /// Four standard deviations above the mean.
