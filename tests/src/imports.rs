@@ -170,7 +170,9 @@ fn inline_paths(code: &str) -> Vec<Vec<String>> {
     for head in ["crate::", "super::"] {
         for (at, _) in code.match_indices(head) {
             let before = code[..at].chars().next_back();
-            if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':' || c == '$') {
+            let is_whole = !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':' || c == '$');
+            // `pub(in crate::a)` imports nothing.
+            if !is_whole || code[..at].ends_with("(in ") {
                 continue;
             }
             let end = code[at..].find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
@@ -226,7 +228,7 @@ mod tests {
         let found = imports(&[
             ("lib.rs", "mod a;\nmod b;\npub use a::{Thing, other as renamed};\n"),
             ("a.rs", "pub struct Thing;\npub fn other() {}\n"),
-            ("b/mod.rs", "mod c;\nuse super::Thing;\n// use crate::missing;\nfn f() { crate::renamed() }\n"),
+            ("b/mod.rs", "mod c;\nuse super::Thing;\n// use crate::missing;\npub(in crate::b) fn f() { crate::renamed() }\n"),
             ("b/c.rs", "use std::fmt;\nuse super::super::a::{self, Thing};\n"),
         ]);
         assert!(found["lib.rs"].is_empty());
