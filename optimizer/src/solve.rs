@@ -5,6 +5,7 @@ use crate::subject::ModelError;
 use std::time::Instant;
 
 mod attempts;
+mod continuation;
 mod error;
 mod figures;
 mod multi_start;
@@ -17,6 +18,7 @@ mod solver_settings;
 mod warm_start;
 
 use attempts::{Tried, choose, enforce_between_nodes, number_basins, try_guesses, try_multi_start, try_warm};
+pub use continuation::{Fold, FoldReason, FollowedPath, Root, solve_by_continuation};
 pub use error::SolveError;
 pub use figures::GaitFigures;
 pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};

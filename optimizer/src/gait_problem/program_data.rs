@@ -2,6 +2,7 @@
 //! of the rows of a domain or a node.
 
 use super::layout::{DomainLayout, Layout, PointVariables};
+use super::problem_definition::GaitProblem;
 use super::rows::RowTable;
 use super::sparse_entries::Compressed;
 use super::variable_bounds::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
@@ -190,6 +191,17 @@ impl GaitProgramme {
             phases,
             reference_angles,
         })
+    }
+
+    /// The problem with other tuned bounds.
+    #[must_use]
+    pub(crate) fn with_bounds(&self, problem: &GaitProblem, bounds: &TunedBounds) -> Self {
+        let weight_n = self.model.total_mass * GRAVITY;
+        Self {
+            limits: ActiveLimits::new(&self.settings.limits, bounds),
+            bounds: variable_bounds(&self.layout, bounds, &self.settings, &problem.device, &self.muscles, weight_n),
+            ..self.clone()
+        }
     }
 
     /// The problem of a tracking phase: other weights, and landing points must only move downwards.
