@@ -2,7 +2,6 @@
 //! of the rows of a domain or a node.
 
 use super::layout::{DomainLayout, Layout, PointVariables};
-use super::problem_definition::GaitProblem;
 use super::rows::RowTable;
 use super::sparse_entries::Compressed;
 use super::variable_bounds::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
@@ -195,11 +194,11 @@ impl GaitProgramme {
 
     /// The problem with other tuned bounds.
     #[must_use]
-    pub(crate) fn with_bounds(&self, problem: &GaitProblem, bounds: &TunedBounds) -> Self {
+    pub(crate) fn with_bounds(&self, device: &Device, bounds: &TunedBounds) -> Self {
         let weight_n = self.model.total_mass * GRAVITY;
         Self {
             limits: ActiveLimits::new(&self.settings.limits, bounds),
-            bounds: variable_bounds(&self.layout, bounds, &self.settings, &problem.device, &self.muscles, weight_n),
+            bounds: variable_bounds(&self.layout, bounds, &self.settings, device, &self.muscles, weight_n),
             ..self.clone()
         }
     }

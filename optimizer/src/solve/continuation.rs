@@ -7,21 +7,16 @@
 //! [`MOST_ITERATIONS`] and the joint angles change by at most [`MOST_CHANGE_RAD`]. If a step of [`SHORTEST_STEP`] is refused,
 //! the path ends there: this is called a fold, and the reason says which of the two conditions failed.
 
-use super::attempts::{Tried, enforce_between_nodes};
 use super::error::SolveError;
-use super::options::SolveOptions;
-use super::phases::{AttemptRun, SolveContext};
-use super::progress::{CancelToken, IterationRecord, SolvePhase};
-use super::report::{SolveOutcome, SolveStatus, StartedFrom};
-use super::warm_start::{WarmStart, on_mesh_of};
-use super::{finish, number_basins};
-use crate::gait_problem::margins::Margins;
+use super::phases::AttemptRun;
+use super::progress::SolvePhase;
+use super::report::SolveStatus;
+use super::warm_start::WarmStart;
 use crate::gait_problem::{GaitProblem, GaitProgramme};
 use crate::subject::ModelError;
 use crate::tuned_bounds::TunedBounds;
 use interior_point::{NlpResult, NlpStatus, WarmPoint};
 use serde::{Deserialize, Serialize};
-use std::time::Instant;
 
 /// First step, as a share of the path.
 const FIRST_STEP: f64 = 0.25;
@@ -77,37 +72,12 @@ pub enum FoldReason {
     Jump,
 }
 
-/// The gait of `problem` that continues the gait `root`, and how it was followed. After a fold, the outcome is a solve from
-/// the last gait of the path, which leads to another local optimum or to none.
-///
-/// # Errors
-/// [`SolveError`] if the input is invalid, or the root has no gait.
-pub fn solve_by_continuation(
-    problem: &GaitProblem,
-    root: &Root,
-    options: &SolveOptions,
-    observer: &mut dyn FnMut(&IterationRecord),
-    cancel: &CancelToken,
-) -> Result<(SolveOutcome, FollowedPath), SolveError> {
-    options.validate()?;
-    let programme = problem.programme(problem.muscles)?;
-    root.bounds.validate()?;
-    let start = on_mesh_of(problem, &programme, &root.solution)?;
-    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
-    let mut run = AttemptRun::new(&context, options.threads, observer);
-    let follower = Follower { problem, programme: &programme, from: root.bounds };
-    let (result, path) = follower.follow(&mut run, start.point)?;
-    let mut tried = vec![Tried::new(&context, result, "continuation", Margins::default(), &run)];
-    number_basins(&mut tried);
-    let chosen = enforce_between_nodes(&context, &mut tried, 0, observer)?;
-    Ok((finish(&context, tried, chosen, StartedFrom::Warm)?, path))
-}
-
 /// Follows the gait of a programme.
-struct Follower<'a> {
-    problem: &'a GaitProblem,
-    programme: &'a GaitProgramme,
-    from: TunedBounds,
+pub(super) struct Follower<'a> {
+    pub(super) problem: &'a GaitProblem,
+    pub(super) programme: &'a GaitProgramme,
+    /// The tuned bounds of the root.
+    pub(super) from: TunedBounds,
 }
 
 impl Follower<'_> {
@@ -121,10 +91,15 @@ impl Follower<'_> {
     }
 
     fn programme_at(&self, share: f64) -> Result<GaitProgramme, ModelError> {
-        Ok(self.programme.with_bounds(self.problem, &self.bounds_at(share)?))
+        Ok(self.programme.with_bounds(&self.problem.device, &self.bounds_at(share)?))
     }
 
-    fn follow(&self, run: &mut AttemptRun<'_>, start: WarmPoint) -> Result<(NlpResult, FollowedPath), SolveError> {
+    /// The result for the bounds of the problem, or an interrupted one.
+    pub(super) fn follow(
+        &self,
+        run: &mut AttemptRun<'_>,
+        start: WarmPoint,
+    ) -> Result<(NlpResult, FollowedPath), SolveError> {
         let mut path = FollowedPath { steps: 0, refused_steps: 0, largest_change_rad: 0.0, fold: None };
         // The root without tightened bounds.
         let mut now = run.warm(SolvePhase::Cost, &self.programme_at(0.0)?, start)?;
