@@ -30,36 +30,11 @@ fn followed(bounds: &str, root: &Root) -> (SolveOutcome, FollowedPath) {
 }
 
 #[test]
-fn gait_does_not_depend_on_the_way_if_no_way_has_a_fold() {
-    let root = root();
-    let (direct, path) = followed("a5=0.01,a2=85", &root);
-    assert_eq!((direct.report.status, path.fold), (SolveStatus::Converged, None));
-    assert!(path.steps > 1 && path.largest_change_rad > 0.0, "{path:?}");
-    let (way, path) = followed("a2=85", &root);
-    assert_eq!(path.fold, None);
-    let way = Root { bounds: problem("a2=85").bounds, solution: way.warm_start };
-    let (other, path) = followed("a5=0.01,a2=85", &way);
-    assert_eq!(path.fold, None);
-    let (one, other) = (&direct.report, &other.report);
-    assert!((one.objective - other.objective).abs() <= 1e-6 * one.objective.abs(), "{one:?} {other:?}");
-    assert!((one.gait_rmse_rad - other.gait_rmse_rad).abs() <= 1e-3, "{one:?} {other:?}");
-}
-
-#[test]
 fn root_continued_to_its_own_bounds_stays_as_it_is() {
     let root = root();
     let (same, path) = followed("a5=0", &root);
     assert_eq!((same.report.status, path.fold, path.refused_steps), (SolveStatus::Converged, None, 0));
     assert!(path.largest_change_rad < 1e-6, "{path:?}");
-}
-
-#[test]
-fn path_to_bounds_without_a_gait_ends_in_a_fold() {
-    let (outcome, path) = followed("a5=0.3", &root());
-    let fold = path.fold.unwrap();
-    assert!((0.0..1.0).contains(&fold.share), "{fold:?}");
-    assert!((fold.bounds.a5 - 0.3 * fold.share).abs() < 1e-12, "{fold:?}");
-    assert_ne!(outcome.report.status, SolveStatus::Converged);
 }
 
 #[test]
