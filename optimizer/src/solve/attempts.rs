@@ -84,7 +84,7 @@ impl Tried {
         matches!(self.candidate.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
     }
 
-    fn new(
+    pub(super) fn new(
         context: &SolveContext<'_>,
         result: NlpResult,
         strategy: &str,

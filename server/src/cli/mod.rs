@@ -12,6 +12,7 @@ mod doctor;
 mod emg;
 mod flag_choices;
 mod flag_numbers;
+mod followed_path;
 mod gait_file;
 mod lineage;
 mod logging;
