@@ -43,9 +43,9 @@ pub use interior_point::{NlpSettings, WarmPoint};
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
-    BasinChoice, CancelToken, Fold, FoldReason, FollowedPath, GaitFigures, GuessTiming, InitialGuess, IterationRecord,
-    LinearAlgebra, MuscleRoute, OtherBasin, Root, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase,
-    SolveReport, SolveStatus, StartedFrom, Violation, WarmStart, solve, solve_by_continuation, solve_from_guesses,
+    BasinChoice, CancelToken, GaitFigures, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, MuscleRoute,
+    OtherBasin, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus,
+    StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
 };
 pub use subject::{ModelError, Subject};
 pub use tuned_bounds::TunedBounds;

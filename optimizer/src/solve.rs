@@ -1,12 +1,10 @@
 //! Solving a gait problem: attempts from initial guesses or a warm start, and the outcome.
 
 use crate::gait_problem::GaitProblem;
-use crate::gait_problem::margins::Margins;
 use crate::subject::ModelError;
 use std::time::Instant;
 
 mod attempts;
-mod continuation;
 mod error;
 mod figures;
 mod multi_start;
@@ -19,15 +17,13 @@ mod solver_settings;
 mod warm_start;
 
 use attempts::{Tried, choose, enforce_between_nodes, number_basins, try_guesses, try_multi_start, try_warm};
-use continuation::Follower;
-pub use continuation::{Fold, FoldReason, FollowedPath, Root};
 pub use error::SolveError;
 pub use figures::GaitFigures;
 pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use options::{BasinChoice, SolveOptions};
 use outcome::{SolveTally, other_basin, outcome};
+use phases::SolveContext;
 pub(crate) use phases::final_settings;
-use phases::{AttemptRun, SolveContext};
 pub use progress::{CancelToken, IterationRecord, SolvePhase};
 pub use report::{
     CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus,
@@ -77,32 +73,6 @@ pub fn solve(
     };
     let chosen = enforce_between_nodes(&context, &mut tried, chosen, observer)?;
     finish(&context, tried, chosen, started_from)
-}
-
-/// The gait of `problem` that continues the gait `root`, and how it was followed. After a fold, the outcome is a solve from
-/// the last gait of the path, which leads to another local optimum or to none.
-///
-/// # Errors
-/// [`SolveError`] if the input is invalid, or the root has no gait.
-pub fn solve_by_continuation(
-    problem: &GaitProblem,
-    root: &Root,
-    options: &SolveOptions,
-    observer: &mut dyn FnMut(&IterationRecord),
-    cancel: &CancelToken,
-) -> Result<(SolveOutcome, FollowedPath), SolveError> {
-    options.validate()?;
-    root.bounds.validate()?;
-    let programme = problem.programme(problem.muscles)?;
-    let start = on_mesh_of(problem, &programme, &root.solution)?;
-    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
-    let mut run = AttemptRun::new(&context, options.threads, observer);
-    let follower = Follower { problem, programme: &programme, from: root.bounds };
-    let (result, path) = follower.follow(&mut run, start.point)?;
-    let mut tried = vec![Tried::new(&context, result, "continuation", Margins::default(), &run)];
-    number_basins(&mut tried);
-    let chosen = enforce_between_nodes(&context, &mut tried, 0, observer)?;
-    Ok((finish(&context, tried, chosen, StartedFrom::Warm)?, path))
 }
 
 /// Solves a gait problem from a warm start only, without checks between nodes.

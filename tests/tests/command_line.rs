@@ -75,7 +75,6 @@ fn other_invalid_arguments_are_refused() {
     refused(&["solve", "--mesh", "0,4,6,6"], "mesh.ds2 is 0;");
     refused(&["solve", "--tolerance", "5"], "tolerance is 5;");
     refused(&["solve", "--warm", "nowhere.json"], "Cannot read nowhere.json");
-    refused(&["solve", "--continue"], "--warm <FILE>");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
     refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["simulate", "nowhere.json", "--walks", "0"], "must be a whole number from 1 to 100000");

@@ -66,11 +66,6 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     assert!(warm["iterations"].as_u64() < cold["iterations"].as_u64());
     assert_eq!(warm["lineage"]["ancestors"], json!([ancestor(&cold)]));
 
-    let continued = ["solve", "--json", "--warm", "gait.json", "--continue", "--bounds", "a5=0.013"];
-    let continued = json_of(&gaitwright(folder, &[&continued[..], &COARSE].concat()));
-    assert_eq!((&continued["status"], &continued["path"]["fold"]), (&json!("converged"), &Value::Null));
-    assert!(continued["path"]["steps"].as_u64() > Some(1), "{continued}");
-
     // Every basin that the guesses reach is kept, and can be started from.
     let many = ["solve", "--json", "--initial-guesses", "4", "--out", "many.json"];
     let many = json_of(&gaitwright(folder, &[&many[..], &COARSE].concat()));

@@ -192,17 +192,6 @@ impl GaitProgramme {
         })
     }
 
-    /// The problem with other tuned bounds.
-    #[must_use]
-    pub(crate) fn with_bounds(&self, device: &Device, bounds: &TunedBounds) -> Self {
-        let weight_n = self.model.total_mass * GRAVITY;
-        Self {
-            limits: ActiveLimits::new(&self.settings.limits, bounds),
-            bounds: variable_bounds(&self.layout, bounds, &self.settings, device, &self.muscles, weight_n),
-            ..self.clone()
-        }
-    }
-
     /// The problem of a tracking phase: other weights, and landing points must only move downwards.
     #[must_use]
     pub fn for_tracking(&self, tracking: f64) -> Self {

@@ -84,7 +84,7 @@ impl Tried {
         matches!(self.candidate.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
     }
 
-    pub(super) fn new(
+    fn new(
         context: &SolveContext<'_>,
         result: NlpResult,
         strategy: &str,

@@ -56,8 +56,6 @@ pub(super) struct AttemptRun<'a> {
     /// Number of the initial guess.
     pub(super) guess: usize,
     pub(super) iterations: usize,
-    /// Most iterations of the next phases.
-    pub(super) most_iterations: usize,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra: LinearAlgebra,
     /// The reason why a phase could not start; empty otherwise.
@@ -77,7 +75,6 @@ impl<'a> AttemptRun<'a> {
             begun: Instant::now(),
             guess: 0,
             iterations: 0,
-            most_iterations: usize::MAX,
             evaluation_s: 0.0,
             linear_algebra: LinearAlgebra::default(),
             reason: String::new(),
@@ -102,7 +99,7 @@ impl<'a> AttemptRun<'a> {
             .map_or(f64::INFINITY, |limit| (limit - self.context.started.elapsed().as_secs_f64()).max(0.0));
         let most = match phase {
             SolvePhase::Tracking | SolvePhase::MuscleTracking => MOST_TRACKING_ITERATIONS,
-            SolvePhase::PlainCost | SolvePhase::Cost | SolvePhase::InterNode => self.most_iterations,
+            SolvePhase::PlainCost | SolvePhase::Cost | SolvePhase::InterNode => usize::MAX,
         };
         let settings = NlpSettings {
             max_seconds: remaining,

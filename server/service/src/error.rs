@@ -236,7 +236,7 @@ impl From<SolveError> for Error {
     fn from(error: SolveError) -> Self {
         match error {
             SolveError::Model(error) => error.into(),
-            SolveError::WarmStartShape(_) | SolveError::RootWithoutGait(_) => Self::Conflict(error.to_string()),
+            SolveError::WarmStartShape { .. } => Self::Conflict(error.to_string()),
             SolveError::Solver(_) => Self::Internal(error.to_string()),
         }
     }

@@ -12,7 +12,6 @@ mod doctor;
 mod emg;
 mod flag_choices;
 mod flag_numbers;
-mod followed_path;
 mod gait_file;
 mod lineage;
 mod logging;

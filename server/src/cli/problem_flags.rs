@@ -8,7 +8,7 @@ use super::subject_flags::{Body, Switch};
 use clap::Args;
 use gait_optimizer::NlpSettings;
 use gait_optimizer::{
-    CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherBasin, ReferenceGait, Root, SolveOptions, SolveOutcome,
+    CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherBasin, ReferenceGait, SolveOptions, SolveOutcome,
     TunedBounds,
 };
 use gaitwright_service::error::Error;
@@ -18,9 +18,6 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-/// What a warm start is read from.
-const SOLVED: &str = "a file written by `gaitwright solve --out`";
 
 /// Files that replace parts of the built-in problem.
 #[derive(Debug, Clone, Args)]
@@ -144,17 +141,10 @@ impl ProblemFlags {
         Ok(options)
     }
 
-    /// The gait of the warm start that was given, as the root of a continuation.
-    pub(super) fn root(&self) -> Result<Option<Root>, Error> {
-        let Some(path) = &self.warm else { return Ok(None) };
-        let outcome: SolveOutcome = read_document(path, SOLVED, |_| Ok(()))?;
-        Ok(Some(Root { bounds: outcome.gait.bounds, solution: outcome.warm_start }))
-    }
-
     /// The warm start that was given. `basin` chooses a gait of another basin in the file.
     pub(super) fn warm_start(&self, basin: Option<usize>) -> Result<Option<LineageStart>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
-        let what = SOLVED;
+        let what = "a file written by `gaitwright solve --out`";
         let outcome: SolveOutcome = read_document(path, what, |_| Ok(()))?;
         let Kept { lineage } = read_document(path, what, |_| Ok(()))?;
         let answers = basin_of_answer(&outcome.report);

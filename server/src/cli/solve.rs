@@ -2,7 +2,6 @@
 
 use super::Ended;
 use super::flag_numbers::basin;
-use super::followed_path;
 use super::lineage::{Lineage, LineageStart, basin_of_answer};
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
@@ -16,8 +15,7 @@ use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
 use gait_optimizer::sensitivity::{GaitSensitivities, sensitivities};
 use gait_optimizer::{
-    FollowedPath, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
-    TunedBounds, solve, solve_by_continuation,
+    GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, TunedBounds, solve,
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
@@ -59,11 +57,6 @@ pub(super) struct Solve {
     /// the gait in that file).
     #[arg(long, value_name = "NUMBER", requires = "warm", value_parser = basin, allow_negative_numbers = true)]
     warm_basin: Option<usize>,
-    /// Follow the gait in the file given to --warm in small steps from its bounds to those of this solve, so that the result
-    /// belongs to the same family. If the path ends before (a fold), says where and solves from there. With --json, adds the
-    /// member `path`.
-    #[arg(long = "continue", requires = "warm", conflicts_with = "warm_basin")]
-    continued: bool,
     #[command(flatten)]
     multi_start: MultiStartFlags,
     /// Output file (JSON) for the results, the gait, its multipliers, the gaits that it was warm-started from, and the
@@ -101,8 +94,6 @@ struct Figures<'a> {
     explanation: Option<&'a Explanation>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sensitivities: Option<&'a GaitSensitivities>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    path: Option<&'a FollowedPath>,
 }
 
 /// The content of the output file.
@@ -137,7 +128,6 @@ impl Solve {
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
         let explain = self.explain;
-        let root = if self.continued { self.flags.root()? } else { None };
         let (reference, solved_problem) = (problem.reference.clone(), problem.clone());
         let pool = Pool::new(1);
         let solved = pool.run(move |_| {
@@ -148,13 +138,7 @@ impl Solve {
                 ));
                 shown.tick();
             };
-            let (outcome, path) = match &root {
-                Some(root) => {
-                    let (outcome, path) = solve_by_continuation(&problem, root, &options, &mut observer, &cancel)?;
-                    (outcome, Some(path))
-                }
-                None => (solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)?, None),
-            };
+            let outcome = solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)?;
             let explanation = if explain {
                 let mut progress = |question: &str| {
                     shown.suspend(|| tell(question));
@@ -164,9 +148,9 @@ impl Solve {
             } else {
                 None
             };
-            Ok::<_, SolveError>((outcome, explanation, path))
+            Ok::<_, SolveError>((outcome, explanation))
         });
-        let (outcome, explanation, path) = solved.await??;
+        let (outcome, explanation) = solved.await??;
         bar.finish_and_clear();
         let lineage = Lineage::of(&outcome, start.as_ref());
         let converged = outcome.report.status == SolveStatus::Converged;
@@ -192,14 +176,10 @@ impl Solve {
                 certificate: certificate.as_ref(),
                 explanation: explanation.as_ref(),
                 sensitivities: sensitivities.as_ref(),
-                path: path.as_ref(),
             };
             data(&serde_json::to_string_pretty(&figures).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
             data(&for_people(&outcome, &comparisons, &lineage, start.as_ref(), explanation.as_ref()))?;
-            if let Some(path) = &path {
-                data(&followed_path::in_words(path))?;
-            }
             if let Some(certificate) = &certificate {
                 data(&super::certify::for_people(certificate))?;
             }
