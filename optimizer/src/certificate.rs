@@ -48,7 +48,7 @@ pub use return_map::{Multiplier, ReturnMap};
 
 use crate::body::WalkerModel;
 use crate::gait::Gait;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use feedback_linearization::join;
 use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! The device: a prosthesis on the right leg, read from a JSON file.
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -32,10 +32,10 @@ mod simulation_tests;
 
 pub use report::{ExecutionReport, StridesOnYield, SurvivedPushes, WalksOnGround};
 
+use crate::cancel_token::CancelToken;
 use crate::certificate::CertifiedGait;
 use crate::gait::Gait;
-use crate::solve::CancelToken;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use disturbance::{Disturbance, LADDER_N_S, MassChanges, Push, YIELD_LADDER_M};
 use serde::{Deserialize, Serialize};
 use simulated_walk::{End, WalkOutcome, Walker};

@@ -202,15 +202,15 @@ fn found_out(
     cancel: &CancelToken,
 ) -> Result<Explanation, Stop> {
     let Unsolved { status, violations, last } = unsolved;
-    let programme = problem.programme(problem.muscles)?;
+    let program = problem.program(problem.muscles)?;
     let x = &last.point.x;
-    if x.len() != programme.variables() {
-        let sizes = format!("{} variables, expected {}", x.len(), programme.variables());
+    if x.len() != program.variables() {
+        let sizes = format!("{} variables, expected {}", x.len(), program.variables());
         return Err(SolveError::WarmStartShape(sizes).into());
     }
     let (mut at_limit, mut reached) = (Vec::new(), BoundSet::EMPTY);
     for (bound, value) in problem.bounds.to_array().into_iter().enumerate() {
-        let domains = domains_at_limit(problem, &programme, x, bound)?;
+        let domains = domains_at_limit(problem, &program, x, bound)?;
         if !domains.is_empty() {
             let (bound_name, meaning) = (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned());
             at_limit.push(BoundAtLimit { bound: bound_name, meaning, value, domains });

@@ -1,4 +1,4 @@
-//! The gait problem: the nonlinear programme of the paper with variables, rows C1 to C12, objective and bounds.
+//! The gait problem: the nonlinear program of the paper with variables, rows C1 to C12, objective and bounds.
 //!
 //! | constraint | rows here |
 //! |---|---|
@@ -40,7 +40,7 @@ pub use evaluation::RowViolation;
 pub use gait_of_variables::gait_of;
 pub use layout::{Layout, PointVariables};
 pub use problem_definition::GaitProblem;
-pub use program_data::{GaitProgramme, ObjectiveWeights};
+pub use program_data::{GaitProgram, ObjectiveWeights};
 pub use row_names::{RowKind, RowName};
 pub use rows::RowTable;
 pub(crate) use unchanged_bounds::ConvergedGait;

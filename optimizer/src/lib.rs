@@ -6,6 +6,7 @@
 
 pub mod activation_alternations;
 pub mod body;
+mod cancel_token;
 pub mod certificate;
 pub mod cost_of_transport;
 pub mod device;
@@ -17,6 +18,7 @@ pub mod gait;
 pub mod gait_problem;
 pub mod gait_rmse;
 pub mod initial_guess;
+mod model_error;
 pub mod muscle;
 mod number_format;
 mod opensim;
@@ -40,6 +42,7 @@ pub use gait::{DomainTrajectory, Gait};
 pub use gait_problem::margins::Margins;
 pub use gait_problem::{GaitProblem, UnchangedBound};
 pub use interior_point::{NlpSettings, WarmPoint};
+pub use model_error::ModelError;
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
@@ -47,5 +50,5 @@ pub use solve::{
     OtherBasin, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus,
     StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
 };
-pub use subject::{ModelError, Subject};
+pub use subject::Subject;
 pub use tuned_bounds::TunedBounds;

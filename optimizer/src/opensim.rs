@@ -1,6 +1,6 @@
 //! OpenSim motion and storage files (.mot, .sto): a header that ends with `endheader`, then a table over time.
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use crate::table::{Separator, Table, TimeColumn, lines_of, malformed};
 
 /// Unit of the angles in an OpenSim file.

@@ -4,11 +4,11 @@
 //! differences. Unevenly spaced rows are first interpolated linearly on an even grid. The first and last samples have
 //! no central difference and are omitted.
 
+use crate::model_error::ModelError;
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::reference::{LARGEST_ANGLE_RAD, MotionRecording};
 use crate::signal_filter::{extension, filter, low_pass};
 use crate::statistics::extremes;
-use crate::subject::ModelError;
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 use serde::{Deserialize, Serialize};
 

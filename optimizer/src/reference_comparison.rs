@@ -5,8 +5,8 @@
 
 use crate::gait::Gait;
 use crate::gait_rmse::gait_rmse_with_shift;
+use crate::model_error::ModelError;
 use crate::reference::ReferenceGait;
-use crate::subject::ModelError;
 use serde::Serialize;
 
 /// Largest shift of the reference gait in the alignment, in fractions of the stride.

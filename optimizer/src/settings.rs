@@ -5,8 +5,8 @@ mod naturalness;
 pub use naturalness::Naturalness;
 
 use crate::device::Device;
+use crate::model_error::ModelError;
 use crate::muscle::MuscleParameters;
-use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Number of mesh intervals of each kind of domain. A domain with N intervals has 2N + 1 equidistant nodes.

@@ -1,7 +1,7 @@
 //! Solving a gait problem: attempts from initial guesses or a warm start, and the outcome.
 
 use crate::gait_problem::GaitProblem;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use std::time::Instant;
 
 mod attempts;
@@ -16,6 +16,7 @@ mod report;
 mod solver_settings;
 mod warm_start;
 
+pub use crate::cancel_token::CancelToken;
 use attempts::{Tried, choose, enforce_between_nodes, number_basins, try_guesses, try_multi_start, try_warm};
 pub use error::SolveError;
 pub use figures::GaitFigures;
@@ -24,7 +25,7 @@ pub use options::{BasinChoice, SolveOptions};
 use outcome::{SolveTally, other_basin, outcome};
 use phases::SolveContext;
 pub(crate) use phases::final_settings;
-pub use progress::{CancelToken, IterationRecord, SolvePhase};
+pub use progress::{IterationRecord, SolvePhase};
 pub use report::{
     CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus,
     StartedFrom, Violation,
@@ -54,9 +55,9 @@ pub fn solve(
     cancel: &CancelToken,
 ) -> Result<SolveOutcome, SolveError> {
     options.validate()?;
-    let programme = problem.programme(problem.muscles)?;
-    let start = warm_start.map(|warm| on_mesh_of(problem, &programme, warm)).transpose()?;
-    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let program = problem.program(problem.muscles)?;
+    let start = warm_start.map(|warm| on_mesh_of(problem, &program, warm)).transpose()?;
+    let context = SolveContext { problem, program: &program, options, cancel, started: Instant::now() };
     let mut tried = Vec::new();
     if let Some(start) = start {
         tried.push(try_warm(&context, start, observer)?);
@@ -86,9 +87,9 @@ pub(crate) fn solve_from_warm_start(
     cancel: &CancelToken,
 ) -> Result<SolveOutcome, SolveError> {
     options.validate()?;
-    let programme = problem.programme(problem.muscles)?;
-    let start = on_mesh_of(problem, &programme, warm_start)?;
-    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let program = problem.program(problem.muscles)?;
+    let start = on_mesh_of(problem, &program, warm_start)?;
+    let context = SolveContext { problem, program: &program, options, cancel, started: Instant::now() };
     let tried = try_warm(&context, start, &mut |_| {})?;
     finish(&context, vec![tried], 0, StartedFrom::Warm)
 }
@@ -110,8 +111,8 @@ pub fn solve_from_guesses(
         guess.validate()?;
     }
     ModelError::check_range("number of guesses", guesses.len() as f64, 1.0, 1e3)?;
-    let programme = problem.programme(problem.muscles)?;
-    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let program = problem.program(problem.muscles)?;
+    let context = SolveContext { problem, program: &program, options, cancel, started: Instant::now() };
     let mut tried = try_guesses(&context, guesses, 0, observer)?;
     number_basins(&mut tried);
     let chosen = choose(&tried, options.basin_choice);

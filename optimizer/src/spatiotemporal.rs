@@ -1,7 +1,7 @@
 //! Spatiotemporal parameters of a gait, as a gait laboratory reports them.
 
 use crate::gait::Gait;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use crate::walking::{CYCLE, DomainKind};
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! Strict parser of tables of numbers over time. Errors name line and column; a table with an error is rejected.
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 
 /// The lines of a file, without the byte order mark that spreadsheets write first.
 pub(crate) fn lines_of(text: &str) -> Vec<&str> {

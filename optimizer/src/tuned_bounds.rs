@@ -1,6 +1,6 @@
 //! The tuned constraint bounds (Table I of the paper).
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 
 const LOWER: bool = true;

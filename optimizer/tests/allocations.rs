@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use allocation_counter::measure;
-use gait_optimizer::gait_problem::GaitProgramme;
+use gait_optimizer::gait_problem::GaitProgram;
 use gait_optimizer::{
     CancelToken, GaitProblem, GaitSettings, InitialGuess, Mesh, NlpSettings, SolveOptions, Subject, WarmPoint,
     solve_from_guesses,
@@ -11,12 +11,12 @@ use gait_optimizer::{
 use interior_point::{StartPoint, solve};
 
 /// Numbers of allocations and of iterations of a solve that ends at its iteration limit.
-fn allocations(programme: &GaitProgramme, start: &WarmPoint, max_iterations: usize) -> (u64, usize) {
+fn allocations(program: &GaitProgram, start: &WarmPoint, max_iterations: usize) -> (u64, usize) {
     let settings = NlpSettings { max_iterations, tolerance: 1e-14, ..NlpSettings::default() };
     let start = StartPoint::Warm(start.clone());
     let mut iterations = 0;
     let counted = measure(|| {
-        iterations = solve(programme, &start, &settings, &mut |_| {}, &|| false).unwrap().iterations;
+        iterations = solve(program, &start, &settings, &mut |_| {}, &|| false).unwrap().iterations;
     });
     (counted.count_total, iterations)
 }
@@ -29,7 +29,7 @@ fn iterations_do_not_allocate() {
         let options = SolveOptions { max_iterations: 10, ..SolveOptions::default() };
         let begun =
             solve_from_guesses(&problem, &[InitialGuess::NATURAL], &options, &mut |_| {}, &CancelToken::new()).unwrap();
-        let programme = GaitProgramme::new(
+        let program = GaitProgram::new(
             &problem.subject,
             &problem.device,
             &problem.bounds,
@@ -38,7 +38,7 @@ fn iterations_do_not_allocate() {
             &problem.reference,
         )
         .unwrap();
-        let counts = [10, 30, 50].map(|limit| allocations(&programme, &begun.warm_start.point, limit));
+        let counts = [10, 30, 50].map(|limit| allocations(&program, &begun.warm_start.point, limit));
         assert_eq!(counts.map(|count| count.1), [10, 30, 50]);
         // The list of the filter doubles now and then. The first iterations can build another factorisation.
         assert!(counts[2].0 - counts[1].0 <= 2, "muscles: {muscles}, {counts:?}");

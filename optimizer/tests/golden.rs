@@ -18,20 +18,20 @@ use interior_point::{BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProg
 fn golden_gaits_satisfy_all_rows() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let golden = golden(subject, muscles);
-        let mut g = vec![0.0; golden.programme.rows()];
-        golden.programme.constraints(&golden.x, &mut g);
-        for (i, name) in golden.programme.rows.names.iter().enumerate() {
-            let (low, high) = (golden.programme.rows.lower[i], golden.programme.rows.upper[i]);
+        let mut g = vec![0.0; golden.program.rows()];
+        golden.program.constraints(&golden.x, &mut g);
+        for (i, name) in golden.program.rows.names.iter().enumerate() {
+            let (low, high) = (golden.program.rows.lower[i], golden.program.rows.upper[i]);
             let violation = (low - g[i]).max(g[i] - high).max(0.0);
             assert!(violation < 1e-6, "subject {subject} muscles {muscles} {}: {violation}", name.label());
         }
         let (mut lower, mut upper) = (vec![0.0; golden.x.len()], vec![0.0; golden.x.len()]);
-        golden.programme.variable_bounds(&mut lower, &mut upper);
+        golden.program.variable_bounds(&mut lower, &mut upper);
         for i in 0..golden.x.len() {
             let violation = (lower[i] - golden.x[i]).max(golden.x[i] - upper[i]);
             assert!(violation < 1e-6, "subject {subject} muscles {muscles} variable {i}: {violation}");
         }
-        let objective = golden.programme.objective(&golden.x);
+        let objective = golden.program.objective(&golden.x);
         let theirs = golden.data["obj"].as_f64().unwrap();
         assert!((objective - theirs).abs() < 1e-10, "{objective} {theirs}");
     }
@@ -67,7 +67,7 @@ fn solver_stays_at_the_golden_gaits() {
         let golden = golden(subject, muscles);
         let settings = NlpSettings { max_iterations: HANDFUL, ..from_a_golden_gait() };
         let result = interior_point::solve(
-            &golden.programme,
+            &golden.program,
             &StartPoint::Cold(golden.x.clone()),
             &settings,
             &mut |_| {},
@@ -128,10 +128,10 @@ fn activations_do_not_alternate_with_the_default_weights() {
         let golden = golden_with(&problem.settings, subject, true);
         let settings = from_a_golden_gait();
         let result =
-            interior_point::solve(&golden.programme, &StartPoint::Cold(golden.x), &settings, &mut |_| {}, &|| false)
+            interior_point::solve(&golden.program, &StartPoint::Cold(golden.x), &settings, &mut |_| {}, &|| false)
                 .unwrap();
         assert_eq!(result.status, NlpStatus::Converged);
-        let gait = gait_of(&problem, &golden.programme, &result.x);
+        let gait = gait_of(&problem, &golden.program, &result.x);
         assert_eq!(activation_alternations(&gait), 0, "after {} iterations", result.iterations);
         let theirs = golden.data["obj"].as_f64().unwrap();
         assert!(result.objective > theirs && result.objective < 1.01 * theirs, "{} {theirs}", result.objective);

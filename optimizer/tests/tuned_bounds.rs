@@ -5,7 +5,7 @@
 mod golden_gaits;
 
 use gait_optimizer::certificate::certify;
-use gait_optimizer::gait_problem::GaitProgramme;
+use gait_optimizer::gait_problem::GaitProgram;
 use gait_optimizer::{Gait, GaitSettings, ReferenceGait, TunedBounds};
 use golden_gaits::{golden, golden_gait};
 
@@ -43,9 +43,9 @@ fn gait_beyond_a_tightened_bound_violates_the_problem() {
     let violated = |bounds: &TunedBounds| {
         let settings = GaitSettings::reference_problem();
         let reference = ReferenceGait::builtin().unwrap();
-        let programme =
-            GaitProgramme::new(&problem.subject, &problem.device, bounds, false, &settings, &reference).unwrap();
-        programme.violations(&golden.x).first().is_some_and(|worst| worst.amount > 1e-3)
+        let program =
+            GaitProgram::new(&problem.subject, &problem.device, bounds, false, &settings, &reference).unwrap();
+        program.violations(&golden.x).first().is_some_and(|worst| worst.amount > 1e-3)
     };
     assert!(!violated(&TunedBounds::default()));
     for (bound, name) in TunedBounds::NAMES.into_iter().enumerate() {

@@ -228,7 +228,10 @@ mod tests {
         let found = imports(&[
             ("lib.rs", "mod a;\nmod b;\npub use a::{Thing, other as renamed};\n"),
             ("a.rs", "pub struct Thing;\npub fn other() {}\n"),
-            ("b/mod.rs", "mod c;\nuse super::Thing;\n// use crate::missing;\npub(in crate::b) fn f() { crate::renamed() }\n"),
+            (
+                "b/mod.rs",
+                "mod c;\nuse super::Thing;\n// use crate::missing;\npub(in crate::b) fn f() { crate::renamed() }\n",
+            ),
             ("b/c.rs", "use std::fmt;\nuse super::super::a::{self, Thing};\n"),
         ]);
         assert!(found["lib.rs"].is_empty());

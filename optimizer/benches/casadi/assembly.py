@@ -1,4 +1,4 @@
-"""A sparse nonlinear programme as a sum of small elements with symbolic derivatives.
+"""A sparse nonlinear program as a sum of small elements with symbolic derivatives.
 
 Each element type is a function of a few local variables z (gathered from x) and constants p: rows r(z, p) and a share of
 the objective f(z, p, w). CasADi differentiates the small functions symbolically (SX: exact, sparse, common
@@ -64,7 +64,7 @@ def _accumulate(sparsity, triplets, values):
     return ca.MX(sparsity, nonzeros)
 
 
-class Programme:
+class Program:
     """Functions f, g, gradient, Jacobian and Hessian of all elements, in the forms CasADi's nlpsol takes."""
 
     def __init__(self, elements, n, m, weights):

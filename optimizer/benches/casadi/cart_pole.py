@@ -34,7 +34,7 @@ def rates(state, force):
     return ca.vertcat(state[2:], ca.solve(mass, force))
 
 
-def programme(intervals):
+def program(intervals):
     """The solver with its starting point and bounds."""
     step = DURATION_S / intervals
     state, force = ca.SX.sym("state", 4), ca.SX.sym("force")
@@ -76,7 +76,7 @@ def main():
     ours = example("cart_pole", "interior-point")
     print("intervals,ours,ours_iterations,ours_objective,ours_s,ipopt_iterations,ipopt_objective,ipopt_s,ratio")
     for intervals in arguments.intervals:
-        solver, given = programme(intervals)
+        solver, given = program(intervals)
         ours_s, theirs_s = [], []
         for _ in range(arguments.runs):
             output = subprocess.check_output([ours, str(intervals)], text=True)

@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 import muscle_guess
-from programme import DEFAULTS, Gait, read_reference
+from program import DEFAULTS, Gait, read_reference
 
 HERE = Path(__file__).resolve().parent
 CRATE = HERE.parent.parent
@@ -53,7 +53,7 @@ class Solver:
     def __init__(self, options, backend="vm", cache=None):
         started = time.perf_counter()
         self.gait = Gait(options, read_reference(REFERENCE))
-        self.functions = self.gait.programme.functions()
+        self.functions = self.gait.program.functions()
         self.setup_s = time.perf_counter() - started
         self.compile_s = 0.0
         if backend == "c":

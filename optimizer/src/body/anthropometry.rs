@@ -7,7 +7,8 @@ use super::anatomy::{FootPoint, Side};
 use super::coordinates::{LINKS, THIGH_L, THIGH_R, TORSO};
 use super::point::{Chain, ContactPoint, LegGeometry};
 use crate::device::Device;
-use crate::subject::{ModelError, Subject};
+use crate::model_error::ModelError;
+use crate::subject::Subject;
 
 /// Thigh length / height.
 const THIGH_LENGTH: f64 = 0.245;

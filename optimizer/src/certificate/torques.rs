@@ -1,7 +1,7 @@
 //! Torques and ground reaction forces for a given acceleration: `M qdd + h = B u + J^T f`.
 //!
 //! In single support the solution is unique. In double support it is redundant, by one dimension in DS2 and two in DS3:
-//! a convex quadratic programme chooses the torques nearest to those of the gait at the same phase, subject to
+//! a convex quadratic program chooses the torques nearest to those of the gait at the same phase, subject to
 //! unilateral contact, friction and torque limits. One slack variable with a large penalty relaxes these limits
 //! together. Optimal gaits leave the trailing foot almost unloaded, on the boundary of the limits, and the periodic
 //! motion may cross it slightly; the slack measures by how much.
@@ -13,9 +13,9 @@ use crate::walking::DomainKind;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
-/// Unit of the torques in the programme, N m.
+/// Unit of the torques in the program, N m.
 const TORQUE_UNIT_N_M: f64 = 100.0;
-/// Unit of the forces in the programme, N.
+/// Unit of the forces in the program, N.
 const FORCE_UNIT_N: f64 = 500.0;
 /// Number of equations of motion without a torque.
 const UNACTUATED: usize = 3;
@@ -30,7 +30,7 @@ pub(super) struct Effort {
 /// Penalty on the slack: far above any gain in torque, so that the slack is positive only if the limits are infeasible.
 const EXCESS_PRICE: f64 = 1e4;
 
-/// Dense rows `a . (f, excess) <= bound` of the programme; equations come first.
+/// Dense rows `a . (f, excess) <= bound` of the program; equations come first.
 struct Rows {
     coefficients: Vec<Vec<f64>>,
     bounds: Vec<f64>,
@@ -66,7 +66,7 @@ impl Control<'_> {
         limits: &AllowedRanges,
     ) -> Option<Vec<f64>> {
         let count = gradients.len();
-        // u = offset + slope f, in the units of the programme.
+        // u = offset + slope f, in the units of the program.
         let slope = |i: usize, c: usize| -gradients[c][3 + i] * FORCE_UNIT_N / TORQUE_UNIT_N_M;
         let offset = |i: usize| wanted[3 + i] / TORQUE_UNIT_N_M;
         let mut quadratic = vec![vec![0.0; count + 1]; count + 1];

@@ -1,7 +1,7 @@
 //! Muscle activity of a gait relative to normal walking: curves, averages and EMG RMSE.
 
 use super::{CycleActivity, EmgRmse, emg_rmse};
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Muscle activity over the gait cycle, relative to the peaks of normal walking.

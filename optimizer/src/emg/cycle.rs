@@ -1,8 +1,8 @@
 //! Mean activity of a muscle over the gait cycle, and EMG RMSE.
 
 use super::envelope::Envelope;
+use crate::model_error::ModelError;
 use crate::reference::STRIDE_RANGE_S;
-use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Number of points of a gait cycle: 0, 1, ..., 100 %.

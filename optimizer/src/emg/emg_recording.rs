@@ -1,10 +1,10 @@
 //! Raw EMG signals, and the checks that they are raw.
 
 use super::{CycleActivity, EmgSettings, Envelope};
+use crate::model_error::ModelError;
 use crate::opensim::StorageFile;
 use crate::reference::{contacts, given};
 use crate::signal_filter::{self, band_pass, low_pass};
-use crate::subject::ModelError;
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 
 /// Allowed sampling rates of a file without a time column, Hz.

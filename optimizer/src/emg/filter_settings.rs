@@ -1,6 +1,6 @@
 //! Settings of the filters.
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Highest lower edge of the band-pass, and highest edge of the envelope, Hz.

@@ -9,7 +9,8 @@ use super::prosthesis::Prosthesis;
 use super::sensors::Sensors;
 use crate::body::WalkerModel;
 use crate::gait::Gait;
-use crate::subject::{ModelError, Subject};
+use crate::model_error::ModelError;
+use crate::subject::Subject;
 
 /// Steps of the plant in a period of the controller.
 pub(super) const PLANT_STEPS: u32 = 2;

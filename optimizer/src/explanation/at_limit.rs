@@ -2,7 +2,7 @@
 
 use super::bound::{Level, loosened};
 use super::conflict::BoundSet;
-use crate::gait_problem::{GaitProblem, GaitProgramme};
+use crate::gait_problem::{GaitProblem, GaitProgram};
 use crate::solve::SolveError;
 use interior_point::NonlinearProgram;
 
@@ -12,36 +12,36 @@ const AT_LIMIT: f64 = 1e-4;
 /// Names of the domains in which `x` reaches a limit that `bound` sets.
 pub(super) fn domains_at_limit(
     problem: &GaitProblem,
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     x: &[f64],
     bound: usize,
 ) -> Result<Vec<String>, SolveError> {
     let bounds = loosened(&problem.bounds, BoundSet::EMPTY.with(bound), Level::Loosest)?;
-    let relaxed = GaitProblem { bounds, ..problem.clone() }.programme(problem.muscles)?;
-    let mut values = [vec![0.0; programme.rows()], vec![0.0; programme.rows()]];
-    programme.constraints(x, &mut values[0]);
+    let relaxed = GaitProblem { bounds, ..problem.clone() }.program(problem.muscles)?;
+    let mut values = [vec![0.0; program.rows()], vec![0.0; program.rows()]];
+    program.constraints(x, &mut values[0]);
     relaxed.constraints(x, &mut values[1]);
     let row_at_limit = |row: usize| {
         let value = values[0][row];
-        let slack = (value - programme.rows.lower[row]).min(programme.rows.upper[row] - value);
+        let slack = (value - program.rows.lower[row]).min(program.rows.upper[row] - value);
         values[0][row] != values[1][row] && slack < AT_LIMIT
     };
-    let bounds = |programme: &GaitProgramme| {
-        let mut pair = [vec![0.0; programme.variables()], vec![0.0; programme.variables()]];
+    let bounds = |program: &GaitProgram| {
+        let mut pair = [vec![0.0; program.variables()], vec![0.0; program.variables()]];
         let [lower, upper] = &mut pair;
-        programme.variable_bounds(lower, upper);
+        program.variable_bounds(lower, upper);
         pair
     };
-    let ([lower, upper], [loose_lower, loose_upper]) = (bounds(programme), bounds(&relaxed));
+    let ([lower, upper], [loose_lower, loose_upper]) = (bounds(program), bounds(&relaxed));
     let variable_at_limit = |j: usize| {
         lower[j] != loose_lower[j] && x[j] - lower[j] < AT_LIMIT
             || upper[j] != loose_upper[j] && upper[j] - x[j] < AT_LIMIT
     };
     let mut names: Vec<String> = Vec::new();
-    let places = (0..programme.variables())
+    let places = (0..program.variables())
         .filter(|variable| variable_at_limit(*variable))
-        .map(|variable| programme.layout.variable_label(variable).0)
-        .chain((0..programme.rows()).filter(|row| row_at_limit(*row)).map(|row| programme.rows.names[row].label()));
+        .map(|variable| program.layout.variable_label(variable).0)
+        .chain((0..program.rows()).filter(|row| row_at_limit(*row)).map(|row| program.rows.names[row].label()));
     for place in places {
         // `SS1_R node 3, ...`, or a variable of the whole stride.
         let name = place.split_once(" node").map_or("stride", |(domain, _)| domain);

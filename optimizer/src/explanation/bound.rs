@@ -1,7 +1,7 @@
 //! Relaxation of tuned bounds: direction, range and steps.
 
 use super::conflict::BoundSet;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use crate::tuned_bounds::TunedBounds;
 
 /// Number of significant digits of relaxed values.

@@ -110,9 +110,9 @@ impl<'a> Solves<'a> {
         if self.unmet(bounds).is_some() {
             return Ok(false);
         }
-        let programme = self.with(bounds).programme(self.problem.muscles)?;
+        let program = self.with(bounds).program(self.problem.muscles)?;
         let keeps = |warm: &WarmStart| {
-            programme.violations(&warm.point.x).first().is_none_or(|worst| worst.amount <= CONVERGED_VIOLATION)
+            program.violations(&warm.point.x).first().is_none_or(|worst| worst.amount <= CONVERGED_VIOLATION)
         };
         if let Some((_, gait)) = self.met.iter().find(|(_, gait)| keeps(gait)) {
             let gait = gait.clone();

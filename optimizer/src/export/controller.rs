@@ -3,7 +3,7 @@
 use super::samples::{RATE_RANGE_HZ, samples};
 use crate::body::{Side, WalkerModel};
 use crate::gait::Gait;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, DomainKind, basis, phase_gradient};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@
 
 use super::samples::samples;
 use crate::gait::Gait;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use std::fmt::Write;
 
 /// The columns: name, index into q, sign.

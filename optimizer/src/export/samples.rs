@@ -2,7 +2,7 @@
 
 use crate::gait::Gait;
 use crate::gait::motion::{Instant, instant};
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 
 /// Allowed sampling rates, Hz.
 pub const RATE_RANGE_HZ: (f64, f64) = (10.0, 5000.0);

@@ -1,7 +1,7 @@
 //! Validation of gaits from files: dimensions, order, times and ranges.
 
 use super::{DomainTrajectory, Gait};
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, Domain};
 
 /// Tolerance for redundant quantities, s or m/s.

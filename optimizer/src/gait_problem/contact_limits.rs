@@ -2,7 +2,7 @@
 
 use super::layout::{FORCE, PointVariables, Q, QD};
 use super::mechanics::{add_contact_hessian, leg_angles, position_gradient, velocity_angle_gradient};
-use super::program_data::{GaitProgramme, PointContext};
+use super::program_data::{GaitProgram, PointContext};
 use super::rows::{HeightRow, PointRows};
 use super::sparse_entries::Entries;
 use crate::body::dynamics::LinkHessian;
@@ -40,14 +40,14 @@ struct SwingShare {
     durations: [usize; 2],
 }
 
-fn swing_share(programme: &GaitProgramme, d: usize, sigma: f64, x: &[f64]) -> SwingShare {
-    let (ss2, ss1, alpha, beta) = match programme.layout.domains[d].domain.kind {
+fn swing_share(program: &GaitProgram, d: usize, sigma: f64, x: &[f64]) -> SwingShare {
+    let (ss2, ss1, alpha, beta) = match program.layout.domains[d].domain.kind {
         DomainKind::Ss2 => (d, d + 1, sigma, 0.0),
         _ => (d - 1, d, 1.0, sigma),
     };
-    let durations = [programme.layout.domains[ss2].duration, programme.layout.domains[ss1].duration];
-    let t2 = programme.layout.value(x, durations[0]);
-    let t1 = programme.layout.value(x, durations[1]);
+    let durations = [program.layout.domains[ss2].duration, program.layout.domains[ss1].duration];
+    let t2 = program.layout.value(x, durations[0]);
+    let t1 = program.layout.value(x, durations[1]);
     let sum = t2 + t1;
     let w = (alpha * t2 + beta * t1) / sum;
     let gradient = [(alpha - w) / sum, (beta - w) / sum];
@@ -59,30 +59,30 @@ fn swing_share(programme: &GaitProgramme, d: usize, sigma: f64, x: &[f64]) -> Sw
 /// Value of a height row at a relative time of domain `d`, at a node or between nodes: the height minus the swing
 /// clearance, if it applies.
 pub(super) fn height_row(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     d: usize,
     sigma: f64,
     state: &PointState,
     height: HeightRow,
     x: &[f64],
 ) -> f64 {
-    let z = state.contact_position(&programme.foot_points[height.foot_point])[1];
+    let z = state.contact_position(&program.foot_points[height.foot_point])[1];
     let mut value = HEIGHT_SCALE * z;
     if height.clearance {
-        let share = swing_share(programme, d, sigma, x);
-        value -= HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[0];
+        let share = swing_share(program, d, sigma, x);
+        value -= HEIGHT_SCALE * program.limits.clearance_m * clearance_profile(share.w)[0];
     }
     value
 }
 
 /// How much a metre of swing clearance lowers the value of a height row.
-pub(super) fn clearance_weight(programme: &GaitProgramme, d: usize, sigma: f64, x: &[f64]) -> f64 {
-    HEIGHT_SCALE * clearance_profile(swing_share(programme, d, sigma, x).w)[0]
+pub(super) fn clearance_weight(program: &GaitProgram, d: usize, sigma: f64, x: &[f64]) -> f64 {
+    HEIGHT_SCALE * clearance_profile(swing_share(program, d, sigma, x).w)[0]
 }
 
 /// Values.
 pub(super) fn values(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
@@ -100,23 +100,23 @@ pub(super) fn values(
             }
         }
         let row = rows.friction + 2 * foot;
-        g[row] = FRICTION_SCALE * (programme.limits.friction * normal - tangential);
-        g[row + 1] = FRICTION_SCALE * (programme.limits.friction * normal + tangential);
+        g[row] = FRICTION_SCALE * (program.limits.friction * normal - tangential);
+        g[row + 1] = FRICTION_SCALE * (program.limits.friction * normal + tangential);
     }
     for height in &rows.heights {
-        g[height.row] = height_row(programme, context.d, context.layout.sigma(context.k), state, *height, x);
+        g[height.row] = height_row(program, context.d, context.layout.sigma(context.k), state, *height, x);
     }
     if let Some(row) = rows.phase_rate {
         g[row] = context.hip_phase(point)[1];
     }
     if let Some((foot_point, row)) = rows.touchdown {
-        g[row] = state.contact_velocity(&programme.foot_points[foot_point])[1];
+        g[row] = state.contact_velocity(&program.foot_points[foot_point])[1];
     }
 }
 
 /// Jacobian.
 pub(super) fn jacobian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     state: &PointState,
@@ -132,21 +132,21 @@ pub(super) fn jacobian(
                 out.jacobian(row, variable, -FRICTION_SCALE);
                 out.jacobian(row + 1, variable, FRICTION_SCALE);
             } else {
-                out.jacobian(row, variable, FRICTION_SCALE * programme.limits.friction);
-                out.jacobian(row + 1, variable, FRICTION_SCALE * programme.limits.friction);
+                out.jacobian(row, variable, FRICTION_SCALE * program.limits.friction);
+                out.jacobian(row + 1, variable, FRICTION_SCALE * program.limits.friction);
             }
         }
     }
     for height in &rows.heights {
-        let foot = &programme.foot_points[height.foot_point];
+        let foot = &program.foot_points[height.foot_point];
         let gradient = position_gradient(state, foot, Axis::Z);
         out.jacobian(height.row, p + Q + 1, HEIGHT_SCALE);
         for i in leg_angles(side_of(height.foot_point)) {
             out.jacobian(height.row, p + Q + 2 + i, HEIGHT_SCALE * gradient[i]);
         }
         if height.clearance {
-            let share = swing_share(programme, context.d, context.layout.sigma(context.k), x);
-            let slope = -HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[1];
+            let share = swing_share(program, context.d, context.layout.sigma(context.k), x);
+            let slope = -HEIGHT_SCALE * program.limits.clearance_m * clearance_profile(share.w)[1];
             for i in 0..2 {
                 out.jacobian(height.row, share.durations[i], slope * share.gradient[i]);
             }
@@ -158,7 +158,7 @@ pub(super) fn jacobian(
         }
     }
     if let Some((foot_point, row)) = rows.touchdown {
-        let foot = &programme.foot_points[foot_point];
+        let foot = &program.foot_points[foot_point];
         let by_rate = position_gradient(state, foot, Axis::Z);
         let by_angle = velocity_angle_gradient(state, foot, Axis::Z);
         out.jacobian(row, p + QD + 1, 1.0);
@@ -172,7 +172,7 @@ pub(super) fn jacobian(
 /// Hessian: adds the part in link space to `link`, and writes the part of the durations.
 #[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     state: &PointState,
@@ -183,12 +183,12 @@ pub(super) fn hessian(
 ) {
     for height in &rows.heights {
         let weight = HEIGHT_SCALE * multipliers[height.row];
-        let foot = &programme.foot_points[height.foot_point];
+        let foot = &program.foot_points[height.foot_point];
         add_contact_hessian(state, foot, [0.0, weight], [0.0; 2], [0.0; 2], link);
         if height.clearance {
-            let share = swing_share(programme, context.d, context.layout.sigma(context.k), x);
+            let share = swing_share(program, context.d, context.layout.sigma(context.k), x);
             let profile = clearance_profile(share.w);
-            let scale = -weight * programme.limits.clearance_m;
+            let scale = -weight * program.limits.clearance_m;
             for i in 0..2 {
                 for j in 0..=i {
                     let value = profile[2] * share.gradient[i] * share.gradient[j] + profile[1] * share.hessian[i][j];
@@ -198,7 +198,7 @@ pub(super) fn hessian(
         }
     }
     if let Some((foot_point, row)) = rows.touchdown {
-        let foot = &programme.foot_points[foot_point];
+        let foot = &program.foot_points[foot_point];
         add_contact_hessian(state, foot, [0.0; 2], [0.0, multipliers[row]], [0.0; 2], link);
     }
 }

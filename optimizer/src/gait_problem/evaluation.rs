@@ -2,7 +2,7 @@
 //! structure of the derivatives once.
 
 use super::elimination_tree::elimination_tree;
-use super::program_data::{GaitProgramme, Structure};
+use super::program_data::{GaitProgram, Structure};
 use super::sparse_entries::{Compressed, Entries};
 use super::{
     contact_limits, hip_velocity, mechanics, muscle_fibres, muscle_forces, objective, stride, transitions,
@@ -11,9 +11,10 @@ use super::{
 use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
 use crate::device::Device;
+use crate::model_error::ModelError;
 use crate::reference::ReferenceGait;
 use crate::settings::GaitSettings;
-use crate::subject::{ModelError, Subject};
+use crate::subject::Subject;
 use crate::tuned_bounds::TunedBounds;
 use interior_point::{EliminationBlocks, NonlinearProgram, SparsityPattern};
 use std::sync::Arc;
@@ -29,7 +30,7 @@ pub struct RowViolation {
     pub amount: f64,
 }
 
-impl GaitProgramme {
+impl GaitProgram {
     /// The gait problem with the weights of the final phase: 1 for the cost of transport, and that of the settings
     /// for tracking.
     ///
@@ -43,9 +44,9 @@ impl GaitProgramme {
         settings: &GaitSettings,
         reference: &ReferenceGait,
     ) -> Result<Self, ModelError> {
-        let mut programme = Self::without_structure(subject, device, bounds, muscles, settings, reference)?;
-        programme.structure = Arc::new(programme.record_structure());
-        Ok(programme)
+        let mut program = Self::without_structure(subject, device, bounds, muscles, settings, reference)?;
+        program.structure = Arc::new(program.record_structure());
+        Ok(program)
     }
 
     /// Largest violation of a row or variable bound at x, in scaled units, with its row or variable.
@@ -138,7 +139,7 @@ impl GaitProgramme {
     }
 }
 
-impl NonlinearProgram for GaitProgramme {
+impl NonlinearProgram for GaitProgram {
     fn variables(&self) -> usize {
         self.layout.variables
     }

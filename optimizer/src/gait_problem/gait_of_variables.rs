@@ -1,13 +1,13 @@
 //! Conversion of variables to a gait in physical units.
 
 use super::problem_definition::GaitProblem;
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use crate::gait::{ContactRowName, DomainTrajectory, FORMAT_VERSION, Gait, MuscleTrajectory};
 use crate::walking::BEZIER_COEFFICIENTS;
 
 /// The gait of a vector of variables.
-pub fn gait_of(problem: &GaitProblem, programme: &GaitProgramme, x: &[f64]) -> Gait {
-    let layout = &programme.layout;
+pub fn gait_of(problem: &GaitProblem, program: &GaitProgram, x: &[f64]) -> Gait {
+    let layout = &program.layout;
     let value = |index: usize| layout.value(x, index);
     let mut elapsed = 0.0;
     let domains: Vec<DomainTrajectory> = layout

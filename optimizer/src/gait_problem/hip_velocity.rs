@@ -4,7 +4,7 @@
 //! the first node of every domain `dp = pa`.
 
 use super::layout::{PointVariables, Q, QD, QDD};
-use super::program_data::{GaitProgramme, PointContext};
+use super::program_data::{GaitProgram, PointContext};
 use super::rows::PointRows;
 use super::sparse_entries::Entries;
 
@@ -12,7 +12,7 @@ const ACCELERATION_SCALE: f64 = 0.1;
 
 /// Values.
 pub(super) fn values(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
@@ -22,7 +22,7 @@ pub(super) fn values(
     let [dp, dpd, dpdd] = context.hip_phase(point);
     if let Some(row) = rows.hip_phase {
         let travelled = context.hip_velocity * context.duration * context.layout.sigma(context.k);
-        g[row] = dp - programme.layout.value(x, context.layout.phase_start) - travelled;
+        g[row] = dp - program.layout.value(x, context.layout.phase_start) - travelled;
     }
     if let Some(row) = rows.hip_velocity {
         g[row] = dpd - context.hip_velocity;

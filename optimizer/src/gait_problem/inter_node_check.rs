@@ -7,7 +7,7 @@
 use super::contact_limits::{FRICTION_SCALE, HEIGHT_SCALE, clearance_weight, height_row};
 use super::layout::{DomainLayout, FORCE, Q, QD, QDD, U};
 use super::margins::Margins;
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use super::rows::HeightRow;
 use crate::body::{Axis, COORDINATES, JOINTS, PointState};
 use crate::gait::Gait;
@@ -41,20 +41,20 @@ pub struct InterNodeExcess {
 
 impl InterNodeExcess {
     /// Adds a value of a variable between two nodes.
-    fn note_variable(&mut self, programme: &GaitProgramme, points: [usize; 2], value: f64, left_alone: f64) {
+    fn note_variable(&mut self, program: &GaitProgram, points: [usize; 2], value: f64, left_alone: f64) {
         for variable in points {
-            let (low, high) = programme.variable_range(variable);
-            self.note_side(programme, variable, 0, low - value, left_alone);
-            self.note_side(programme, variable, 1, value - high, left_alone);
+            let (low, high) = program.variable_range(variable);
+            self.note_side(program, variable, 0, low - value, left_alone);
+            self.note_side(program, variable, 1, value - high, left_alone);
         }
     }
 
     /// Adds a violation; `side` is 0 for the lower and 1 for the upper bound.
-    fn note_side(&mut self, programme: &GaitProgramme, variable: usize, side: usize, beyond: f64, left_alone: f64) {
+    fn note_side(&mut self, program: &GaitProgram, variable: usize, side: usize, beyond: f64, left_alone: f64) {
         if beyond > 0.5 * left_alone {
             self.worst = self.worst.max(beyond / left_alone);
             let margin = &mut self.margins.variables.entry(variable).or_default()[side];
-            *margin = margin.max(beyond / programme.layout.scale[variable]);
+            *margin = margin.max(beyond / program.layout.scale[variable]);
         }
     }
 
@@ -67,25 +67,25 @@ impl InterNodeExcess {
     }
 }
 
-/// The violations between nodes of `gait`, the gait of the point `x` of `programme`: coordinates, torques,
+/// The violations between nodes of `gait`, the gait of the point `x` of `program`: coordinates, torques,
 /// activations, fibre velocities, foot heights, normal forces and friction.
-pub fn inter_node_excess(programme: &GaitProgramme, gait: &Gait, x: &[f64]) -> InterNodeExcess {
-    let mut values = vec![0.0; programme.rows.names.len()];
-    programme.constraints(x, &mut values);
+pub fn inter_node_excess(program: &GaitProgram, gait: &Gait, x: &[f64]) -> InterNodeExcess {
+    let mut values = vec![0.0; program.rows.names.len()];
+    program.constraints(x, &mut values);
     let mut excess = InterNodeExcess::default();
-    visit(programme, gait, |d, gap, share, now| {
-        let mut note = |nodes, value, tolerance| excess.note_variable(programme, nodes, value, tolerance);
-        visit_variables(programme, &programme.layout.domains[d], gap, now, &mut note);
+    visit(program, gait, |d, gap, share, now| {
+        let mut note = |nodes, value, tolerance| excess.note_variable(program, nodes, value, tolerance);
+        visit_variables(program, &program.layout.domains[d], gap, now, &mut note);
         let mut note = |height: HeightRow, value: f64| excess.note_row(height.row, -value, HEIGHT_TOLERANCE);
-        visit_heights(programme, (d, gap, share), now, x, &mut note);
-        note_forces(programme, (d, gap, share), now, &values, &mut excess);
+        visit_heights(program, (d, gap, share), now, x, &mut note);
+        note_forces(program, (d, gap, share), now, &values, &mut excess);
     });
     excess
 }
 
 /// Calls `note` at the instants of the check, with domain, interval between adjacent nodes, and relative time in the domain.
-fn visit(programme: &GaitProgramme, gait: &Gait, mut note: impl FnMut(usize, usize, f64, &Instant)) {
-    for (d, layout) in programme.layout.domains.iter().enumerate() {
+fn visit(program: &GaitProgram, gait: &Gait, mut note: impl FnMut(usize, usize, f64, &Instant)) {
+    for (d, layout) in program.layout.domains.iter().enumerate() {
         let gaps = layout.points - 1;
         for gap in 0..gaps {
             for part in 1..PARTS {
@@ -113,23 +113,23 @@ pub(super) struct ClearanceBetween {
 }
 
 impl BetweenNodes {
-    /// The values of `gait`, the gait of the point `x` of `programme`.
-    pub(super) fn new(programme: &GaitProgramme, gait: &Gait, x: &[f64]) -> Self {
-        let mut reach = vec![[f64::INFINITY, f64::NEG_INFINITY]; programme.layout.variables];
+    /// The values of `gait`, the gait of the point `x` of `program`.
+    pub(super) fn new(program: &GaitProgram, gait: &Gait, x: &[f64]) -> Self {
+        let mut reach = vec![[f64::INFINITY, f64::NEG_INFINITY]; program.layout.variables];
         let mut clearances = Vec::new();
-        visit(programme, gait, |d, gap, share, now| {
-            let layout = &programme.layout.domains[d];
-            visit_variables(programme, layout, gap, now, &mut |nodes, value, tolerance| {
+        visit(program, gait, |d, gap, share, now| {
+            let layout = &program.layout.domains[d];
+            visit_variables(program, layout, gap, now, &mut |nodes, value, tolerance| {
                 for variable in nodes {
-                    let scale = programme.layout.scale[variable];
+                    let scale = program.layout.scale[variable];
                     let [least, most] = &mut reach[variable];
                     *least = least.min((value + tolerance) / scale);
                     *most = most.max((value - tolerance) / scale);
                 }
             });
-            visit_heights(programme, (d, gap, share), now, x, &mut |height, value| {
+            visit_heights(program, (d, gap, share), now, x, &mut |height, value| {
                 if height.clearance {
-                    let per_metre = clearance_weight(programme, d, share, x);
+                    let per_metre = clearance_weight(program, d, share, x);
                     clearances.push(ClearanceBetween { room: value + HEIGHT_TOLERANCE, per_metre });
                 }
             });
@@ -140,7 +140,7 @@ impl BetweenNodes {
 
 /// Calls `note` for each variable with a bound: the two nodes beside the instant, the value, and its tolerance.
 fn visit_variables(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     layout: &DomainLayout,
     gap: usize,
     now: &Instant,
@@ -160,7 +160,7 @@ fn visit_variables(
     }
     if let Some(muscles) = &now.muscles {
         for m in 0..MUSCLE_COUNT {
-            let fastest = programme.muscles[m].max_speed;
+            let fastest = program.muscles[m].max_speed;
             let velocity = muscles.fibre_velocity[m];
             note(beside(layout.activation() + m), muscles.activation[m], MUSCLE_SHARE);
             note(beside(layout.fibre_velocity() + m), velocity, MUSCLE_SHARE * fastest);
@@ -170,7 +170,7 @@ fn visit_variables(
 
 /// Calls `note` with the value of each height row of the two nodes beside the instant.
 fn visit_heights(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     (d, gap, share): (usize, usize, f64),
     now: &Instant,
     x: &[f64],
@@ -178,28 +178,28 @@ fn visit_heights(
 ) {
     let state = PointState::new(&now.q, &now.qd, &now.qdd);
     for k in [gap, gap + 1] {
-        for height in &programme.rows.domains[d].points[k].heights {
-            note(*height, height_row(programme, d, share, &state, *height, x));
+        for height in &program.rows.domains[d].points[k].heights {
+            note(*height, height_row(program, d, share, &state, *height, x));
         }
     }
 }
 
 fn note_forces(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     (d, gap, share): (usize, usize, f64),
     now: &Instant,
     values: &[f64],
     excess: &mut InterNodeExcess,
 ) {
-    let layout = &programme.layout.domains[d];
-    for (c, _) in programme.contacts[d].iter().enumerate().filter(|(_, row)| row.axis == Axis::Z) {
+    let layout = &program.layout.domains[d];
+    for (c, _) in program.contacts[d].iter().enumerate().filter(|(_, row)| row.axis == Axis::Z) {
         for k in [gap, gap + 1] {
             // The limit is 0, because some bounds at nodes are the load of a foot before lift-off.
-            excess.note_side(programme, layout.point(k) + FORCE + c, 0, -now.forces[c], NORMAL_FORCE_N);
+            excess.note_side(program, layout.point(k) + FORCE + c, 0, -now.forces[c], NORMAL_FORCE_N);
         }
     }
     // Forces are parabolas, and the edges of the cone are linear in them.
-    let points = &programme.rows.domains[d].points;
+    let points = &program.rows.domains[d].points;
     let first = gap - gap % 2;
     let s = 0.5 * (share * (layout.points - 1) as f64 - first as f64);
     let parabola = [(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)];
@@ -220,42 +220,42 @@ mod tests {
     use crate::subject::Subject;
 
     /// A problem, and a posture at rest high above the ground that satisfies all bounds, with positive normal forces.
-    fn hanging() -> (GaitProblem, GaitProgramme, Vec<f64>) {
+    fn hanging() -> (GaitProblem, GaitProgram, Vec<f64>) {
         let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
-        let programme = problem.programme(false).unwrap();
-        let mut x = vec![0.0; programme.layout.variables];
-        for (d, layout) in programme.layout.domains.iter().enumerate() {
+        let program = problem.program(false).unwrap();
+        let mut x = vec![0.0; program.layout.variables];
+        for (d, layout) in program.layout.domains.iter().enumerate() {
             x[layout.duration] = 1.0;
             for k in 0..layout.points {
-                let mut point = programme.layout.point_variables(&x, d, k);
+                let mut point = program.layout.point_variables(&x, d, k);
                 point.q[1] = 2.0;
                 (point.q[4], point.q[7]) = (0.3, 0.3);
-                for (force, row) in point.force.iter_mut().zip(&programme.contacts[d]) {
+                for (force, row) in point.force.iter_mut().zip(&program.contacts[d]) {
                     *force = if row.axis == Axis::Z { 100.0 } else { 0.0 };
                 }
-                programme.layout.set_point_variables(&mut x, d, k, &point);
+                program.layout.set_point_variables(&mut x, d, k, &point);
             }
         }
-        (problem, programme, x)
+        (problem, program, x)
     }
 
-    fn excess(problem: &GaitProblem, programme: &GaitProgramme, x: &[f64]) -> InterNodeExcess {
-        inter_node_excess(programme, &gait_of(problem, programme, x), x)
+    fn excess(problem: &GaitProblem, program: &GaitProgram, x: &[f64]) -> InterNodeExcess {
+        inter_node_excess(program, &gait_of(problem, program, x), x)
     }
 
     #[test]
     fn joint_violation_between_nodes_is_found_at_its_place_only() {
-        let (problem, programme, mut x) = hanging();
-        assert_eq!(excess(&problem, &programme, &x), InterNodeExcess::default());
-        let layout = &programme.layout.domains[2];
+        let (problem, program, mut x) = hanging();
+        assert_eq!(excess(&problem, &program, &x), InterNodeExcess::default());
+        let layout = &program.layout.domains[2];
         let knee = |k: usize, block: usize| layout.point(k) + block + 4;
-        let scale = &programme.layout.scale;
-        let (_, most) = programme.variable_range(knee(5, Q));
+        let scale = &program.layout.scale;
+        let (_, most) = program.variable_range(knee(5, Q));
         for (k, speed) in [(5, 3.0), (6, -3.0)] {
             x[knee(k, Q)] = most / scale[knee(k, Q)];
             x[knee(k, QD)] = speed / scale[knee(k, QD)];
         }
-        let found = excess(&problem, &programme, &x);
+        let found = excess(&problem, &program, &x);
         assert!(found.worst > 1.0, "{}", found.worst);
         let of_angles: Vec<_> =
             found.margins.variables.iter().filter(|(at, _)| [4, 5, 6, 7].map(|k| knee(k, Q)).contains(at)).collect();
@@ -265,42 +265,42 @@ mod tests {
 
         let mut margins = Margins::default();
         margins.grow(&found.margins);
-        let tightened = programme.tightened(&margins);
+        let tightened = program.tightened(&margins);
         let by = most - tightened.variable_range(knee(5, Q)).1;
         assert!((by - of_angles[0].1[1] * scale[knee(5, Q)]).abs() < 1e-12);
-        assert_eq!(tightened.variable_range(knee(4, Q)), programme.variable_range(knee(4, Q)));
+        assert_eq!(tightened.variable_range(knee(4, Q)), program.variable_range(knee(4, Q)));
         // Margins near their bound stay relevant; others do not.
-        let on = margins.bearing_on(&programme, &x);
+        let on = margins.bearing_on(&program, &x);
         assert!(on.variables.contains_key(&knee(5, Q)) && on.variables.contains_key(&knee(6, Q)));
         x[knee(5, Q)] = 0.0;
-        assert!(!margins.bearing_on(&programme, &x).variables.contains_key(&knee(5, Q)));
+        assert!(!margins.bearing_on(&program, &x).variables.contains_key(&knee(5, Q)));
     }
 
     #[test]
     fn low_foot_and_pulling_force_between_nodes_are_found() {
-        let (problem, programme, mut x) = hanging();
-        let layout = &programme.layout.domains[0];
+        let (problem, program, mut x) = hanging();
+        let layout = &program.layout.domains[0];
         let [first, second, third] = [0, 1, 2].map(|k| layout.point(k) + FORCE);
-        let row = programme.contacts[0].iter().position(|row| row.axis == Axis::Z).unwrap();
-        x[first + row] = 1000.0 / programme.layout.scale[first + row];
+        let row = program.contacts[0].iter().position(|row| row.axis == Axis::Z).unwrap();
+        x[first + row] = 1000.0 / program.layout.scale[first + row];
         (x[second + row], x[third + row]) = (0.0, 0.0);
-        let found = excess(&problem, &programme, &x);
+        let found = excess(&problem, &program, &x);
         // The minimum of the parabola is in the second interval: -125 N.
         for at in [second + row, third + row] {
-            let missing = found.margins.variables[&at][0] * programme.layout.scale[at];
+            let missing = found.margins.variables[&at][0] * program.layout.scale[at];
             assert!((missing - 120.0).abs() < 6.0, "{missing}");
         }
         assert!(!found.margins.variables.contains_key(&(first + row)));
 
         let (_, _, mut x) = hanging();
-        let swing = &programme.layout.domains[2];
+        let swing = &program.layout.domains[2];
         for k in 3..=4 {
             let height = swing.point(k) + Q + 1;
             x[height] = 0.85;
         }
-        let found = excess(&problem, &programme, &x);
+        let found = excess(&problem, &program, &x);
         let rows: Vec<usize> =
-            (2..=5).flat_map(|k| &programme.rows.domains[2].points[k].heights).map(|height| height.row).collect();
+            (2..=5).flat_map(|k| &program.rows.domains[2].points[k].heights).map(|height| height.row).collect();
         assert!(rows.iter().any(|row| found.margins.rows.contains_key(row)), "{:?}", found.margins.rows);
     }
 }

@@ -1,6 +1,6 @@
 //! Margins by which bounds at nodes are tightened, so that the gait also satisfies them between the nodes.
 
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use interior_point::NonlinearProgram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -73,11 +73,11 @@ impl Margins {
     /// The margins that are relevant at the point `x`: those with a distance to the tightened bound of at most the
     /// margin.
     #[must_use]
-    pub fn bearing_on(&self, programme: &GaitProgramme, x: &[f64]) -> Self {
-        let mut values = vec![0.0; programme.rows.names.len()];
-        programme.constraints(x, &mut values);
+    pub fn bearing_on(&self, program: &GaitProgram, x: &[f64]) -> Self {
+        let mut values = vec![0.0; program.rows.names.len()];
+        program.constraints(x, &mut values);
         let bears = |distance: f64, margin: f64| distance <= 2.0 * margin;
-        let (lower, upper) = programme.stored_bounds();
+        let (lower, upper) = program.stored_bounds();
         let mut kept = Self::default();
         for (&at, &[low, high]) in &self.variables {
             let low = if bears(x[at] - lower[at], low) { low } else { 0.0 };
@@ -87,7 +87,7 @@ impl Margins {
             }
         }
         let rows = self.rows.iter().map(|(&at, &margin)| (at, margin));
-        kept.rows = rows.filter(|&(at, margin)| bears(values[at] - programme.rows.lower[at], margin)).collect();
+        kept.rows = rows.filter(|&(at, margin)| bears(values[at] - program.rows.lower[at], margin)).collect();
         kept
     }
 
@@ -109,13 +109,13 @@ impl Margins {
     }
 }
 
-impl GaitProgramme {
+impl GaitProgram {
     /// The problem with tightened bounds.
     #[must_use]
     pub fn tightened(&self, margins: &Margins) -> Self {
-        let mut programme = self.clone();
-        margins.apply(&mut programme.bounds.lower, &mut programme.bounds.upper, &mut programme.rows.lower);
-        programme
+        let mut program = self.clone();
+        margins.apply(&mut program.bounds.lower, &mut program.bounds.upper, &mut program.rows.lower);
+        program
     }
 }
 

@@ -5,7 +5,7 @@
 //! [`super::contact_limits`], are summed in link space and transformed once.
 
 use super::layout::{FORCE, PointVariables, Q, QD, QDD, U};
-use super::program_data::{GaitProgramme, PointContext};
+use super::program_data::{GaitProgram, PointContext};
 use super::rows::PointRows;
 use super::sparse_entries::Entries;
 use crate::body::coordinates::{LINKS, link_angles, to_generalised, transform_rows};
@@ -40,7 +40,7 @@ pub(super) fn axis_index(axis: Axis) -> usize {
     }
 }
 
-impl GaitProgramme {
+impl GaitProgram {
     /// Position component of a foot point, and its gradient with respect to the nine coordinates.
     pub fn foot_point_linearised(&self, state: &PointState, foot_point: usize, axis: Axis) -> (f64, [f64; 9]) {
         let point = &self.foot_points[foot_point];
@@ -113,25 +113,25 @@ pub(super) fn add_contact_hessian(
 
 /// Values of the rows of a node.
 pub(super) fn values(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
     state: &PointState,
     g: &mut [f64],
 ) {
-    let mut motion = InverseDynamics::new(&programme.model).rows(state);
+    let mut motion = InverseDynamics::new(&program.model).rows(state);
     for (i, u) in point.u.iter().enumerate() {
         motion[3 + i] -= u;
     }
     for (c, row) in context.contacts.iter().enumerate() {
-        subtract_force(programme, state, *row, point.force[c], &mut motion);
+        subtract_force(program, state, *row, point.force[c], &mut motion);
     }
     for i in 0..9 {
         g[rows.dynamics + i] = motion[i] * DYNAMICS_SCALE;
     }
     for (c, row) in context.contacts.iter().enumerate() {
-        let foot = programme.contact_point(*row);
+        let foot = program.contact_point(*row);
         let axis = axis_index(row.axis);
         g[rows.contact_acceleration + c] = state.contact_acceleration(foot)[axis] * ACCELERATION_SCALE;
         if let Some(first) = rows.contact_velocity {
@@ -140,7 +140,7 @@ pub(super) fn values(
     }
     for &(c, row) in &rows.contact_position {
         let contact = context.contacts[c];
-        let position = state.contact_position(programme.contact_point(contact))[axis_index(contact.axis)];
+        let position = state.contact_position(program.contact_point(contact))[axis_index(contact.axis)];
         let target = context.contact_targets[c];
         g[row] = position - target[0] - target[1] * context.right_step_length - target[2] * context.stride_length;
     }
@@ -149,13 +149,13 @@ pub(super) fn values(
 /// `motion -= J_row^T force`.
 #[inline]
 pub(super) fn subtract_force(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     state: &PointState,
     row: ContactRow,
     force: f64,
     motion: &mut [f64; 9],
 ) {
-    let gradient = position_gradient(state, programme.contact_point(row), row.axis);
+    let gradient = position_gradient(state, program.contact_point(row), row.axis);
     motion[axis_index(row.axis)] -= force;
     for i in 0..LINKS {
         motion[2 + i] -= gradient[i] * force;
@@ -164,7 +164,7 @@ pub(super) fn subtract_force(
 
 /// Jacobian of the rows of a node; `p` is the first variable of the node.
 pub(super) fn jacobian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
@@ -172,11 +172,11 @@ pub(super) fn jacobian(
     p: usize,
     out: &mut Entries<'_>,
 ) {
-    let mut d = InverseDynamics::new(&programme.model).jacobian(state);
+    let mut d = InverseDynamics::new(&program.model).jacobian(state);
     // d(-t . f)/dpsi = a . f in link space, transformed by A^T diag A.
     let mut link_stiffness = [0.0; LINKS];
     for (c, row) in context.contacts.iter().enumerate() {
-        let foot = programme.contact_point(*row);
+        let foot = program.contact_point(*row);
         for (k, u) in foot.vectors.iter().enumerate() {
             let link = foot.first_link + k;
             link_stiffness[link] += state.rotated(link, u)[axis_index(row.axis)] * point.force[c];
@@ -211,7 +211,7 @@ pub(super) fn jacobian(
         }
     }
     for (c, contact) in context.contacts.iter().enumerate() {
-        let foot = programme.contact_point(*contact);
+        let foot = program.contact_point(*contact);
         let axis = axis_index(contact.axis);
         let gradient = position_gradient(state, foot, contact.axis);
         let angles = leg_angles(contact.side);
@@ -250,17 +250,17 @@ pub(super) fn jacobian(
     }
     for &(c, row) in &rows.contact_position {
         let contact = context.contacts[c];
-        let gradient = position_gradient(state, programme.contact_point(contact), contact.axis);
+        let gradient = position_gradient(state, program.contact_point(contact), contact.axis);
         out.jacobian(row, p + Q + axis_index(contact.axis), 1.0);
         for i in leg_angles(contact.side) {
             out.jacobian(row, p + Q + 2 + i, gradient[i]);
         }
         let target = context.contact_targets[c];
         if target[1] != 0.0 {
-            out.jacobian(row, programme.layout.right_step_length, -target[1]);
+            out.jacobian(row, program.layout.right_step_length, -target[1]);
         }
         if target[2] != 0.0 {
-            out.jacobian(row, programme.layout.stride_length, -target[2]);
+            out.jacobian(row, program.layout.stride_length, -target[2]);
         }
     }
 }
@@ -268,7 +268,7 @@ pub(super) fn jacobian(
 /// Adds the Hessian of the rows of a node in link space, and writes the columns of the forces.
 #[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
@@ -282,10 +282,10 @@ pub(super) fn hessian(
     for i in 0..9 {
         motion[i] = multipliers[rows.dynamics + i] * DYNAMICS_SCALE;
     }
-    InverseDynamics::new(&programme.model).add_hessian(state, &motion, link);
+    InverseDynamics::new(&program.model).add_hessian(state, &motion, link);
     let weights = link_angles(&angles_of(&motion));
     for (c, contact) in context.contacts.iter().enumerate() {
-        let foot = programme.contact_point(*contact);
+        let foot = program.contact_point(*contact);
         let axis = axis_index(contact.axis);
         // The term -t . f has the second derivative +t . f and the mixed derivative +a with the force.
         let mut cross = [[0.0; 1]; LINKS];
@@ -313,7 +313,7 @@ pub(super) fn hessian(
     }
     for &(c, row) in &rows.contact_position {
         let contact = context.contacts[c];
-        let foot = programme.contact_point(contact);
+        let foot = program.contact_point(contact);
         add_contact_hessian(state, foot, along(contact.axis, multipliers[row]), [0.0; 2], [0.0; 2], link);
     }
 }

@@ -6,14 +6,14 @@
 //! are interpolated directly.
 
 use super::layout::DomainLayout;
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use super::row_names::{RowKind, RowName, RowPlace};
 use interior_point::WarmPoint;
 use std::collections::HashMap;
 
 /// Transfers `point` from the mesh of `from` to that of `to`, a problem of the same variant. The solver initialises
 /// slacks and their multipliers from the rows.
-pub fn transfer(from: &GaitProgramme, to: &GaitProgramme, point: &WarmPoint) -> WarmPoint {
+pub fn transfer(from: &GaitProgram, to: &GaitProgram, point: &WarmPoint) -> WarmPoint {
     WarmPoint {
         x: transfer_variables(from, to, &point.x, parabola),
         lower_multipliers: transfer_variables(from, to, &point.lower_multipliers, density),
@@ -26,7 +26,7 @@ pub fn transfer(from: &GaitProgramme, to: &GaitProgramme, point: &WarmPoint) -> 
 /// Interpolates at a position in the domain, given the values at its old nodes.
 type Interpolation = fn(&DomainLayout, &DomainLayout, usize, &dyn Fn(usize) -> f64) -> f64;
 
-fn transfer_variables(from: &GaitProgramme, to: &GaitProgramme, values: &[f64], by: Interpolation) -> Vec<f64> {
+fn transfer_variables(from: &GaitProgram, to: &GaitProgram, values: &[f64], by: Interpolation) -> Vec<f64> {
     let mut result = vec![0.0; to.layout.variables];
     for (old, new) in from.layout.domains.iter().zip(&to.layout.domains) {
         for k in 0..new.points {
@@ -65,7 +65,7 @@ fn whole_below(value: f64, most: usize) -> usize {
     (value.max(0.0) as usize).min(most)
 }
 
-fn transfer_rows(from: &GaitProgramme, to: &GaitProgramme, values: &[f64]) -> Vec<f64> {
+fn transfer_rows(from: &GaitProgram, to: &GaitProgram, values: &[f64]) -> Vec<f64> {
     // Rows that differ in their node only, in the order of the nodes.
     let mut alike: HashMap<RowName, Vec<usize>> = HashMap::new();
     for (row, name) in from.rows.names.iter().enumerate() {
@@ -97,13 +97,13 @@ fn whatever_the_point(name: RowName) -> RowName {
 }
 
 /// Position of a row in its domain, 0 to 1.
-fn sigma(programme: &GaitProgramme, name: RowName) -> f64 {
+fn sigma(program: &GaitProgram, name: RowName) -> f64 {
     let RowPlace::Point { domain, point } = name.place else { return 0.0 };
-    programme.layout.domains[domain].sigma(point)
+    program.layout.domains[domain].sigma(point)
 }
 
 /// Simpson weight of the node of a row; 1 for an integration row.
-fn weight(programme: &GaitProgramme, name: RowName) -> f64 {
+fn weight(program: &GaitProgram, name: RowName) -> f64 {
     let RowPlace::Point { domain, point } = name.place else { return 1.0 };
     match name.kind {
         RowKind::MidpointPhase
@@ -112,7 +112,7 @@ fn weight(programme: &GaitProgramme, name: RowName) -> f64 {
         | RowKind::EndpointPhaseRate
         | RowKind::MidpointFibre
         | RowKind::EndpointFibre => 1.0,
-        _ => programme.layout.domains[domain].simpson(point),
+        _ => program.layout.domains[domain].simpson(point),
     }
 }
 
@@ -125,10 +125,10 @@ mod tests {
     use crate::subject::Subject;
     use interior_point::NonlinearProgram;
 
-    fn programme(mesh: Mesh) -> GaitProgramme {
+    fn program(mesh: Mesh) -> GaitProgram {
         let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), true).unwrap();
         problem.settings.mesh = mesh;
-        problem.programme(true).unwrap()
+        problem.program(true).unwrap()
     }
 
     const COARSE: Mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 3 };
@@ -139,8 +139,8 @@ mod tests {
         (0..count).map(|i| 1.0 + (i as f64 * 0.7).sin()).collect()
     }
 
-    fn some_point(programme: &GaitProgramme) -> WarmPoint {
-        let (n, m) = (programme.variables(), programme.rows());
+    fn some_point(program: &GaitProgram) -> WarmPoint {
+        let (n, m) = (program.variables(), program.rows());
         WarmPoint {
             x: numbers(n),
             row_multipliers: numbers(m),
@@ -152,9 +152,9 @@ mod tests {
 
     #[test]
     fn transfer_to_the_same_mesh_is_the_identity() {
-        let programme = programme(COARSE);
-        let point = some_point(&programme);
-        let moved = transfer(&programme, &programme, &point);
+        let program = program(COARSE);
+        let point = some_point(&program);
+        let moved = transfer(&program, &program, &point);
         let pairs = [
             (&moved.x, &point.x),
             (&moved.row_multipliers, &point.row_multipliers),
@@ -169,10 +169,10 @@ mod tests {
 
     #[test]
     fn transfer_reproduces_parabolas_and_linear_densities() {
-        let (coarse, fine) = (programme(COARSE), programme(FINE));
-        let fill = |programme: &GaitProgramme| {
-            let mut point = some_point(programme);
-            for layout in &programme.layout.domains {
+        let (coarse, fine) = (program(COARSE), program(FINE));
+        let fill = |program: &GaitProgram| {
+            let mut point = some_point(program);
+            for layout in &program.layout.domains {
                 for k in 0..layout.points {
                     let sigma = layout.sigma(k);
                     for j in layout.point(k)..layout.point(k) + layout.per_point {
@@ -182,9 +182,9 @@ mod tests {
                     }
                 }
             }
-            let rows = programme.rows.names.iter();
-            point.row_multipliers = rows.map(|name| weight(programme, *name) * (1.0 + name.component as f64)).collect();
-            let tail = programme.layout.hip_velocities;
+            let rows = program.rows.names.iter();
+            point.row_multipliers = rows.map(|name| weight(program, *name) * (1.0 + name.component as f64)).collect();
+            let tail = program.layout.hip_velocities;
             for values in [&mut point.x, &mut point.lower_multipliers, &mut point.upper_multipliers] {
                 values[tail..].fill(4.0);
             }

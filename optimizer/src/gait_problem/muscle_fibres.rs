@@ -1,19 +1,13 @@
 //! Rows of C8: Hermite-Simpson integration of fibre velocities to fibre lengths, in optimal fibre lengths.
 
 use super::hermite_simpson::{SLOPE, STATE};
-use super::program_data::{DomainContext, GaitProgramme};
+use super::program_data::{DomainContext, GaitProgram};
 use super::rows::DomainRows;
 use super::sparse_entries::Entries;
 use crate::muscle::MUSCLE_COUNT;
 
 /// Values.
-pub(super) fn values(
-    programme: &GaitProgramme,
-    context: &DomainContext<'_>,
-    rows: &DomainRows,
-    x: &[f64],
-    g: &mut [f64],
-) {
+pub(super) fn values(program: &GaitProgram, context: &DomainContext<'_>, rows: &DomainRows, x: &[f64], g: &mut [f64]) {
     let Some(first) = rows.fibres else { return };
     let layout = context.layout;
     let h = context.duration / layout.intervals as f64;
@@ -23,8 +17,8 @@ pub(super) fn values(
                 let mut sum = 0.0;
                 for i in 0..3 {
                     let p = layout.point(2 * interval + i);
-                    sum += STATE[kind][i] * programme.layout.value(x, p + layout.fibre_length() + m)
-                        + h * SLOPE[kind][i] * programme.layout.value(x, p + layout.fibre_velocity() + m);
+                    sum += STATE[kind][i] * program.layout.value(x, p + layout.fibre_length() + m)
+                        + h * SLOPE[kind][i] * program.layout.value(x, p + layout.fibre_velocity() + m);
                 }
                 g[first + 2 * MUSCLE_COUNT * interval + MUSCLE_COUNT * kind + m] = sum;
             }
@@ -34,7 +28,7 @@ pub(super) fn values(
 
 /// Jacobian.
 pub(super) fn jacobian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &DomainContext<'_>,
     rows: &DomainRows,
     x: &[f64],
@@ -57,7 +51,7 @@ pub(super) fn jacobian(
                     }
                     if SLOPE[kind][i] != 0.0 {
                         out.jacobian(row, velocity, h * SLOPE[kind][i]);
-                        by_duration += SLOPE[kind][i] / n * programme.layout.value(x, velocity);
+                        by_duration += SLOPE[kind][i] / n * program.layout.value(x, velocity);
                     }
                 }
                 out.jacobian(row, layout.duration, by_duration);

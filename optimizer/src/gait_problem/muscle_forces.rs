@@ -4,7 +4,7 @@
 //! from the posture. C9 to C12 equate joint torques and muscle torques (divided by 100).
 
 use super::layout::{DomainLayout, PointVariables, Q, U};
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use super::rows::PointRows;
 use super::sparse_entries::Entries;
 use crate::muscle::unit::AttachmentValue;
@@ -52,11 +52,11 @@ const fn torque_row(coordinate: usize) -> usize {
 }
 
 /// Values.
-pub(super) fn values(programme: &GaitProgramme, rows: &PointRows, point: &PointVariables, g: &mut [f64]) {
+pub(super) fn values(program: &GaitProgram, rows: &PointRows, point: &PointVariables, g: &mut [f64]) {
     let (Some(force), Some(torque)) = (rows.muscle_force, rows.muscle_torque) else { return };
     let mut driven = [0.0; 4];
     for m in 0..MUSCLE_COUNT {
-        let state = muscle_state(&programme.muscles[m], m, point);
+        let state = muscle_state(&program.muscles[m], m, point);
         g[force + m] = point.activation[m] * state.length.value * state.velocity.value - state.tendon.value;
         for (coordinate, joint) in state.joints.iter().flatten() {
             driven[torque_row(*coordinate)] += joint.arm * state.max_force * state.tendon.value;
@@ -69,7 +69,7 @@ pub(super) fn values(programme: &GaitProgramme, rows: &PointRows, point: &PointV
 
 /// Jacobian.
 pub(super) fn jacobian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     layout: &DomainLayout,
     rows: &PointRows,
     point: &PointVariables,
@@ -81,7 +81,7 @@ pub(super) fn jacobian(
         out.jacobian(torque + i, p + U + i, TORQUE_SCALE);
     }
     for m in 0..MUSCLE_COUNT {
-        let state = muscle_state(&programme.muscles[m], m, point);
+        let state = muscle_state(&program.muscles[m], m, point);
         let (fl, fv, fse) = (state.length, state.velocity, state.tendon);
         let s = point.activation[m];
         let row = force + m;
@@ -107,7 +107,7 @@ pub(super) fn jacobian(
 
 /// Hessian.
 pub(super) fn hessian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     layout: &DomainLayout,
     rows: &PointRows,
     point: &PointVariables,
@@ -117,7 +117,7 @@ pub(super) fn hessian(
 ) {
     let (Some(force), Some(torque)) = (rows.muscle_force, rows.muscle_torque) else { return };
     for m in 0..MUSCLE_COUNT {
-        let state = muscle_state(&programme.muscles[m], m, point);
+        let state = muscle_state(&program.muscles[m], m, point);
         let (fl, fv, fse) = (state.length, state.velocity, state.tendon);
         let s = point.activation[m];
         let weight = multipliers[force + m];

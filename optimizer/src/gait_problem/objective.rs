@@ -8,7 +8,7 @@
 //! - `track = sum_domains (1/K) sum_k |q[2..] - q_ref|^2`.
 
 use super::layout::{FORCE, Q, QD, QDD, U};
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use super::sparse_entries::Entries;
 use crate::body::{COORDINATES, GRAVITY, JOINTS};
 use crate::muscle::MUSCLE_COUNT;
@@ -28,19 +28,19 @@ pub struct ObjectiveParts {
 }
 
 /// A regularised variable: offset in the variables of a node, and weight of its square in physical units.
-fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-    let layout = &programme.layout.domains[d];
-    let weights = &programme.regularisation;
+fn squares(program: &GaitProgram, d: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    let layout = &program.layout.domains[d];
+    let weights = &program.regularisation;
     let torque = weights.torque / (100.0 * 100.0);
     let acceleration = weights.acceleration / (30.0 * 30.0);
     let force = weights.contact_force / (500.0 * 500.0);
-    let muscles = if programme.layout.muscles { MUSCLE_COUNT } else { 0 };
+    let muscles = if program.layout.muscles { MUSCLE_COUNT } else { 0 };
     (0..JOINTS)
         .map(move |i| (U + i, torque))
         .chain((0..COORDINATES).map(move |i| (QDD + i, acceleration)))
         .chain((0..layout.contacts).map(move |i| (FORCE + i, force)))
         .chain((0..muscles).flat_map(move |m| {
-            let v = programme.muscles[m].max_speed;
+            let v = program.muscles[m].max_speed;
             [
                 (layout.activation() + m, weights.activation),
                 (layout.fibre_velocity() + m, weights.fibre_velocity / (v * v)),
@@ -52,10 +52,10 @@ fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, 
 const BEND: [f64; 3] = [1.0, -2.0, 1.0];
 
 /// The variables of each bend with the weight of its square; empty if the weight is zero.
-fn bends(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = ([usize; 3], f64)> + '_ {
-    let domain = &programme.layout.domains[d];
-    let bends = if programme.activations_are_coupled() { domain.points - 2 } else { 0 };
-    let weight = programme.regularisation.activation_bend / domain.intervals as f64;
+fn bends(program: &GaitProgram, d: usize) -> impl Iterator<Item = ([usize; 3], f64)> + '_ {
+    let domain = &program.layout.domains[d];
+    let bends = if program.activations_are_coupled() { domain.points - 2 } else { 0 };
+    let weight = program.regularisation.activation_bend / domain.intervals as f64;
     (0..bends).flat_map(move |k| {
         (0..MUSCLE_COUNT).map(move |m| {
             let activation = |i| domain.point(k + i) + domain.activation() + m;
@@ -64,8 +64,8 @@ fn bends(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = ([usize; 3
     })
 }
 
-fn bend(programme: &GaitProgramme, x: &[f64], variables: [usize; 3]) -> f64 {
-    (0..3).map(|i| BEND[i] * programme.layout.value(x, variables[i])).sum()
+fn bend(program: &GaitProgram, x: &[f64], variables: [usize; 3]) -> f64 {
+    (0..3).map(|i| BEND[i] * program.layout.value(x, variables[i])).sum()
 }
 
 /// `sqrt(P^2 + eps^2) - eps` with first and second derivative.
@@ -94,8 +94,8 @@ pub(crate) fn cost_of_transport(energy_j: f64, total_mass_kg: f64, stride_length
 }
 
 /// The parts.
-pub(super) fn parts(programme: &GaitProgramme, x: &[f64]) -> ObjectiveParts {
-    let layout = &programme.layout;
+pub(super) fn parts(program: &GaitProgram, x: &[f64]) -> ObjectiveParts {
+    let layout = &program.layout;
     let mut result = ObjectiveParts::default();
     for (d, domain) in layout.domains.iter().enumerate() {
         let duration = layout.value(x, domain.duration);
@@ -104,32 +104,32 @@ pub(super) fn parts(programme: &GaitProgramme, x: &[f64]) -> ObjectiveParts {
             let joints = |first: usize| std::array::from_fn(|i| layout.value(x, domain.point(k) + first + i));
             (domain.simpson(k), joints(U), joints(QD + 3))
         });
-        let energy = mean_power(nodes, &programme.regularisation);
+        let energy = mean_power(nodes, &program.regularisation);
         for k in 0..domain.points {
             let p = domain.point(k);
             let weight = domain.simpson(k);
-            for (offset, c) in squares(programme, d) {
+            for (offset, c) in squares(program, d) {
                 let value = layout.value(x, p + offset);
                 regularisation += weight * c * value * value;
             }
-            for (i, reference) in programme.reference_angles[d][k].iter().enumerate() {
+            for (i, reference) in program.reference_angles[d][k].iter().enumerate() {
                 let error = x[p + Q + 2 + i] - reference;
                 tracking += error * error;
             }
         }
-        for (variables, c) in bends(programme, d) {
-            regularisation += c * bend(programme, x, variables).powi(2);
+        for (variables, c) in bends(program, d) {
+            regularisation += c * bend(program, x, variables).powi(2);
         }
         result.energy_j += duration * energy;
         result.regularisation += duration * regularisation;
         result.tracking += tracking / domain.points as f64;
     }
     let stride = layout.value(x, layout.stride_length);
-    result.cost_of_transport = cost_of_transport(result.energy_j, programme.model.total_mass, stride);
+    result.cost_of_transport = cost_of_transport(result.energy_j, program.model.total_mass, stride);
     result
 }
 
-impl GaitProgramme {
+impl GaitProgram {
     /// Parts of the objective at x.
     pub fn objective_parts(&self, x: &[f64]) -> ObjectiveParts {
         parts(self, x)
@@ -137,19 +137,19 @@ impl GaitProgramme {
 }
 
 /// Weighted objective.
-pub(super) fn value(programme: &GaitProgramme, x: &[f64]) -> f64 {
-    let parts = parts(programme, x);
-    let weights = &programme.weights;
+pub(super) fn value(program: &GaitProgram, x: &[f64]) -> f64 {
+    let parts = parts(program, x);
+    let weights = &program.weights;
     weights.cost_of_transport * parts.cost_of_transport + weights.tracking * parts.tracking + parts.regularisation
 }
 
 /// Gradient with respect to the stored, scaled variables.
-pub(super) fn gradient(programme: &GaitProgramme, x: &[f64], out: &mut [f64]) {
+pub(super) fn gradient(program: &GaitProgram, x: &[f64], out: &mut [f64]) {
     out.fill(0.0);
-    let layout = &programme.layout;
+    let layout = &program.layout;
     let scale = &layout.scale;
     let stride = layout.value(x, layout.stride_length);
-    let per_energy = programme.weights.cost_of_transport / (programme.model.total_mass * GRAVITY * stride);
+    let per_energy = program.weights.cost_of_transport / (program.model.total_mass * GRAVITY * stride);
     let mut total_energy = 0.0;
     for (d, domain) in layout.domains.iter().enumerate() {
         let duration = layout.value(x, domain.duration);
@@ -160,25 +160,25 @@ pub(super) fn gradient(programme: &GaitProgramme, x: &[f64], out: &mut [f64]) {
             for i in 0..JOINTS {
                 let (iu, iv) = (p + U + i, p + QD + 3 + i);
                 let (u, v) = (layout.value(x, iu), layout.value(x, iv));
-                let power = smooth_power(u * v, programme.regularisation.power_smoothing_w);
+                let power = smooth_power(u * v, program.regularisation.power_smoothing_w);
                 energy += weight * power[0];
                 let factor = per_energy * duration * weight * power[1];
                 out[iu] += factor * v * scale[iu];
                 out[iv] += factor * u * scale[iv];
             }
-            for (offset, c) in squares(programme, d) {
+            for (offset, c) in squares(program, d) {
                 let index = p + offset;
                 let value = layout.value(x, index);
                 regularisation += weight * c * value * value;
                 out[index] += 2.0 * duration * weight * c * value * scale[index];
             }
-            let tracking = 2.0 * programme.weights.tracking / domain.points as f64;
-            for (i, reference) in programme.reference_angles[d][k].iter().enumerate() {
+            let tracking = 2.0 * program.weights.tracking / domain.points as f64;
+            for (i, reference) in program.reference_angles[d][k].iter().enumerate() {
                 out[p + Q + 2 + i] += tracking * (x[p + Q + 2 + i] - reference);
             }
         }
-        for (variables, c) in bends(programme, d) {
-            let bend = bend(programme, x, variables);
+        for (variables, c) in bends(program, d) {
+            let bend = bend(program, x, variables);
             regularisation += c * bend * bend;
             for (index, coefficient) in variables.into_iter().zip(BEND) {
                 out[index] += 2.0 * duration * c * bend * coefficient * scale[index];
@@ -191,11 +191,11 @@ pub(super) fn gradient(programme: &GaitProgramme, x: &[f64], out: &mut [f64]) {
 }
 
 /// Hessian times sigma.
-pub(super) fn hessian(programme: &GaitProgramme, x: &[f64], sigma: f64, out: &mut Entries<'_>) {
-    let layout = &programme.layout;
+pub(super) fn hessian(program: &GaitProgram, x: &[f64], sigma: f64, out: &mut Entries<'_>) {
+    let layout = &program.layout;
     let d_index = layout.stride_length;
     let stride = layout.value(x, d_index);
-    let per_energy = sigma * programme.weights.cost_of_transport / (programme.model.total_mass * GRAVITY * stride);
+    let per_energy = sigma * program.weights.cost_of_transport / (program.model.total_mass * GRAVITY * stride);
     let mut total_energy = 0.0;
     for (d, domain) in layout.domains.iter().enumerate() {
         let duration = layout.value(x, domain.duration);
@@ -206,7 +206,7 @@ pub(super) fn hessian(programme: &GaitProgramme, x: &[f64], sigma: f64, out: &mu
             for i in 0..JOINTS {
                 let (iu, iv) = (p + U + i, p + QD + 3 + i);
                 let (u, v) = (layout.value(x, iu), layout.value(x, iv));
-                let power = smooth_power(u * v, programme.regularisation.power_smoothing_w);
+                let power = smooth_power(u * v, program.regularisation.power_smoothing_w);
                 energy += weight * power[0];
                 let factor = per_energy * duration * weight;
                 out.hessian(iu, iu, factor * power[2] * v * v);
@@ -217,20 +217,20 @@ pub(super) fn hessian(programme: &GaitProgramme, x: &[f64], sigma: f64, out: &mu
                     out.hessian(index, d_index, -factor / stride * by);
                 }
             }
-            for (offset, c) in squares(programme, d) {
+            for (offset, c) in squares(program, d) {
                 let index = p + offset;
                 let slope = 2.0 * sigma * weight * c;
                 out.hessian(index, index, slope * duration);
                 out.hessian(index, domain.duration, slope * layout.value(x, index));
             }
-            let tracking = 2.0 * sigma * programme.weights.tracking / domain.points as f64;
+            let tracking = 2.0 * sigma * program.weights.tracking / domain.points as f64;
             for i in 0..7 {
                 out.hessian(p + Q + 2 + i, p + Q + 2 + i, tracking);
             }
         }
-        for (variables, c) in bends(programme, d) {
+        for (variables, c) in bends(program, d) {
             let slope = 2.0 * sigma * c;
-            let bend = bend(programme, x, variables);
+            let bend = bend(program, x, variables);
             for (i, index) in variables.into_iter().enumerate() {
                 out.hessian(index, domain.duration, slope * bend * BEND[i]);
                 for (other, coefficient) in variables.into_iter().zip(BEND).take(i + 1) {

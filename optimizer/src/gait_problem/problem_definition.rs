@@ -1,10 +1,11 @@
 //! The definition of a gait problem: subject, device, bounds, variant, settings and reference gait.
 
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use crate::device::Device;
+use crate::model_error::ModelError;
 use crate::reference::ReferenceGait;
 use crate::settings::GaitSettings;
-use crate::subject::{ModelError, Subject};
+use crate::subject::Subject;
 use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +44,7 @@ impl GaitProblem {
         })
     }
 
-    pub(crate) fn programme(&self, muscles: bool) -> Result<GaitProgramme, ModelError> {
-        GaitProgramme::new(&self.subject, &self.device, &self.bounds, muscles, &self.settings, &self.reference)
+    pub(crate) fn program(&self, muscles: bool) -> Result<GaitProgram, ModelError> {
+        GaitProgram::new(&self.subject, &self.device, &self.bounds, muscles, &self.settings, &self.reference)
     }
 }

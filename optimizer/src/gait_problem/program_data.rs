@@ -7,10 +7,11 @@ use super::sparse_entries::Compressed;
 use super::variable_bounds::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
 use crate::body::{Axis, ContactPoint, FootPoint, GRAVITY, Side, WalkerModel};
 use crate::device::Device;
+use crate::model_error::ModelError;
 use crate::muscle::{MUSCLE_COUNT, Muscle};
 use crate::reference::ReferenceGait;
 use crate::settings::{GaitSettings, Regularisation};
-use crate::subject::{ModelError, Subject};
+use crate::subject::Subject;
 use crate::tuned_bounds::TunedBounds;
 use crate::walking::{CYCLE, ContactRow, phase_gradient};
 use interior_point::EliminationBlocks;
@@ -89,9 +90,9 @@ impl PointContext<'_> {
     }
 }
 
-/// The gait problem of a subject, device, set of bounds and variant, as a nonlinear programme.
+/// The gait problem of a subject, device, set of bounds and variant, as a nonlinear program.
 #[derive(Debug, Clone)]
-pub struct GaitProgramme {
+pub struct GaitProgram {
     /// The walker.
     pub model: WalkerModel,
     /// Variables.
@@ -138,7 +139,7 @@ fn reference_points(layout: &Layout, reference: &ReferenceGait, timing: &StrideT
         .collect()
 }
 
-impl GaitProgramme {
+impl GaitProgram {
     /// The program without the structure of its derivatives.
     pub(super) fn without_structure(
         subject: &Subject,
@@ -195,10 +196,10 @@ impl GaitProgramme {
     /// The problem of a tracking phase: other weights, and landing points must only move downwards.
     #[must_use]
     pub fn for_tracking(&self, tracking: f64) -> Self {
-        let mut programme = self.clone();
-        programme.weights = ObjectiveWeights { cost_of_transport: 0.0, tracking };
-        set_row_bounds(&mut programme.rows, &self.settings.limits, true);
-        programme
+        let mut program = self.clone();
+        program.weights = ObjectiveWeights { cost_of_transport: 0.0, tracking };
+        set_row_bounds(&mut program.rows, &self.settings.limits, true);
+        program
     }
 
     /// The problem with another timing of the tracked reference gait.

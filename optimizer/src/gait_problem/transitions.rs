@@ -6,7 +6,7 @@
 
 use super::layout::{PointVariables, Q, QD};
 use super::mechanics::{axis_index, coupled, leg_angles, position_gradient, subtract_force};
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use super::rows::DomainRows;
 use super::sparse_entries::Entries;
 use crate::body::coordinates::{LINKS, congruence, link_angles, transform_rows};
@@ -30,16 +30,16 @@ struct Transition {
     impulse: Option<usize>,
 }
 
-fn transition(programme: &GaitProgramme, x: &[f64], d: usize) -> Transition {
+fn transition(program: &GaitProgram, x: &[f64], d: usize) -> Transition {
     let next = (d + 1) % CYCLE.len();
-    let layout = &programme.layout.domains[d];
+    let layout = &program.layout.domains[d];
     Transition {
         next,
-        before: programme.layout.point_variables(x, d, layout.last()),
-        after: programme.layout.point_variables(x, next, 0),
+        before: program.layout.point_variables(x, d, layout.last()),
+        after: program.layout.point_variables(x, next, 0),
         first_before: layout.point(layout.last()),
-        first_after: programme.layout.domains[next].point(0),
-        impulse: programme.layout.domains[next].impulse,
+        first_after: program.layout.domains[next].point(0),
+        impulse: program.layout.domains[next].impulse,
     }
 }
 
@@ -52,32 +52,32 @@ fn jump(t: &Transition) -> PointState {
     PointState::new(&t.after.q, &[0.0; 9], &dv)
 }
 
-fn contact_rows(programme: &GaitProgramme, next: usize) -> &[ContactRow] {
-    &programme.contacts[next]
+fn contact_rows(program: &GaitProgram, next: usize) -> &[ContactRow] {
+    &program.contacts[next]
 }
 
 /// Values.
-pub(super) fn values(programme: &GaitProgramme, d: usize, rows: &DomainRows, x: &[f64], g: &mut [f64]) {
-    let t = transition(programme, x, d);
+pub(super) fn values(program: &GaitProgram, d: usize, rows: &DomainRows, x: &[f64], g: &mut [f64]) {
+    let t = transition(program, x, d);
     for i in 0..9 {
         let mut value = t.after.q[i] - t.before.q[i];
         if i == 0 && t.next == 0 {
-            value += programme.layout.value(x, programme.layout.stride_length);
+            value += program.layout.value(x, program.layout.stride_length);
         }
         g[rows.position_reset + i] = value;
     }
     if let Some(impulse) = t.impulse {
         let state = jump(&t);
-        let mut momentum = InverseDynamics::without_gravity(&programme.model).rows(&state);
-        for (c, row) in contact_rows(programme, t.next).iter().enumerate() {
-            subtract_force(programme, &state, *row, programme.layout.value(x, impulse + c), &mut momentum);
+        let mut momentum = InverseDynamics::without_gravity(&program.model).rows(&state);
+        for (c, row) in contact_rows(program, t.next).iter().enumerate() {
+            subtract_force(program, &state, *row, program.layout.value(x, impulse + c), &mut momentum);
         }
         for i in 0..9 {
             g[rows.velocity_reset + i] = momentum[i] * IMPACT_SCALE;
         }
         if let Some(row) = rows.impact_friction {
-            let tangential = programme.layout.value(x, impulse);
-            let normal = programme.limits.impact_friction * programme.layout.value(x, impulse + 1);
+            let tangential = program.layout.value(x, impulse);
+            let normal = program.limits.impact_friction * program.layout.value(x, impulse + 1);
             g[row] = IMPULSE_SCALE * (normal - tangential);
             g[row + 1] = IMPULSE_SCALE * (normal + tangential);
         }
@@ -94,22 +94,22 @@ pub(super) fn values(programme: &GaitProgramme, d: usize, rows: &DomainRows, x: 
 }
 
 /// Jacobian.
-pub(super) fn jacobian(programme: &GaitProgramme, d: usize, rows: &DomainRows, x: &[f64], out: &mut Entries<'_>) {
-    let t = transition(programme, x, d);
+pub(super) fn jacobian(program: &GaitProgram, d: usize, rows: &DomainRows, x: &[f64], out: &mut Entries<'_>) {
+    let t = transition(program, x, d);
     for i in 0..9 {
         out.jacobian(rows.position_reset + i, t.first_after + Q + i, 1.0);
         out.jacobian(rows.position_reset + i, t.first_before + Q + i, -1.0);
     }
     if t.next == 0 {
-        out.jacobian(rows.position_reset, programme.layout.stride_length, 1.0);
+        out.jacobian(rows.position_reset, program.layout.stride_length, 1.0);
     }
     if let Some(impulse) = t.impulse {
         let state = jump(&t);
-        let mut derivative = InverseDynamics::without_gravity(&programme.model).jacobian(&state);
+        let mut derivative = InverseDynamics::without_gravity(&program.model).jacobian(&state);
         let mut stiffness = [[0.0; LINKS]; LINKS];
-        for (c, row) in contact_rows(programme, t.next).iter().enumerate() {
-            let foot = programme.contact_point(*row);
-            let value = programme.layout.value(x, impulse + c);
+        for (c, row) in contact_rows(program, t.next).iter().enumerate() {
+            let foot = program.contact_point(*row);
+            let value = program.layout.value(x, impulse + c);
             for (k, u) in foot.vectors.iter().enumerate() {
                 let link = foot.first_link + k;
                 stiffness[link][link] += state.rotated(link, u)[axis_index(row.axis)] * value;
@@ -134,15 +134,15 @@ pub(super) fn jacobian(programme: &GaitProgramme, d: usize, rows: &DomainRows, x
                 }
             }
         }
-        for (c, contact) in contact_rows(programme, t.next).iter().enumerate() {
-            let gradient = position_gradient(&state, programme.contact_point(*contact), contact.axis);
+        for (c, contact) in contact_rows(program, t.next).iter().enumerate() {
+            let gradient = position_gradient(&state, program.contact_point(*contact), contact.axis);
             out.jacobian(rows.velocity_reset + axis_index(contact.axis), impulse + c, -IMPACT_SCALE);
             for i in leg_angles(contact.side) {
                 out.jacobian(rows.velocity_reset + 2 + i, impulse + c, -gradient[i] * IMPACT_SCALE);
             }
         }
         if let Some(row) = rows.impact_friction {
-            let friction = programme.limits.impact_friction;
+            let friction = program.limits.impact_friction;
             out.jacobian(row, impulse, -IMPULSE_SCALE);
             out.jacobian(row, impulse + 1, IMPULSE_SCALE * friction);
             out.jacobian(row + 1, impulse, IMPULSE_SCALE);
@@ -155,8 +155,8 @@ pub(super) fn jacobian(programme: &GaitProgramme, d: usize, rows: &DomainRows, x
         }
     }
     if let Some(row) = rows.fibre_reset {
-        let after = t.first_after + programme.layout.domains[t.next].fibre_length();
-        let before = t.first_before + programme.layout.domains[d].fibre_length();
+        let after = t.first_after + program.layout.domains[t.next].fibre_length();
+        let before = t.first_before + program.layout.domains[d].fibre_length();
         for m in 0..MUSCLE_COUNT {
             out.jacobian(row + m, after + m, 1.0);
             out.jacobian(row + m, before + m, -1.0);
@@ -166,14 +166,14 @@ pub(super) fn jacobian(programme: &GaitProgramme, d: usize, rows: &DomainRows, x
 
 /// Hessian.
 pub(super) fn hessian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     d: usize,
     rows: &DomainRows,
     x: &[f64],
     multipliers: &[f64],
     out: &mut Entries<'_>,
 ) {
-    let t = transition(programme, x, d);
+    let t = transition(program, x, d);
     let Some(impulse) = t.impulse else { return };
     let state = jump(&t);
     let mut weights = [0.0; 9];
@@ -181,12 +181,12 @@ pub(super) fn hessian(
         weights[i] = multipliers[rows.velocity_reset + i] * IMPACT_SCALE;
     }
     let mut link = LinkHessian::default();
-    InverseDynamics::without_gravity(&programme.model).add_hessian(&state, &weights, &mut link);
+    InverseDynamics::without_gravity(&program.model).add_hessian(&state, &weights, &mut link);
     let link_weights = link_angles(&angles_of(&weights));
-    for (c, row) in contact_rows(programme, t.next).iter().enumerate() {
-        let foot = programme.contact_point(*row);
+    for (c, row) in contact_rows(program, t.next).iter().enumerate() {
+        let foot = program.contact_point(*row);
         let axis = axis_index(row.axis);
-        let value = programme.layout.value(x, impulse + c);
+        let value = program.layout.value(x, impulse + c);
         let mut cross = [[0.0; 1]; LINKS];
         for (k, u) in foot.vectors.iter().enumerate() {
             let j = foot.first_link + k;

@@ -10,7 +10,7 @@ use super::contact_limits::clearance_weight;
 use super::inter_node_check::{BetweenNodes, inter_node_excess};
 use super::margins::Margins;
 use super::problem_definition::GaitProblem;
-use super::program_data::GaitProgramme;
+use super::program_data::GaitProgram;
 use super::rows::HeightRow;
 use super::variable_bounds::{ActiveLimits, VariableBounds, variable_bounds};
 use crate::body::GRAVITY;
@@ -45,7 +45,7 @@ impl UnchangedBound {
 /// A converged gait.
 pub(crate) struct ConvergedGait<'a> {
     pub(crate) problem: &'a GaitProblem,
-    pub(crate) programme: &'a GaitProgramme,
+    pub(crate) program: &'a GaitProgram,
     /// Bounds that were tightened.
     pub(crate) margins: &'a Margins,
     pub(crate) gait: &'a Gait,
@@ -63,7 +63,7 @@ impl ConvergedGait<'_> {
         let values = self.problem.bounds.to_array();
         // A solve would go on tightening a gait with an excess, whatever its bounds.
         let settled =
-            !self.checks_between_nodes || inter_node_excess(self.programme, self.gait, &self.point.x).worst <= 1.0;
+            !self.checks_between_nodes || inter_node_excess(self.program, self.gait, &self.point.x).worst <= 1.0;
         let solution = settled.then(|| Solution::new(self));
         let end = |place: usize, end: f64| match &solution {
             Some(solution) => last_unchanged(values[place], end, |value| solution.stays(place, value)),
@@ -107,10 +107,10 @@ struct Limits {
 
 impl Limits {
     fn new(of: &ConvergedGait<'_>, bounds: &TunedBounds) -> Self {
-        let &ConvergedGait { problem, programme, margins, .. } = of;
-        let weight_n = programme.model.total_mass * GRAVITY;
-        let (layout, settings) = (&programme.layout, programme.settings());
-        let nominal = variable_bounds(layout, bounds, settings, &problem.device, &programme.muscles, weight_n);
+        let &ConvergedGait { problem, program, margins, .. } = of;
+        let weight_n = program.model.total_mass * GRAVITY;
+        let (layout, settings) = (&program.layout, program.settings());
+        let nominal = variable_bounds(layout, bounds, settings, &problem.device, &program.muscles, weight_n);
         let mut tightened = nominal.clone();
         margins.tighten_variables(&mut tightened.lower, &mut tightened.upper);
         Self { nominal, tightened, clearance_m: ActiveLimits::new(&settings.limits, bounds).clearance_m }
@@ -135,21 +135,21 @@ struct Solution<'a> {
 
 impl<'a> Solution<'a> {
     fn new(of: &'a ConvergedGait<'a>) -> Self {
-        let &ConvergedGait { problem, programme, gait, point, .. } = of;
-        let mut values = vec![0.0; programme.rows()];
-        programme.constraints(&point.x, &mut values);
+        let &ConvergedGait { problem, program, gait, point, .. } = of;
+        let mut values = vec![0.0; program.rows()];
+        program.constraints(&point.x, &mut values);
         let mut clearances = Vec::new();
-        for (d, domain) in programme.rows.domains.iter().enumerate() {
+        for (d, domain) in program.rows.domains.iter().enumerate() {
             for (k, node) in domain.points.iter().enumerate() {
                 for &HeightRow { row, .. } in node.heights.iter().filter(|height| height.clearance) {
-                    let per_metre = clearance_weight(programme, d, programme.layout.domains[d].sigma(k), &point.x);
+                    let per_metre = clearance_weight(program, d, program.layout.domains[d].sigma(k), &point.x);
                     clearances.push(Clearance { row, value: values[row], per_metre });
                 }
             }
         }
         Self {
             own: Limits::new(of, &problem.bounds),
-            between: of.checks_between_nodes.then(|| BetweenNodes::new(programme, gait, &point.x)),
+            between: of.checks_between_nodes.then(|| BetweenNodes::new(program, gait, &point.x)),
             of,
             clearances,
         }
@@ -196,7 +196,7 @@ impl<'a> Solution<'a> {
         }
         let row_stays = |clearance: &Clearance| {
             let &Clearance { row, value, per_metre } = clearance;
-            let bound = of.programme.rows.lower[row] + of.margins.rows.get(&row).copied().unwrap_or(0.0);
+            let bound = of.program.rows.lower[row] + of.margins.rows.get(&row).copied().unwrap_or(0.0);
             let moved = value - by * per_metre;
             let multiplier = of.point.slack_lower_multipliers[row];
             let side = Side { bound, distance: value - bound, moved: moved - bound, multiplier };
@@ -243,17 +243,17 @@ mod tests {
     /// excess between nodes as a multiple of its tolerance.
     fn distance_and_excess(problem: &GaitProblem, outcome: &SolveOutcome, values: [f64; 8]) -> (f64, f64) {
         let moved = GaitProblem { bounds: TunedBounds::of_array(values), ..problem.clone() };
-        let programme = moved.programme(problem.muscles).unwrap();
+        let program = moved.program(problem.muscles).unwrap();
         let x = &outcome.warm_start.point.x;
-        let excess = inter_node_excess(&programme, &outcome.gait, x).worst;
-        let tightened = programme.tightened(&outcome.warm_start.margins);
+        let excess = inter_node_excess(&program, &outcome.gait, x).worst;
+        let tightened = program.tightened(&outcome.warm_start.margins);
         let mut rows = vec![0.0; tightened.rows()];
         tightened.constraints(x, &mut rows);
         let (lower, upper) = tightened.stored_bounds();
         let beside = |value: f64, bound: f64, sign: f64| sign * (value - bound) / bound.abs().max(1.0);
         let of_bounds = x.iter().zip(lower).zip(upper).filter(|((_, low), high)| low < high);
         let of_bounds = of_bounds.map(|((x, low), high)| beside(*x, *low, 1.0).min(beside(*x, *high, -1.0)));
-        let clearances = programme.rows.domains.iter().flat_map(|domain| &domain.points).flat_map(|node| &node.heights);
+        let clearances = program.rows.domains.iter().flat_map(|domain| &domain.points).flat_map(|node| &node.heights);
         let of_rows = clearances.map(|height| rows[height.row] - tightened.rows.lower[height.row]);
         (of_bounds.chain(of_rows).fold(f64::INFINITY, f64::min), excess)
     }
@@ -290,11 +290,11 @@ mod tests {
         // As a gait that clears 0.03 m for another reason.
         problem.bounds.a5 = 0.01;
         point.slack_lower_multipliers.fill(0.0);
-        let programme = problem.programme(false).unwrap();
+        let program = problem.program(false).unwrap();
         let margins = &outcome.warm_start.margins;
         let gait = ConvergedGait {
             problem: &problem,
-            programme: &programme,
+            program: &program,
             margins,
             gait: &outcome.gait,
             point: &point,
@@ -324,10 +324,10 @@ mod tests {
         assert!(outcome.report.tightened_bounds > 0, "nothing was tightened");
         let loose = SolveOptions { initial_guesses: 1, tightening_rounds: 0, ..SolveOptions::default() };
         let at_nodes = solve(&problem, None, &loose, &mut |_| {}, &CancelToken::new()).unwrap();
-        let programme = problem.programme(false).unwrap();
+        let program = problem.program(false).unwrap();
         let gait = ConvergedGait {
             problem: &problem,
-            programme: &programme,
+            program: &program,
             margins: &Margins::default(),
             gait: &at_nodes.gait,
             point: &at_nodes.warm_start.point,

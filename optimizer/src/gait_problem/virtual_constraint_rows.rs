@@ -5,7 +5,7 @@
 //! SS1 `s = (dp - pa)/(pb - pa)` depends on the state.
 
 use super::layout::{DomainLayout, MAX_OUTPUTS, PointVariables, Q, QD, QDD};
-use super::program_data::{GaitProgramme, PointContext};
+use super::program_data::{GaitProgram, PointContext};
 use super::rows::PointRows;
 use super::sparse_entries::Entries;
 use crate::walking::{BEZIER_COEFFICIENTS, basis};
@@ -21,15 +21,11 @@ struct Phase {
 }
 
 /// Bezier coefficients of a domain, rad.
-fn coefficients(
-    programme: &GaitProgramme,
-    layout: &DomainLayout,
-    x: &[f64],
-) -> [[f64; BEZIER_COEFFICIENTS]; MAX_OUTPUTS] {
+fn coefficients(program: &GaitProgram, layout: &DomainLayout, x: &[f64]) -> [[f64; BEZIER_COEFFICIENTS]; MAX_OUTPUTS] {
     let mut alpha = [[0.0; BEZIER_COEFFICIENTS]; MAX_OUTPUTS];
     for j in 0..layout.outputs.len() {
         for i in 0..BEZIER_COEFFICIENTS {
-            alpha[j][i] = programme.layout.value(x, layout.bezier_coefficient(j, i));
+            alpha[j][i] = program.layout.value(x, layout.bezier_coefficient(j, i));
         }
     }
     alpha
@@ -40,7 +36,7 @@ fn dot(a: &[f64; BEZIER_COEFFICIENTS], b: &[f64; BEZIER_COEFFICIENTS]) -> f64 {
 }
 
 /// Width `pb - pa` of the phase and the phase itself.
-fn phase_of(programme: &GaitProgramme, context: &PointContext<'_>, point: &PointVariables, x: &[f64]) -> (Phase, f64) {
+fn phase_of(program: &GaitProgram, context: &PointContext<'_>, point: &PointVariables, x: &[f64]) -> (Phase, f64) {
     let layout = context.layout;
     match layout.phase_end {
         None => {
@@ -48,8 +44,8 @@ fn phase_of(programme: &GaitProgramme, context: &PointContext<'_>, point: &Point
             (Phase { s: layout.sigma(context.k), rate, acceleration: 0.0 }, 1.0)
         }
         Some(end) => {
-            let start = programme.layout.value(x, layout.phase_start);
-            let width = programme.layout.value(x, end) - start;
+            let start = program.layout.value(x, layout.phase_start);
+            let width = program.layout.value(x, end) - start;
             let [dp, dpd, dpdd] = context.hip_phase(point);
             (Phase { s: (dp - start) / width, rate: dpd / width, acceleration: dpdd / width }, width)
         }
@@ -58,7 +54,7 @@ fn phase_of(programme: &GaitProgramme, context: &PointContext<'_>, point: &Point
 
 /// Values.
 pub(super) fn values(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
@@ -66,9 +62,9 @@ pub(super) fn values(
     g: &mut [f64],
 ) {
     let layout = context.layout;
-    let (phase, _) = phase_of(programme, context, point, x);
+    let (phase, _) = phase_of(program, context, point, x);
     let b = basis(phase.s);
-    let alpha = coefficients(programme, layout, x);
+    let alpha = coefficients(program, layout, x);
     for (j, &output) in layout.outputs.iter().enumerate() {
         let (y0, y1, y2) = (dot(&alpha[j], &b[0]), dot(&alpha[j], &b[1]), dot(&alpha[j], &b[2]));
         g[rows.output_position + j] = point.q[output] - y0;
@@ -80,7 +76,7 @@ pub(super) fn values(
 
 /// Jacobian.
 pub(super) fn jacobian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
@@ -89,9 +85,9 @@ pub(super) fn jacobian(
     out: &mut Entries<'_>,
 ) {
     let layout = context.layout;
-    let (phase, width) = phase_of(programme, context, point, x);
+    let (phase, width) = phase_of(program, context, point, x);
     let b = basis(phase.s);
-    let alpha = coefficients(programme, layout, x);
+    let alpha = coefficients(program, layout, x);
     for (j, &output) in layout.outputs.iter().enumerate() {
         let y: [f64; 4] = std::array::from_fn(|r| dot(&alpha[j], &b[r]));
         let (row0, row1, row2) = (rows.output_position + j, rows.output_velocity + j, rows.output_acceleration + j);
@@ -145,7 +141,7 @@ pub(super) fn jacobian(
 /// Hessian.
 #[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &PointContext<'_>,
     rows: &PointRows,
     point: &PointVariables,
@@ -155,9 +151,9 @@ pub(super) fn hessian(
     out: &mut Entries<'_>,
 ) {
     let layout = context.layout;
-    let (phase, width) = phase_of(programme, context, point, x);
+    let (phase, width) = phase_of(program, context, point, x);
     let b = basis(phase.s);
-    let alpha = coefficients(programme, layout, x);
+    let alpha = coefficients(program, layout, x);
     let (v, a) = (phase.rate, phase.acceleration);
     let Some(end) = layout.phase_end else {
         let rate = v;

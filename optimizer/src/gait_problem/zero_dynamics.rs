@@ -5,24 +5,18 @@
 
 use super::hermite_simpson::{SLOPE, STATE};
 use super::layout::{Q, QD, QDD};
-use super::program_data::{DomainContext, GaitProgramme};
+use super::program_data::{DomainContext, GaitProgram};
 use super::rows::DomainRows;
 use super::sparse_entries::Entries;
 
 /// Values.
-pub(super) fn values(
-    programme: &GaitProgramme,
-    context: &DomainContext<'_>,
-    rows: &DomainRows,
-    x: &[f64],
-    g: &mut [f64],
-) {
+pub(super) fn values(program: &GaitProgram, context: &DomainContext<'_>, rows: &DomainRows, x: &[f64], g: &mut [f64]) {
     let layout = context.layout;
     if let Some(first) = rows.zero_dynamics {
         let h = context.duration / layout.intervals as f64;
         for interval in 0..layout.intervals {
             let z: [[f64; 3]; 3] = std::array::from_fn(|i| {
-                let point = programme.layout.point_variables(x, context.d, 2 * interval + i);
+                let point = program.layout.point_variables(x, context.d, 2 * interval + i);
                 context.phase.derivatives(&point)
             });
             for order in 0..2 {
@@ -35,14 +29,14 @@ pub(super) fn values(
         }
     }
     if let (Some(row), Some(end)) = (rows.phase_end, layout.phase_end) {
-        let point = programme.layout.point_variables(x, context.d, layout.last());
-        g[row] = context.phase.derivatives(&point)[0] - programme.layout.value(x, end);
+        let point = program.layout.point_variables(x, context.d, layout.last());
+        g[row] = context.phase.derivatives(&point)[0] - program.layout.value(x, end);
     }
 }
 
 /// Jacobian.
 pub(super) fn jacobian(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     context: &DomainContext<'_>,
     rows: &DomainRows,
     x: &[f64],
@@ -54,7 +48,7 @@ pub(super) fn jacobian(
         let h = context.duration / n;
         for interval in 0..layout.intervals {
             let z: [[f64; 3]; 3] = std::array::from_fn(|i| {
-                let point = programme.layout.point_variables(x, context.d, 2 * interval + i);
+                let point = program.layout.point_variables(x, context.d, 2 * interval + i);
                 context.phase.derivatives(&point)
             });
             for order in 0..2 {

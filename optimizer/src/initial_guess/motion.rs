@@ -3,7 +3,7 @@
 
 use super::GuessSettings;
 use crate::body::{InverseDynamics, PointState};
-use crate::gait_problem::{GaitProgramme, PointVariables};
+use crate::gait_problem::{GaitProgram, PointVariables};
 use crate::muscle::MUSCLE_COUNT;
 use crate::walking::{BEZIER_COEFFICIENTS, basis};
 use nalgebra::{DMatrix, DVector};
@@ -15,13 +15,13 @@ const ACCELERATION_LIMIT: f64 = 40.0;
 const DAMPING: f64 = 1e-3;
 
 /// Writes a motion through the postures `q[domain][node]` to a scaled vector of variables.
-pub fn guess(programme: &GaitProgramme, postures: &[Vec<[f64; 9]>], settings: &GuessSettings) -> Vec<f64> {
-    let layout = &programme.layout;
+pub fn guess(program: &GaitProgram, postures: &[Vec<[f64; 9]>], settings: &GuessSettings) -> Vec<f64> {
+    let layout = &program.layout;
     let mut x = vec![0.0; layout.variables];
     let put = |x: &mut [f64], index: usize, value: f64| x[index] = value / layout.scale[index];
     let speed = settings.stride_length_m / settings.stride_time_s;
     for (d, domain) in layout.domains.iter().enumerate() {
-        let share = programme.stride_fraction(d, 1.0) - programme.stride_fraction(d, 0.0);
+        let share = program.stride_fraction(d, 1.0) - program.stride_fraction(d, 0.0);
         let duration = share * settings.stride_time_s;
         put(&mut x, domain.duration, duration);
         let coefficients = fit(&postures[d]);
@@ -45,7 +45,7 @@ pub fn guess(programme: &GaitProgramme, postures: &[Vec<[f64; 9]>], settings: &G
                 point.qdd[coordinate] =
                     (along(2, coordinate) / (duration * duration)).clamp(-ACCELERATION_LIMIT, ACCELERATION_LIMIT);
             }
-            torques_and_forces(programme, d, &mut point);
+            torques_and_forces(program, d, &mut point);
             layout.set_point_variables(&mut x, d, k, &point);
         }
         for (j, &output) in domain.outputs.iter().enumerate() {
@@ -53,9 +53,9 @@ pub fn guess(programme: &GaitProgramme, postures: &[Vec<[f64; 9]>], settings: &G
                 put(&mut x, domain.bezier_coefficient(j, i), coefficients[output][i]);
             }
         }
-        put(&mut x, domain.phase_start, programme.hip_phase_of(d, &postures[d][0]));
+        put(&mut x, domain.phase_start, program.hip_phase_of(d, &postures[d][0]));
         if let Some(end) = domain.phase_end {
-            put(&mut x, end, programme.hip_phase_of(d, &postures[d][domain.last()]));
+            put(&mut x, end, program.hip_phase_of(d, &postures[d][domain.last()]));
         }
     }
     for i in 0..4 {
@@ -89,19 +89,19 @@ fn fit(postures: &[[f64; 9]]) -> [[f64; BEZIER_COEFFICIENTS]; 9] {
 }
 
 /// Torques and forces at a node by damped least squares of `M qdd + h = B u + J^T lambda`, clipped to their bounds.
-fn torques_and_forces(programme: &GaitProgramme, d: usize, point: &mut PointVariables) {
+fn torques_and_forces(program: &GaitProgram, d: usize, point: &mut PointVariables) {
     let state = PointState::new(&point.q, &point.qd, &point.qdd);
-    let motion = InverseDynamics::new(&programme.model).rows(&state);
-    let contacts = programme.layout.domains[d].contacts;
+    let motion = InverseDynamics::new(&program.model).rows(&state);
+    let contacts = program.layout.domains[d].contacts;
     let columns = 6 + contacts;
     // Unknowns are in units of 100 N m and 500 N.
     let mut matrix = DMatrix::<f64>::zeros(9, columns);
     for i in 0..6 {
         matrix[(3 + i, i)] = 100.0;
     }
-    for (c, contact) in programme.layout.domains[d].domain.contact_rows().into_iter().enumerate() {
+    for (c, contact) in program.layout.domains[d].domain.contact_rows().into_iter().enumerate() {
         let foot_point = crate::gait_problem::rows::foot_point_index(contact.point, contact.side);
-        let (_, gradient) = programme.foot_point_linearised(&state, foot_point, contact.axis);
+        let (_, gradient) = program.foot_point_linearised(&state, foot_point, contact.axis);
         for (i, value) in gradient.into_iter().enumerate() {
             matrix[(i, 6 + c)] = 500.0 * value;
         }
@@ -117,7 +117,7 @@ fn torques_and_forces(programme: &GaitProgramme, d: usize, point: &mut PointVari
     for i in 0..6 {
         point.u[i] = (100.0 * solution[i]).clamp(-100.0, 100.0);
     }
-    for (c, contact) in programme.layout.domains[d].domain.contact_rows().into_iter().enumerate() {
+    for (c, contact) in program.layout.domains[d].domain.contact_rows().into_iter().enumerate() {
         let value = 500.0 * solution[6 + c];
         point.force[c] = match contact.axis {
             crate::body::Axis::X => value.clamp(-200.0, 200.0),

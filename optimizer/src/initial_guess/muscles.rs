@@ -1,6 +1,6 @@
 //! The muscle states of the initial guess: forces by non-negative least squares, then tendon, fibre and activation.
 
-use crate::gait_problem::{GaitProgramme, PointVariables};
+use crate::gait_problem::{GaitProgram, PointVariables};
 use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
@@ -14,39 +14,39 @@ const FORCE_RANGE: (f64, f64) = (1e-3, 1.2);
 /// Tendon strain at F_max.
 const REFERENCE_STRAIN: f64 = 0.04;
 
-/// Converts a point without muscles (`x_plain` of `plain`) to the layout of `programme` and adds the muscle states. If
+/// Converts a point without muscles (`x_plain` of `plain`) to the layout of `program` and adds the muscle states. If
 /// no force distribution is found, the muscles are at rest.
-pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) -> Vec<f64> {
-    let mut x = programme.adopt_globals(plain, x_plain);
-    for (d, domain) in programme.layout.domains.iter().enumerate() {
+pub fn guess(program: &GaitProgram, plain: &GaitProgram, x_plain: &[f64]) -> Vec<f64> {
+    let mut x = program.adopt_globals(plain, x_plain);
+    for (d, domain) in program.layout.domains.iter().enumerate() {
         let mut points: Vec<PointVariables> =
             (0..domain.points).map(|k| plain.layout.point_variables(x_plain, d, k)).collect();
         let mut forces = Vec::with_capacity(points.len());
         for point in &mut points {
-            let force = distribute(&programme.muscles, point).unwrap_or([REST_FORCE; MUSCLE_COUNT]);
+            let force = distribute(&program.muscles, point).unwrap_or([REST_FORCE; MUSCLE_COUNT]);
             for m in 0..MUSCLE_COUNT {
-                let muscle = &programme.muscles[m];
+                let muscle = &program.muscles[m];
                 let tendon = muscle.slack_length_m * (1.0 + REFERENCE_STRAIN * force[m].sqrt());
                 point.fibre_length[m] =
                     ((muscle.unit_length(&point.q) - tendon) / muscle.optimal_length_m).clamp(0.35, 1.55);
             }
             forces.push(force);
         }
-        let step = programme.layout.value(&x, domain.duration) / (domain.points - 1) as f64;
+        let step = program.layout.value(&x, domain.duration) / (domain.points - 1) as f64;
         for k in 0..points.len() {
             let (before, after) = (k.saturating_sub(1), (k + 1).min(points.len() - 1));
             for m in 0..MUSCLE_COUNT {
-                let speed = 0.5 * programme.muscles[m].max_speed;
+                let speed = 0.5 * program.muscles[m].max_speed;
                 let change = points[after].fibre_length[m] - points[before].fibre_length[m];
                 let velocity = (change / (step * (after - before).max(1) as f64)).clamp(-speed, speed);
                 points[k].fibre_velocity[m] = velocity;
                 let capacity = force_length(points[k].fibre_length[m]).value
-                    * force_velocity(velocity / programme.muscles[m].max_speed).value;
+                    * force_velocity(velocity / program.muscles[m].max_speed).value;
                 points[k].activation[m] = (forces[k][m] / capacity.max(0.05)).clamp(0.01, 0.95);
             }
         }
         for (k, point) in points.iter().enumerate() {
-            programme.layout.set_point_variables(&mut x, d, k, point);
+            program.layout.set_point_variables(&mut x, d, k, point);
         }
     }
     x

@@ -7,7 +7,7 @@
 
 use super::GuessSettings;
 use crate::body::{Axis, PointState};
-use crate::gait_problem::GaitProgramme;
+use crate::gait_problem::GaitProgram;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
@@ -34,11 +34,11 @@ struct Instant {
 }
 
 /// The instants of the stride. The last node of a domain and the first node of the next one share an instant.
-fn instants(programme: &GaitProgramme) -> Vec<Instant> {
+fn instants(program: &GaitProgram) -> Vec<Instant> {
     let mut result: Vec<Instant> = Vec::new();
-    for (d, domain) in programme.layout.domains.iter().enumerate() {
+    for (d, domain) in program.layout.domains.iter().enumerate() {
         for k in 0..domain.points {
-            let fraction = programme.stride_fraction(d, domain.sigma(k));
+            let fraction = program.stride_fraction(d, domain.sigma(k));
             match result.last_mut() {
                 Some(last) if k == 0 && d > 0 => last.members.push((d, k)),
                 _ => result.push(Instant { members: vec![(d, k)], fraction }),
@@ -79,37 +79,37 @@ enum Rows {
 
 /// Coordinates of each node, `result[domain][node]`. They satisfy contacts and ranges as well as the bounds, and the
 /// linearisations before a cancellation, allow.
-pub fn solve(programme: &GaitProgramme, guess: &GuessSettings, cancel: &dyn Fn() -> bool) -> Vec<Vec<[f64; 9]>> {
-    let instants = instants(programme);
+pub fn solve(program: &GaitProgram, guess: &GuessSettings, cancel: &dyn Fn() -> bool) -> Vec<Vec<[f64; 9]>> {
+    let instants = instants(program);
     let stride = guess.stride_length_m;
     let speed = stride / guess.stride_time_s;
     let right_step = 0.5 * stride;
-    let toe_left = programme.model.left.toe_ahead_m;
+    let toe_left = program.model.left.toe_ahead_m;
     let targets: Vec<[f64; 9]> = instants
         .iter()
         .map(|instant| {
-            let mut reference = programme.reference_at(instant.fraction);
+            let mut reference = program.reference_at(instant.fraction);
             for knee in [2, 5] {
                 reference[knee] = reference[knee].clamp(0.05, 1.35);
             }
             let mut q = [0.0; 9];
             q[0] = -toe_left - 0.22 * stride + speed * instant.fraction * guess.stride_time_s;
             q[1] = 0.98
-                * (programme.model.left.thigh_length_m
-                    + programme.model.left.shank_length_m
-                    + programme.model.left.ankle_height_m);
+                * (program.model.left.thigh_length_m
+                    + program.model.left.shank_length_m
+                    + program.model.left.ankle_height_m);
             q[2..].copy_from_slice(&reference);
             q
         })
         .collect();
     let mut q = targets.clone();
-    let torso = programme.variable_range(programme.layout.domains[0].point(0) + 2);
+    let torso = program.variable_range(program.layout.domains[0].point(0) + 2);
     let mut rows = Rows::Hard;
     for pass in 0..PASSES {
         if cancel() {
             break;
         }
-        let step_with = |rows| linearised_step(programme, &instants, &targets, &q, right_step, stride, torso, rows);
+        let step_with = |rows| linearised_step(program, &instants, &targets, &q, right_step, stride, torso, rows);
         let mut step = step_with(rows);
         if step.is_none() && rows == Rows::Hard {
             rows = Rows::Soft;
@@ -128,7 +128,7 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings, cancel: &dyn Fn()
             break;
         }
     }
-    let mut result: Vec<Vec<[f64; 9]>> = programme.layout.domains.iter().map(|d| vec![[0.0; 9]; d.points]).collect();
+    let mut result: Vec<Vec<[f64; 9]>> = program.layout.domains.iter().map(|d| vec![[0.0; 9]; d.points]).collect();
     for (i, instant) in instants.iter().enumerate() {
         for &(d, k) in &instant.members {
             result[d][k] = q[i];
@@ -152,7 +152,7 @@ fn joint_range(coordinate: usize, torso: (f64, f64), hip_ankle: [(f64, f64); 9])
 /// The step of all nodes; `None` if the QP has no solution.
 #[allow(clippy::too_many_arguments)] // one call
 fn linearised_step(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     instants: &[Instant],
     targets: &[[f64; 9]],
     q: &[[f64; 9]],
@@ -203,7 +203,7 @@ fn linearised_step(
     let mut inequality = Triplets::default();
     let mut inequality_rhs = Vec::new();
     let ranges: [(f64, f64); 9] =
-        std::array::from_fn(|coordinate| programme.variable_range(programme.layout.domains[0].point(0) + coordinate));
+        std::array::from_fn(|coordinate| program.variable_range(program.layout.domains[0].point(0) + coordinate));
     for (i, instant) in instants.iter().enumerate() {
         let state = PointState::new(&q[i], &[0.0; 9], &[0.0; 9]);
         let last = i + 1 == count;
@@ -211,20 +211,20 @@ fn linearised_step(
         let within = !last;
         if within {
             for &(d, _) in &instant.members {
-                for (contact, target, foot_point) in programme.contact_targets_at(d, right_step, stride) {
+                for (contact, target, foot_point) in program.contact_targets_at(d, right_step, stride) {
                     let seen = grounded[foot_point] && contact.axis == Axis::Z;
                     let flat_x = contact.axis == Axis::X
                         && instant
                             .members
                             .iter()
-                            .any(|&(other, _)| other < d && programme.shares_contact(other, contact));
+                            .any(|&(other, _)| other < d && program.shares_contact(other, contact));
                     if seen || flat_x {
                         continue;
                     }
                     if contact.axis == Axis::Z {
                         grounded[foot_point] = true;
                     }
-                    let (position, gradient) = programme.foot_point_linearised(&state, foot_point, contact.axis);
+                    let (position, gradient) = program.foot_point_linearised(&state, foot_point, contact.axis);
                     let row = equality_rhs.len();
                     for (coordinate, value) in gradient.into_iter().enumerate() {
                         if value != 0.0 {
@@ -238,7 +238,7 @@ fn linearised_step(
                 if *on_ground {
                     continue;
                 }
-                let (height, gradient) = programme.foot_point_linearised(&state, foot_point, Axis::Z);
+                let (height, gradient) = program.foot_point_linearised(&state, foot_point, Axis::Z);
                 let row = inequality_rhs.len();
                 for (coordinate, value) in gradient.into_iter().enumerate() {
                     if value != 0.0 {

@@ -1,7 +1,8 @@
 //! Muscle parameters of a subject: the published table, scaled to the subject or overridden by measured values.
 
 use super::unit::{Joint, MUSCLE_COUNT, MUSCLES, Muscle};
-use crate::subject::{ModelError, Subject};
+use crate::model_error::ModelError;
+use crate::subject::Subject;
 use serde::{Deserialize, Serialize};
 
 /// Height and mass of the person in the published table (Geyer and Herr 2010).

@@ -1,7 +1,7 @@
 //! Heel strikes of a recording: given, by force, or by kinematics.
 
 use super::motion_recording::MotionRecording;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use std::ops::Range;
 
 /// The error if heel strikes cannot be detected by kinematics.

@@ -4,7 +4,7 @@ use super::heel_strikes::{HeelStrikes, ROUNDING_S};
 use super::motion_recording::MotionRecording;
 use super::plausibility::{no_walker, unlike_builtin};
 use super::reference_gait::{REFERENCE_ROWS, ReferenceGait, Walker};
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 
 /// Durations of valid strides, s.
 pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);

@@ -1,9 +1,9 @@
 //! A recording of joint angles over several strides, converted to the convention of the walker.
 
 use super::reference_gait::{LARGEST_ANGLE_RAD, REFERENCE_COLUMNS};
+use crate::model_error::ModelError;
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::statistics::extremes;
-use crate::subject::ModelError;
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 
 /// Index of the left knee among the angles of a reference gait.

@@ -1,8 +1,8 @@
 //! Plausibility of a mean stride: impossible curves are errors, unusual ones give a warning.
 
 use super::reference_gait::{REFERENCE_COLUMNS, ReferenceGait};
+use crate::model_error::ModelError;
 use crate::statistics::{average, correlation, extremes};
-use crate::subject::ModelError;
 
 /// Indices among the angles of a reference gait.
 const TORSO: usize = 0;

@@ -1,6 +1,7 @@
 //! A reference gait: mean joint angles over the gait cycle, and whose they are.
 
-use crate::subject::{ModelError, Subject};
+use crate::model_error::ModelError;
+use crate::subject::Subject;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 

@@ -1,6 +1,6 @@
 //! Active constraints of a solution, and how far a parameter can move until they change.
 
-use crate::gait_problem::GaitProgramme;
+use crate::gait_problem::GaitProgram;
 use interior_point::{NonlinearProgram, ParameterDerivative, WarmPoint};
 use serde::Serialize;
 
@@ -31,12 +31,12 @@ pub(super) struct ActiveSet {
 }
 
 impl ActiveSet {
-    pub(super) fn new(programme: &GaitProgramme, point: &WarmPoint) -> Self {
-        let (n, m) = (programme.variables(), programme.rows());
+    pub(super) fn new(program: &GaitProgram, point: &WarmPoint) -> Self {
+        let (n, m) = (program.variables(), program.rows());
         let (mut lower, mut upper) = (vec![0.0; n], vec![0.0; n]);
-        programme.variable_bounds(&mut lower, &mut upper);
+        program.variable_bounds(&mut lower, &mut upper);
         let (mut row_lower, mut row_upper) = (vec![0.0; m], vec![0.0; m]);
-        programme.row_bounds(&mut row_lower, &mut row_upper);
+        program.row_bounds(&mut row_lower, &mut row_upper);
         let mut sides = Vec::new();
         let mut note = |side: Side, distance: f64, multiplier: f64| {
             if distance.is_finite() {
@@ -119,7 +119,7 @@ fn multiplier_rate(side: Side, along: &WarmPoint) -> f64 {
 
 /// The active constraints that depend on the parameter, largest multiplier first.
 pub(super) fn of_parameter(
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     set: &ActiveSet,
     parameter: &ParameterDerivative,
 ) -> Vec<ActiveConstraint> {
@@ -128,9 +128,9 @@ pub(super) fn of_parameter(
         .filter(|(side, ..)| depends(*side, parameter))
         .map(|&(side, _, multiplier)| ActiveConstraint {
             place: if side.of_row {
-                programme.rows.names[side.index].label()
+                program.rows.names[side.index].label()
             } else {
-                programme.layout.variable_label(side.index).0
+                program.layout.variable_label(side.index).0
             },
             multiplier,
         })

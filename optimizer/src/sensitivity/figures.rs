@@ -1,7 +1,7 @@
 //! Derivatives of the figures of a gait along a direction of its variables.
 
 use crate::gait::Gait;
-use crate::gait_problem::{GaitProblem, GaitProgramme, gait_of};
+use crate::gait_problem::{GaitProblem, GaitProgram, gait_of};
 use crate::solve::GaitFigures;
 use interior_point::Sensitivity;
 use serde::Serialize;
@@ -30,12 +30,7 @@ pub struct FigureDerivatives {
 
 impl FigureDerivatives {
     /// The derivatives along a sensitivity of the point `x`.
-    pub(super) fn along(
-        problem: &GaitProblem,
-        programme: &GaitProgramme,
-        x: &[f64],
-        sensitivity: &Sensitivity,
-    ) -> Self {
+    pub(super) fn along(problem: &GaitProblem, program: &GaitProgram, x: &[f64], sensitivity: &Sensitivity) -> Self {
         let direction = &sensitivity.point.x;
         let largest = direction.iter().fold(0.0, |most: f64, change| most.max(change.abs()));
         if largest == 0.0 {
@@ -44,8 +39,8 @@ impl FigureDerivatives {
         let step = LARGEST_CHANGE / largest;
         let at = |step: f64| {
             let moved: Vec<f64> = x.iter().zip(direction).map(|(x, change)| x + step * change).collect();
-            let gait = gait_of(problem, programme, &moved);
-            (GaitFigures::of_well_formed(&gait, &programme.model, &problem.reference), extreme_angles(&gait))
+            let gait = gait_of(problem, program, &moved);
+            (GaitFigures::of_well_formed(&gait, &program.model, &problem.reference), extreme_angles(&gait))
         };
         let ((more, more_angles), (less, less_angles)) = (at(step), at(-step));
         let rate = |more: f64, less: f64| (more - less) / (2.0 * step);

@@ -3,9 +3,9 @@
 use super::active::{self, ActiveSet};
 use super::figures::FigureDerivatives;
 use super::{BoundSensitivity, GaitSensitivityError};
-use crate::gait_problem::{GaitProblem, GaitProgramme, gait_of};
+use crate::gait_problem::{GaitProblem, GaitProgram, gait_of};
+use crate::model_error::ModelError;
 use crate::solve::{GaitFigures, SolveError, WarmStart, check_shape};
-use crate::subject::ModelError;
 use crate::tuned_bounds::TunedBounds;
 use interior_point::{NlpSettings, NonlinearProgram, ParameterDerivative, Sensitivity};
 
@@ -13,9 +13,9 @@ use interior_point::{NlpSettings, NonlinearProgram, ParameterDerivative, Sensiti
 /// bounds, so that differences are exact up to rounding.
 const STEP: f64 = 1e-6;
 
-/// The programme at a solution, how it depends on each tuned bound, and how the solution follows.
+/// The program at a solution, how it depends on each tuned bound, and how the solution follows.
 pub(super) struct PointSensitivities {
-    pub(super) programme: GaitProgramme,
+    pub(super) program: GaitProgram,
     parameters: Vec<ParameterDerivative>,
     sensitivities: Vec<Sensitivity>,
 }
@@ -26,45 +26,45 @@ impl PointSensitivities {
         solution: &WarmStart,
         settings: &NlpSettings,
     ) -> Result<Self, GaitSensitivityError> {
-        let programme = problem.programme(problem.muscles).map_err(SolveError::from)?;
+        let program = problem.program(problem.muscles).map_err(SolveError::from)?;
         if solution.muscles != problem.muscles || solution.mesh != problem.settings.mesh {
             return Err(SolveError::WarmStartShape("it has another variant or mesh than the problem".to_owned()).into());
         }
-        check_shape(&programme, solution)?;
-        let programme = programme.tightened(&solution.margins);
+        check_shape(&program, solution)?;
+        let program = program.tightened(&solution.margins);
         let parameters: Result<Vec<_>, ModelError> =
-            (0..TunedBounds::COUNT).map(|bound| parameter(problem, &programme, solution, bound)).collect();
+            (0..TunedBounds::COUNT).map(|bound| parameter(problem, &program, solution, bound)).collect();
         let parameters = parameters.map_err(SolveError::from)?;
-        let sensitivities = interior_point::sensitivities(&programme, &solution.point, settings, &parameters)?;
-        Ok(Self { programme, parameters, sensitivities })
+        let sensitivities = interior_point::sensitivities(&program, &solution.point, settings, &parameters)?;
+        Ok(Self { program, parameters, sensitivities })
     }
 
     /// Mechanical cost of transport of the solution.
     pub(super) fn cost_of_transport(&self, problem: &GaitProblem, solution: &WarmStart) -> f64 {
-        let gait = gait_of(problem, &self.programme, &solution.point.x);
-        GaitFigures::of_well_formed(&gait, &self.programme.model, &problem.reference).cost_of_transport
+        let gait = gait_of(problem, &self.program, &solution.point.x);
+        GaitFigures::of_well_formed(&gait, &self.program.model, &problem.reference).cost_of_transport
     }
 
     pub(super) fn of_bound(&self, problem: &GaitProblem, solution: &WarmStart, bound: usize) -> BoundSensitivity {
         let (parameter, sensitivity) = (&self.parameters[bound], &self.sensitivities[bound]);
         let value = problem.bounds.to_array()[bound];
-        let set = ActiveSet::new(&self.programme, &solution.point);
+        let set = ActiveSet::new(&self.program, &solution.point);
         let (back, forth) = set.steps(parameter, &sensitivity.point);
         BoundSensitivity {
             bound: TunedBounds::NAMES[bound],
             value,
-            active: active::of_parameter(&self.programme, &set, parameter),
-            derivatives: FigureDerivatives::along(problem, &self.programme, &solution.point.x, sensitivity),
+            active: active::of_parameter(&self.program, &set, parameter),
+            derivatives: FigureDerivatives::along(problem, &self.program, &solution.point.x, sensitivity),
             interval: (back.map(|step| value + step), forth.map(|step| value + step)),
             is_weakly_active: set.is_weak(parameter),
         }
     }
 }
 
-/// The derivatives of the programme with respect to a tuned bound.
+/// The derivatives of the program with respect to a tuned bound.
 fn parameter(
     problem: &GaitProblem,
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     solution: &WarmStart,
     bound: usize,
 ) -> Result<ParameterDerivative, ModelError> {
@@ -77,7 +77,7 @@ fn parameter(
         let mut values = problem.bounds.to_array();
         values[bound] = to;
         let bounds = TunedBounds::from_array(values)?;
-        let moved = GaitProblem { bounds, ..problem.clone() }.programme(problem.muscles)?;
+        let moved = GaitProblem { bounds, ..problem.clone() }.program(problem.muscles)?;
         Ok(Parts::new(&moved.tightened(&solution.margins), solution))
     };
     let (more, less) = (moved(most)?, moved(least)?);
@@ -94,11 +94,11 @@ fn parameter(
         row_lower: difference(|parts| &parts.row_lower),
         row_upper: difference(|parts| &parts.row_upper),
         // The objective does not depend on tuned bounds.
-        ..ParameterDerivative::zeros(programme.variables(), programme.rows())
+        ..ParameterDerivative::zeros(program.variables(), program.rows())
     })
 }
 
-/// The parts of a programme that can depend on a tuned bound, at the point of a solution.
+/// The parts of a program that can depend on a tuned bound, at the point of a solution.
 struct Parts {
     lagrangian_gradient: Vec<f64>,
     rows: Vec<f64>,
@@ -109,8 +109,8 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(programme: &GaitProgramme, solution: &WarmStart) -> Self {
-        let (n, m) = (programme.variables(), programme.rows());
+    fn new(program: &GaitProgram, solution: &WarmStart) -> Self {
+        let (n, m) = (program.variables(), program.rows());
         let (x, y) = (&solution.point.x, &solution.point.row_multipliers);
         let zeros = |length| vec![0.0; length];
         let mut parts = Self {
@@ -121,13 +121,13 @@ impl Parts {
             row_lower: zeros(m),
             row_upper: zeros(m),
         };
-        programme.variable_bounds(&mut parts.lower, &mut parts.upper);
-        programme.row_bounds(&mut parts.row_lower, &mut parts.row_upper);
-        programme.constraints(x, &mut parts.rows);
-        programme.gradient(x, &mut parts.lagrangian_gradient);
-        let pattern = programme.jacobian_pattern();
+        program.variable_bounds(&mut parts.lower, &mut parts.upper);
+        program.row_bounds(&mut parts.row_lower, &mut parts.row_upper);
+        program.constraints(x, &mut parts.rows);
+        program.gradient(x, &mut parts.lagrangian_gradient);
+        let pattern = program.jacobian_pattern();
         let mut jacobian = zeros(pattern.row_indices.len());
-        programme.jacobian(x, &mut jacobian);
+        program.jacobian(x, &mut jacobian);
         for j in 0..n {
             for q in pattern.column_starts[j]..pattern.column_starts[j + 1] {
                 parts.lagrangian_gradient[j] += jacobian[q] * y[pattern.row_indices[q]];

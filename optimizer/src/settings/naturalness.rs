@@ -3,7 +3,7 @@
 //! The range of walking speeds and the shortest double support are limits ([`super::GaitLimits`]). `examples/naturalness.rs`
 //! measures the effect of each.
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Naturalness terms beyond the paper.

@@ -34,17 +34,17 @@ pub(super) struct Candidate {
 impl Candidate {
     /// Measures the residuals after projection into the bounds, because the solver relaxes bounds by 1e-8.
     pub(super) fn new(context: &SolveContext<'_>, mut result: NlpResult) -> Self {
-        let programme = context.programme;
-        programme.project_into_bounds(&mut result.x);
-        let gait = gait_of(context.problem, programme, &result.x);
-        let violation = programme.violations(&result.x).first().map_or(0.0, |v| v.amount);
+        let program = context.program;
+        program.project_into_bounds(&mut result.x);
+        let gait = gait_of(context.problem, program, &result.x);
+        let violation = program.violations(&result.x).first().map_or(0.0, |v| v.amount);
         let mut status = SolveStatus::from(result.status);
         let met = violation <= CONVERGED_VIOLATION; // False for NaN.
         if status == SolveStatus::Converged && !met {
             status = SolveStatus::Stalled;
         }
         Self {
-            objective: programme.objective(&result.x),
+            objective: program.objective(&result.x),
             rmse: gait_rmse(&gait, &context.problem.reference).total,
             violation,
             status,
@@ -115,9 +115,9 @@ pub(super) fn try_warm(
         margins = Margins::default();
     }
     let result = if margins.is_empty() {
-        run.warm(SolvePhase::Cost, context.programme, point)
+        run.warm(SolvePhase::Cost, context.program, point)
     } else {
-        run.warm(SolvePhase::InterNode, &context.programme.tightened(&margins), point)
+        run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)
     }?;
     Ok(Tried::new(context, result, strategy, margins, &run))
 }
@@ -151,7 +151,7 @@ pub(super) fn enforce_between_nodes(
         if now.candidate.status != SolveStatus::Converged {
             break;
         }
-        let excess = inter_node_excess(context.programme, &now.candidate.gait, &now.candidate.result.x);
+        let excess = inter_node_excess(context.program, &now.candidate.gait, &now.candidate.result.x);
         if excess.worst <= 1.0 {
             break;
         }
@@ -160,7 +160,7 @@ pub(super) fn enforce_between_nodes(
         let point = now.candidate.result.warm_point();
         let mut run = AttemptRun::new(context, context.options.threads, observer);
         run.guess = tried.len();
-        let result = run.warm(SolvePhase::InterNode, &context.programme.tightened(&margins), point)?;
+        let result = run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)?;
         let mut next = Tried::new(context, result, "bounds tightened between nodes", margins, &run);
         next.attempt.basin = tried[chosen].attempt.basin.filter(|_| next.candidate.status == SolveStatus::Converged);
         let status = next.candidate.status;

@@ -1,6 +1,6 @@
 //! Errors of a solve.
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use interior_point::NlpError;
 use thiserror::Error;
 

@@ -5,9 +5,9 @@ use crate::body::WalkerModel;
 use crate::gait::{DomainTrajectory, Gait};
 use crate::gait_problem::objective::{cost_of_transport, mean_power};
 use crate::gait_rmse::gait_rmse;
+use crate::model_error::ModelError;
 use crate::quadrature::simpson;
 use crate::reference::ReferenceGait;
-use crate::subject::ModelError;
 
 /// Relative tolerance between two computations of a figure, which may run on different processors.
 const ROUNDING: f64 = 1e-9;

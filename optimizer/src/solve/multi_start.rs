@@ -1,9 +1,9 @@
 //! Multi-start: the initial guesses of a cold start. There are several because the problem has several local optima.
 
 use crate::gait_problem::program_data::{EVEN_TIMING, StrideTiming};
-use crate::gait_problem::{GaitProblem, GaitProgramme};
+use crate::gait_problem::{GaitProblem, GaitProgram};
 use crate::initial_guess::{self, GuessSettings};
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use interior_point::{BarrierStrategy, NlpSettings};
 use serde::{Deserialize, Serialize};
 
@@ -228,9 +228,9 @@ impl InitialGuess {
         &self,
         tracked: &GaitProblem,
         cancel: &dyn Fn() -> bool,
-    ) -> Result<(GaitProgramme, Vec<f64>), ModelError> {
+    ) -> Result<(GaitProgram, Vec<f64>), ModelError> {
         let settings = self.settings();
-        let plain = tracked.programme(false)?.with_timing(&self.timing.fractions());
+        let plain = tracked.program(false)?.with_timing(&self.timing.fractions());
         let postures = initial_guess::posture::solve(&plain, &settings, cancel);
         let first = initial_guess::motion::guess(&plain, &postures, &settings);
         Ok((plain, first))

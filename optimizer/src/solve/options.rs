@@ -2,7 +2,7 @@
 
 use super::multi_start::InitialGuess;
 use super::solver_settings;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use interior_point::NlpSettings;
 use serde::{Deserialize, Serialize};
 

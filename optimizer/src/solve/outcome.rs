@@ -8,7 +8,7 @@ use super::report::{
 };
 use super::warm_start::WarmStart;
 use crate::gait_problem::margins::Margins;
-use crate::gait_problem::{ConvergedGait, GaitProgramme, RowViolation};
+use crate::gait_problem::{ConvergedGait, GaitProgram, RowViolation};
 use interior_point::{NlpResult, NonlinearProgram};
 
 /// Total cost of the attempts of a solve.
@@ -31,16 +31,16 @@ pub(super) fn outcome(
     tally: SolveTally,
     started_from: StartedFrom,
 ) -> SolveOutcome {
-    let (problem, programme) = (context.problem, context.programme);
+    let (problem, program) = (context.problem, context.program);
     let Candidate { result, gait, status, .. } = candidate;
     let x = &result.x;
-    let figures = GaitFigures::of_well_formed(&gait, &programme.model, &problem.reference);
-    let margins = margins.bearing_on(programme, x);
-    let violations = programme.violations(x);
+    let figures = GaitFigures::of_well_formed(&gait, &program.model, &problem.reference);
+    let margins = margins.bearing_on(program, x);
+    let violations = program.violations(x);
     let warm_start = warm_start(context, &result, margins);
     let converged = ConvergedGait {
         problem,
-        programme,
+        program,
         margins: &warm_start.margins,
         gait: &gait,
         point: &warm_start.point,
@@ -48,12 +48,12 @@ pub(super) fn outcome(
         checks_between_nodes: context.options.tightening_rounds > 0,
     };
     let unchanged_bounds = if status == SolveStatus::Converged { converged.unchanged_bounds() } else { Vec::new() };
-    let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
+    let equalities = (0..program.rows()).filter(|&r| program.rows.lower[r] == program.rows.upper[r]).count();
     let report = SolveReport {
         status,
         started_from,
         iterations: tally.iterations,
-        objective: programme.objective(x),
+        objective: program.objective(x),
         cost_of_transport: figures.cost_of_transport,
         gait_rmse_rad: figures.gait_rmse_rad,
         gait_rmse_parts_rad: figures.gait_rmse_parts_rad,
@@ -70,9 +70,9 @@ pub(super) fn outcome(
         seconds_evaluation: tally.evaluation_s,
         seconds_linear_algebra: tally.linear_algebra.seconds(),
         linear_algebra: Some(tally.linear_algebra),
-        variables: programme.variables(),
+        variables: program.variables(),
         equalities,
-        inequalities: programme.rows() - equalities,
+        inequalities: program.rows() - equalities,
         speed_m_s: figures.speed_m_s,
         stride_length_m: figures.stride_length_m,
         durations_s: figures.durations_s,
@@ -82,7 +82,7 @@ pub(super) fn outcome(
     let violations = if status == SolveStatus::Converged {
         Vec::new()
     } else {
-        violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
+        violations.iter().take(MAX_VIOLATIONS).map(|v| describe(program, v)).collect()
     };
     SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
 }
@@ -108,14 +108,14 @@ fn warm_start(context: &SolveContext<'_>, result: &NlpResult, margins: Margins) 
     WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point(), margins }
 }
 
-fn describe(programme: &GaitProgramme, violation: &RowViolation) -> Violation {
+fn describe(program: &GaitProgram, violation: &RowViolation) -> Violation {
     if let Some(row) = violation.row {
-        let name = &programme.rows.names[row];
+        let name = &program.rows.names[row];
         let (_, unit, scale) = name.kind.description();
         Violation { row: name.label(), amount: violation.amount * scale, unit: unit.to_owned() }
     } else {
         let variable = violation.variable.unwrap_or(0);
-        let (label, unit) = programme.layout.variable_label(variable);
-        Violation { row: label, amount: violation.amount * programme.layout.scale[variable], unit: unit.to_owned() }
+        let (label, unit) = program.layout.variable_label(variable);
+        Violation { row: label, amount: violation.amount * program.layout.scale[variable], unit: unit.to_owned() }
     }
 }

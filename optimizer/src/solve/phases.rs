@@ -3,9 +3,10 @@
 use super::error::SolveError;
 use super::multi_start::{InitialGuess, MuscleRoute};
 use super::options::SolveOptions;
-use super::progress::{CancelToken, IterationRecord, SolvePhase};
+use super::progress::{IterationRecord, SolvePhase};
 use super::report::{CONVERGED_VIOLATION, LinearAlgebra};
-use crate::gait_problem::{GaitProblem, GaitProgramme};
+use crate::cancel_token::CancelToken;
+use crate::gait_problem::{GaitProblem, GaitProgram};
 use crate::initial_guess;
 use interior_point::{
     NlpCounts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, Residuals, StartPoint, Timing, WarmPoint,
@@ -41,7 +42,7 @@ const PLAIN_BARRIER_SHARE: f64 = 0.1;
 #[derive(Clone, Copy)]
 pub(super) struct SolveContext<'a> {
     pub(super) problem: &'a GaitProblem,
-    pub(super) programme: &'a GaitProgramme,
+    pub(super) program: &'a GaitProgram,
     pub(super) options: &'a SolveOptions,
     pub(super) cancel: &'a CancelToken,
     pub(super) started: Instant,
@@ -89,7 +90,7 @@ impl<'a> AttemptRun<'a> {
     fn phase(
         &mut self,
         phase: SolvePhase,
-        programme: &GaitProgramme,
+        program: &GaitProgram,
         start: &StartPoint,
         settings: &NlpSettings,
     ) -> Result<NlpResult, SolveError> {
@@ -110,7 +111,7 @@ impl<'a> AttemptRun<'a> {
         let (before, guess) = (self.iterations, self.guess);
         let observer = &mut *self.observer;
         let result = interior_point::solve(
-            programme,
+            program,
             start,
             &settings,
             &mut |record| {
@@ -131,7 +132,7 @@ impl<'a> AttemptRun<'a> {
             // The starting point is unusable.
             Err(error @ (NlpError::EvaluationFailed { .. } | NlpError::InvalidStart(_))) => {
                 self.reason = error.to_string();
-                return Ok(stuck(programme, start));
+                return Ok(stuck(program, start));
             }
             other => other?,
         };
@@ -148,7 +149,7 @@ impl<'a> AttemptRun<'a> {
 
     /// The tracking phases, by the route of the guess, then the cost phase.
     pub(super) fn cold(&mut self, guess: &InitialGuess) -> Result<NlpResult, SolveError> {
-        let (problem, programme) = (self.context.problem, self.context.programme);
+        let (problem, program) = (self.context.problem, self.context.program);
         let tracked_problem = guess.tracked(problem);
         let (plain, first) = guess.begin(&tracked_problem, &|| self.context.cancel.is_cancelled())?;
         let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..self.context.options.solver };
@@ -170,15 +171,15 @@ impl<'a> AttemptRun<'a> {
                 let settings = NlpSettings { mu_initial: MU_COST, ..rough };
                 tracked = self.phase(SolvePhase::PlainCost, &plain, &StartPoint::Cold(tracked.x), &settings)?;
             }
-            let with_muscles = initial_guess::muscles::guess(programme, &plain, &tracked.x);
+            let with_muscles = initial_guess::muscles::guess(program, &plain, &tracked.x);
             if Self::interrupted(&tracked) {
-                return Ok(blank(programme, with_muscles, tracked));
+                return Ok(blank(program, with_muscles, tracked));
             }
             if guess.route == MuscleRoute::MuscleTracking {
                 tracked = self.phase(
                     SolvePhase::MuscleTracking,
                     &tracked_problem
-                        .programme(true)?
+                        .program(true)?
                         .with_timing(&guess.timing.fractions())
                         .for_tracking(TRACKING_WEIGHT),
                     &StartPoint::Cold(with_muscles),
@@ -198,7 +199,7 @@ impl<'a> AttemptRun<'a> {
             // million times in short domains.
             usual.bound_push = WARM_PUSH;
         }
-        self.phase(SolvePhase::Cost, programme, &StartPoint::Cold(tracked.x), &guess.strategy.applied(&usual))
+        self.phase(SolvePhase::Cost, program, &StartPoint::Cold(tracked.x), &guess.strategy.applied(&usual))
     }
 
     /// Starts with the mean complementarity of the point as barrier parameter. Larger and smaller values take more
@@ -206,12 +207,12 @@ impl<'a> AttemptRun<'a> {
     pub(super) fn warm(
         &mut self,
         phase: SolvePhase,
-        programme: &GaitProgramme,
+        program: &GaitProgram,
         point: WarmPoint,
     ) -> Result<NlpResult, SolveError> {
         self.phase(
             phase,
-            programme,
+            program,
             &StartPoint::Warm(point),
             &NlpSettings {
                 mu_initial: MU_COST,
@@ -243,7 +244,7 @@ pub(crate) fn final_settings(options: &SolveOptions) -> NlpSettings {
 }
 
 /// The result of a solve that ended at its starting point.
-fn stuck(programme: &GaitProgramme, start: &StartPoint) -> NlpResult {
+fn stuck(program: &GaitProgram, start: &StartPoint) -> NlpResult {
     let x = match start {
         StartPoint::Cold(x) => x.clone(),
         StartPoint::Warm(warm) => warm.x.clone(),
@@ -266,13 +267,13 @@ fn stuck(programme: &GaitProgramme, start: &StartPoint) -> NlpResult {
         counts: NlpCounts::default(),
         timing: Timing::default(),
     };
-    blank(programme, x, nothing)
+    blank(program, x, nothing)
 }
 
-/// A result with the dimensions of `programme` and multipliers without information.
+/// A result with the dimensions of `program` and multipliers without information.
 #[allow(clippy::needless_pass_by_value)] // The replaced vectors are not needed any more.
-fn blank(programme: &GaitProgramme, x: Vec<f64>, result: NlpResult) -> NlpResult {
-    let (n, m) = (programme.variables(), programme.rows());
+fn blank(program: &GaitProgram, x: Vec<f64>, result: NlpResult) -> NlpResult {
+    let (n, m) = (program.variables(), program.rows());
     NlpResult {
         x,
         row_multipliers: vec![0.0; m],

@@ -1,8 +1,6 @@
-//! Progress and cancellation of a solve.
+//! Progress of a solve.
 
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The record of an iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -41,23 +39,4 @@ pub enum SolvePhase {
     /// Minimisation of the cost of transport with tightened bounds.
     #[serde(alias = "between_points")] // the name in progress of older records
     InterNode,
-}
-
-/// Cancels a solve from another thread, within one iteration.
-#[derive(Debug, Clone, Default)]
-pub struct CancelToken(Arc<AtomicBool>);
-
-impl CancelToken {
-    /// A token without cancellation.
-    pub fn new() -> Self {
-        Self::default()
-    }
-    /// Cancels every solve with this token.
-    pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-    /// Whether [`Self::cancel`] was called.
-    pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
 }

@@ -3,7 +3,7 @@
 //! The phases of a solve determine the others from the options and the initial guess: tolerances, limits, barrier
 //! parameter and strategy, distance of the first point from its bounds, threshold of the curvature, and threads.
 
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use interior_point::{BoundMultiplierStart, NlpSettings};
 use serde::de::Error as _;
 use serde::ser::Error as _;

@@ -2,7 +2,7 @@
 
 use super::error::SolveError;
 use crate::gait_problem::margins::Margins;
-use crate::gait_problem::{GaitProblem, GaitProgramme, mesh_transfer};
+use crate::gait_problem::{GaitProblem, GaitProgram, mesh_transfer};
 use crate::settings::Mesh;
 use interior_point::{NonlinearProgram, WarmPoint};
 use serde::{Deserialize, Serialize};
@@ -29,13 +29,13 @@ pub(super) struct MeshStart {
     pub(super) strategy: &'static str,
 }
 
-/// Converts a warm start to the mesh of `programme`. Margins belong to a mesh and are dropped on another one.
+/// Converts a warm start to the mesh of `program`. Margins belong to a mesh and are dropped on another one.
 ///
 /// # Errors
 /// [`SolveError::WarmStartShape`] if variant or dimensions differ.
 pub(super) fn on_mesh_of(
     problem: &GaitProblem,
-    programme: &GaitProgramme,
+    program: &GaitProgram,
     warm: &WarmStart,
 ) -> Result<MeshStart, SolveError> {
     if warm.muscles != problem.muscles {
@@ -46,23 +46,23 @@ pub(super) fn on_mesh_of(
         )));
     }
     if warm.mesh == problem.settings.mesh {
-        check_shape(programme, warm)?;
+        check_shape(program, warm)?;
         return Ok(MeshStart { point: warm.point.clone(), margins: warm.margins.clone(), strategy: "warm start" });
     }
     let mut of_its_mesh = problem.clone();
     of_its_mesh.settings.mesh = warm.mesh;
-    let own = of_its_mesh.programme(problem.muscles)?;
+    let own = of_its_mesh.program(problem.muscles)?;
     check_shape(&own, warm)?;
     Ok(MeshStart {
-        point: mesh_transfer::transfer(&own, programme, &warm.point),
+        point: mesh_transfer::transfer(&own, program, &warm.point),
         margins: Margins::default(),
         strategy: "warm start from another mesh",
     })
 }
 
-pub(crate) fn check_shape(programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveError> {
+pub(crate) fn check_shape(program: &GaitProgram, warm: &WarmStart) -> Result<(), SolveError> {
     let point = &warm.point;
-    let (n, m) = (programme.variables(), programme.rows());
+    let (n, m) = (program.variables(), program.rows());
     for (name, found, expected) in [
         ("variables", point.x.len(), n),
         ("lower multipliers", point.lower_multipliers.len(), n),

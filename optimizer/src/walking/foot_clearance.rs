@@ -5,7 +5,7 @@ use super::domain::{CYCLE, DomainKind};
 use super::stick_figure::stick_figure;
 use crate::body::{Side, WalkerModel};
 use crate::gait::Gait;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 
 /// The profile `(4 w (1 - w))^2` with its first two derivatives.
 pub(crate) fn clearance_profile(w: f64) -> [f64; 3] {

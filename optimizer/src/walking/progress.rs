@@ -3,8 +3,8 @@
 use super::{CYCLE, phase_gradient};
 use crate::body::WalkerModel;
 use crate::gait::Gait;
+use crate::model_error::ModelError;
 use crate::quadrature::simpson;
-use crate::subject::ModelError;
 
 /// Phase and hip velocity at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::body::{FootPoint, PointState, Side, WalkerModel};
 use crate::gait::Gait;
-use crate::subject::ModelError;
+use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Joint positions (x forward, z up, m) at one instant.

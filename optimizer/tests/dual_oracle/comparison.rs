@@ -7,7 +7,7 @@ use crate::rows::{self, Problem};
 use crate::walker::Walker;
 use crate::{Scalar, domains, muscles, variables};
 use gait_optimizer::gait_problem::row_names::RowPlace;
-use gait_optimizer::gait_problem::{GaitProgramme, RowKind, RowName};
+use gait_optimizer::gait_problem::{GaitProgram, RowKind, RowName};
 use gait_optimizer::settings::Regularisation;
 use gait_optimizer::{Device, GaitSettings, Mesh, ReferenceGait, Subject, TunedBounds};
 use interior_point::{NonlinearProgram, SparsityPattern};
@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, HashMap};
 /// A problem in both implementations.
 struct Pair {
     name: String,
-    production: GaitProgramme,
+    production: GaitProgram,
     problem: Problem,
     weights: Weights,
     reference: Vec<Vec<[f64; 7]>>,
@@ -37,7 +37,7 @@ impl Pair {
         let bounds = TunedBounds { a5, ..TunedBounds::default() };
         let gait = ReferenceGait::builtin().unwrap();
         let mut production =
-            GaitProgramme::new(&person, &Device::ampro3().unwrap(), &bounds, muscles, &settings, &gait).unwrap();
+            GaitProgram::new(&person, &Device::ampro3().unwrap(), &bounds, muscles, &settings, &gait).unwrap();
         production.weights.tracking = 0.7;
         let (height, mass) = [(1.727, 65.7), (1.803, 75.0)][subject as usize - 1];
         let mut pair = Self {

@@ -4,7 +4,7 @@ use crate::random::Random;
 use crate::walker::{GRAVITY, State, Walker};
 use gait_optimizer::body::{InverseDynamics, PointState, WalkerModel};
 use gait_optimizer::gait_problem::row_names::RowPlace;
-use gait_optimizer::gait_problem::{GaitProgramme, PointVariables, RowKind};
+use gait_optimizer::gait_problem::{GaitProgram, PointVariables, RowKind};
 use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
 use interior_point::NonlinearProgram;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -216,8 +216,8 @@ fn unforced_motion_about_a_fixed_toe_conserves_energy() {
     }
 }
 
-fn programme(subject: u32) -> GaitProgramme {
-    GaitProgramme::new(
+fn program(subject: u32) -> GaitProgram {
+    GaitProgram::new(
         &Subject::builtin(subject).unwrap(),
         &Device::ampro3().unwrap(),
         &TunedBounds::default(),
@@ -242,8 +242,8 @@ fn standing() -> PointVariables {
 }
 
 /// The (row, component) of a kind at a point or transition.
-fn rows_of(programme: &GaitProgramme, place: RowPlace, kind: RowKind) -> Vec<(usize, usize)> {
-    let names = programme.rows.names.iter().enumerate();
+fn rows_of(program: &GaitProgram, place: RowPlace, kind: RowKind) -> Vec<(usize, usize)> {
+    let names = program.rows.names.iter().enumerate();
     names.filter(|(_, n)| n.place == place && n.kind == kind).map(|(i, n)| (i, n.component)).collect()
 }
 
@@ -251,7 +251,7 @@ fn rows_of(programme: &GaitProgramme, place: RowPlace, kind: RowKind) -> Vec<(us
 fn impacts_are_plastic_lose_energy_and_balance_momentum() {
     let mut random = Random::new(4);
     for (subject, twin) in (1..).zip(twins()) {
-        let programme = programme(subject);
+        let program = program(subject);
         // The contacts after right heel strike: right heel, left toe.
         let contacts = [(2, 0), (2, 1), (1, 0), (1, 1)];
         for _ in 0..20 {
@@ -287,7 +287,7 @@ fn impacts_are_plastic_lose_energy_and_balance_momentum() {
             close("moment of the impulses", p1[2] - p0[2], moment, 1e-8);
 
             // The rows of the gait problem vanish, and detect a wrong impulse.
-            let layout = &programme.layout;
+            let layout = &program.layout;
             let mut x = vec![0.0; layout.variables];
             for domain in &layout.domains {
                 x[domain.duration] = 1.0;
@@ -303,16 +303,16 @@ fn impacts_are_plastic_lose_energy_and_balance_momentum() {
             for c in 0..4 {
                 x[first + c] = impulse[c] / layout.scale[first + c];
             }
-            let mut g = vec![0.0; programme.rows()];
-            programme.constraints(&x, &mut g);
-            let impact = rows_of(&programme, RowPlace::Transition { domain: 7 }, RowKind::Impact);
-            let at_rest = rows_of(&programme, RowPlace::Point { domain: 0, point: 0 }, RowKind::ContactVelocity);
+            let mut g = vec![0.0; program.rows()];
+            program.constraints(&x, &mut g);
+            let impact = rows_of(&program, RowPlace::Transition { domain: 7 }, RowKind::Impact);
+            let at_rest = rows_of(&program, RowPlace::Point { domain: 0, point: 0 }, RowKind::ContactVelocity);
             assert_eq!((impact.len(), at_rest.len()), (9, 4));
             for &(row, _) in impact.iter().chain(&at_rest) {
                 close("row", g[row], 0.0, 1e-9);
             }
             x[first + 1] += 1.0 / layout.scale[first + 1];
-            programme.constraints(&x, &mut g);
+            program.constraints(&x, &mut g);
             let wrong = impact.iter().map(|&(row, _)| g[row].abs()).fold(0.0, f64::max);
             assert!(wrong > 0.1, "an impulse that is 1 N s off leaves {wrong}");
         }
@@ -322,7 +322,7 @@ fn impacts_are_plastic_lose_energy_and_balance_momentum() {
 #[test]
 fn ground_carries_the_weight_in_upright_standing() {
     for (subject, twin) in (1..).zip(twins()) {
-        let programme = programme(subject);
+        let program = program(subject);
         let height = [1.727, 1.803][subject as usize - 1];
         let mut point = standing();
         point.q[1] = 0.530 * height;
@@ -357,19 +357,19 @@ fn ground_carries_the_weight_in_upright_standing() {
         // The swing leg hangs straight: its knee and ankle torques are due to small offsets only.
         assert!(point.u[1].abs() < 10.0 && point.u[2].abs() < 10.0, "{:?}", point.u);
         // The equation of motion of the gait problem vanishes, and detects an error of 1 N.
-        let layout = &programme.layout;
+        let layout = &program.layout;
         let mut x = vec![0.5; layout.variables];
         layout.set_point_variables(&mut x, 2, 1, &point);
-        let mut g = vec![0.0; programme.rows()];
-        programme.constraints(&x, &mut g);
-        let rows = rows_of(&programme, RowPlace::Point { domain: 2, point: 1 }, RowKind::Dynamics);
+        let mut g = vec![0.0; program.rows()];
+        program.constraints(&x, &mut g);
+        let rows = rows_of(&program, RowPlace::Point { domain: 2, point: 1 }, RowKind::Dynamics);
         assert_eq!(rows.len(), 9);
         for &(row, _) in &rows {
             close("equation of motion", g[row], 0.0, 1e-10);
         }
         point.force[1] += 1.0;
         layout.set_point_variables(&mut x, 2, 1, &point);
-        programme.constraints(&x, &mut g);
+        program.constraints(&x, &mut g);
         let wrong = rows.iter().map(|&(row, _)| g[row].abs()).fold(0.0, f64::max);
         close("a newton too much", wrong, 0.01, 1e-9);
     }

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // Each test file uses some of it.
 
-use gait_optimizer::gait_problem::{GaitProgramme, PointVariables, gait_of};
+use gait_optimizer::gait_problem::{GaitProgram, PointVariables, gait_of};
 use gait_optimizer::{Device, Gait, GaitProblem, GaitSettings, ReferenceGait, Subject, TunedBounds};
 use serde_json::Value;
 
@@ -11,12 +11,12 @@ pub(crate) fn numbers(value: &Value) -> Vec<f64> {
 }
 
 pub(crate) struct Golden {
-    pub(crate) programme: GaitProgramme,
+    pub(crate) program: GaitProgram,
     pub(crate) x: Vec<f64>,
     pub(crate) data: Value,
 }
 
-/// As a point of the programme that the golden gaits solve.
+/// As a point of the program that the golden gaits solve.
 pub(crate) fn golden(subject: u32, muscles: bool) -> Golden {
     golden_with(&GaitSettings::reference_problem(), subject, muscles)
 }
@@ -25,7 +25,7 @@ pub(crate) fn golden_with(settings: &GaitSettings, subject: u32, muscles: bool) 
     let letter = if muscles { "m" } else { "n" };
     let path = format!("{}/tests/data/golden_s{subject}_{letter}.json", env!("CARGO_MANIFEST_DIR"));
     let data: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let programme = GaitProgramme::new(
+    let program = GaitProgram::new(
         &Subject::builtin(subject).unwrap(),
         &Device::ampro3().unwrap(),
         &TunedBounds::default(),
@@ -34,7 +34,7 @@ pub(crate) fn golden_with(settings: &GaitSettings, subject: u32, muscles: bool) 
         &ReferenceGait::builtin().unwrap(),
     )
     .unwrap();
-    let layout = &programme.layout;
+    let layout = &program.layout;
     let mut x = vec![0.0; layout.variables];
     let put = |x: &mut Vec<f64>, index: usize, value: f64| x[index] = value / layout.scale[index];
     for (d, domain) in layout.domains.iter().enumerate() {
@@ -77,13 +77,13 @@ pub(crate) fn golden_with(settings: &GaitSettings, subject: u32, muscles: bool) 
     }
     put(&mut x, layout.right_step_length, data["xL"].as_f64().unwrap());
     put(&mut x, layout.stride_length, data["D"].as_f64().unwrap());
-    Golden { programme, x, data }
+    Golden { program, x, data }
 }
 
 /// A golden gait in physical units, with its problem.
 pub(crate) fn golden_gait(subject: u32, muscles: bool) -> (GaitProblem, Gait) {
     let golden = golden(subject, muscles);
     let problem = GaitProblem::new(Subject::builtin(subject).unwrap(), muscles).unwrap();
-    let gait = gait_of(&problem, &golden.programme, &golden.x);
+    let gait = gait_of(&problem, &golden.program, &golden.x);
     (problem, gait)
 }

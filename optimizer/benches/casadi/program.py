@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 import walker as model
-from assembly import Element, Programme
+from assembly import Element, Program
 
 DEFAULTS = {
     "subject": {"H": 1.727, "M": 65.7},
@@ -109,7 +109,7 @@ class Gait:
         for d in range(8):
             self._transition_element(d)
         self._stride_element()
-        self.programme = Programme(self.elements, self.layout.n, len(self.tags), 2)
+        self.program = Program(self.elements, self.layout.n, len(self.tags), 2)
 
     # Rows ---------------------------------------------------------------------------------------------------------
 

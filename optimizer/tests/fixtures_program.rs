@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
 use gait_optimizer::gait_problem::row_names::RowPlace;
-use gait_optimizer::gait_problem::{GaitProgramme, RowKind, RowName};
+use gait_optimizer::gait_problem::{GaitProgram, RowKind, RowName};
 use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
 use interior_point::NonlinearProgram;
 use serde_json::Value;
@@ -18,8 +18,8 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-fn programme(muscles: bool, bounds: &TunedBounds) -> GaitProgramme {
-    GaitProgramme::new(
+fn program(muscles: bool, bounds: &TunedBounds) -> GaitProgram {
+    GaitProgram::new(
         &Subject::builtin(1).unwrap(),
         &Device::ampro3().unwrap(),
         bounds,
@@ -84,19 +84,19 @@ fn group(name: RowName) -> String {
 fn gait_problem_matches_independent_sums() {
     for (name, muscles) in [("nlp_s1_n", false), ("nlp_s1_m", true)] {
         let data = fixture(name);
-        let mut programme = programme(muscles, &TunedBounds::default());
+        let mut program = program(muscles, &TunedBounds::default());
         if let Some(height) = data["subject"]["H"].as_f64() {
             assert_eq!(height, 1.727);
         }
         let x = numbers(&data["x"]);
-        assert_eq!(x.len(), programme.variables());
-        let mut g = vec![f64::NAN; programme.rows()];
-        programme.constraints(&x, &mut g);
+        assert_eq!(x.len(), program.variables());
+        let mut g = vec![f64::NAN; program.rows()];
+        program.constraints(&x, &mut g);
         assert!(g.iter().all(|v| v.is_finite()));
         let mut sums: BTreeMap<String, (usize, f64, f64, f64)> = BTreeMap::new();
-        for (i, (row, value)) in programme.rows.names.iter().zip(&g).enumerate() {
+        for (i, (row, value)) in program.rows.names.iter().zip(&g).enumerate() {
             // The fixture has rows dp_dot - minimum >= 0. Here the minimum is a bound of the row.
-            let value = if row.kind == RowKind::PhaseRate { value - programme.rows.lower[i] } else { *value };
+            let value = if row.kind == RowKind::PhaseRate { value - program.rows.lower[i] } else { *value };
             let entry = sums.entry(group(*row)).or_insert((0, 0.0, 0.0, 0.0));
             entry.0 += 1;
             entry.1 += value;
@@ -115,8 +115,8 @@ fn gait_problem_matches_independent_sums() {
         }
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
         assert!(sums.is_empty(), "rows the fixture lacks: {sums:?}");
-        programme.weights.tracking = 1.0;
-        let parts = programme.objective_parts(&x);
+        program.weights.tracking = 1.0;
+        let parts = program.objective_parts(&x);
         for (ours, key) in [
             (parts.cost_of_transport, "mcot"),
             (parts.regularisation, "reg"),
@@ -148,23 +148,23 @@ fn multiply(pattern: &interior_point::SparsityPattern, values: &[f64], v: &[f64]
 fn derivatives_match_finite_differences() {
     for (name, muscles) in [("nlp_s1_n", false), ("nlp_s1_m", true)] {
         let x = numbers(&fixture(name)["x"]);
-        let mut programme = programme(muscles, &tight_bounds());
-        programme.weights.tracking = 0.7;
-        let (n, m) = (programme.variables(), programme.rows());
+        let mut program = program(muscles, &tight_bounds());
+        program.weights.tracking = 0.7;
+        let (n, m) = (program.variables(), program.rows());
         let direction: Vec<f64> = (0..n).map(|i| (1.3 * i as f64).sin()).collect();
         let multipliers: Vec<f64> = (0..m).map(|i| (0.7 * i as f64 + 0.3).cos()).collect();
         let sigma = 1.7;
         let shifted = |h: f64| -> Vec<f64> { x.iter().zip(&direction).map(|(a, d)| a + h * d).collect() };
-        let (jp, hp) = (programme.jacobian_pattern().clone(), programme.hessian_pattern().clone());
+        let (jp, hp) = (program.jacobian_pattern().clone(), program.hessian_pattern().clone());
 
         let values_at = |h: f64| {
             let point = shifted(h);
             let mut g = vec![0.0; m];
-            programme.constraints(&point, &mut g);
+            program.constraints(&point, &mut g);
             let mut jacobian = vec![0.0; jp.row_indices.len()];
-            programme.jacobian(&point, &mut jacobian);
+            program.jacobian(&point, &mut jacobian);
             let mut lagrangian = vec![0.0; n];
-            programme.gradient(&point, &mut lagrangian);
+            program.gradient(&point, &mut lagrangian);
             for v in &mut lagrangian {
                 *v *= sigma;
             }
@@ -173,7 +173,7 @@ fn derivatives_match_finite_differences() {
                     lagrangian[column] += jacobian[slot] * multipliers[jp.row_indices[slot]];
                 }
             }
-            (g, jacobian, lagrangian, programme.objective(&point))
+            (g, jacobian, lagrangian, program.objective(&point))
         };
         let h = 1e-6;
         let (low, mid, high) = (values_at(-h), values_at(0.0), values_at(h));
@@ -184,17 +184,17 @@ fn derivatives_match_finite_differences() {
             assert!(
                 (difference - product[row]).abs() < 2e-6 * scale,
                 "{name} {}: difference {difference}, Jacobian {}",
-                programme.rows.names[row].label(),
+                program.rows.names[row].label(),
                 product[row]
             );
         }
         let mut gradient = vec![0.0; n];
-        programme.gradient(&x, &mut gradient);
+        program.gradient(&x, &mut gradient);
         let slope: f64 = gradient.iter().zip(&direction).map(|(a, b)| a * b).sum();
         let difference = (high.3 - low.3) / (2.0 * h);
         assert!((slope - difference).abs() < 1e-7 * (1.0 + slope.abs()), "{name} gradient {slope} {difference}");
         let mut hessian = vec![0.0; hp.row_indices.len()];
-        programme.hessian(&x, sigma, &multipliers, &mut hessian);
+        program.hessian(&x, sigma, &multipliers, &mut hessian);
         let product = multiply(&hp, &hessian, &direction, true);
         for i in 0..n {
             let difference = (high.2[i] - low.2[i]) / (2.0 * h);
@@ -210,8 +210,8 @@ fn derivatives_match_finite_differences() {
 #[test]
 fn elimination_tree_covers_every_coupling() {
     for muscles in [false, true] {
-        let programme = programme(muscles, &TunedBounds::default());
-        let blocks = programme.elimination_blocks().unwrap();
+        let program = program(muscles, &TunedBounds::default());
+        let blocks = program.elimination_blocks().unwrap();
         let related = |mut a: usize, mut b: usize| {
             // The block with the larger number must be an ancestor of the other.
             if a > b {
@@ -226,11 +226,11 @@ fn elimination_tree_covers_every_coupling() {
             }
             false
         };
-        let (jp, hp) = (programme.jacobian_pattern(), programme.hessian_pattern());
-        for column in 0..programme.variables() {
+        let (jp, hp) = (program.jacobian_pattern(), program.hessian_pattern());
+        for column in 0..program.variables() {
             for &row in &jp.row_indices[jp.column_starts[column]..jp.column_starts[column + 1]] {
                 let (a, b) = (blocks.block_of_row[row], blocks.block_of_variable[column]);
-                assert!(related(a, b), "{} with variable {column}", programme.rows.names[row].label());
+                assert!(related(a, b), "{} with variable {column}", program.rows.names[row].label());
             }
             for &row in &hp.row_indices[hp.column_starts[column]..hp.column_starts[column + 1]] {
                 let (a, b) = (blocks.block_of_variable[row], blocks.block_of_variable[column]);
