@@ -11,7 +11,7 @@ mod emg_recording;
 mod model_activity;
 
 pub use activity::Activity;
-pub use cycle::{CycleActivity, EmgRmse, emg_rmse};
+pub use cycle::{CycleActivity, EmgRmse, emg_rmse, is_plausible, strides_between};
 pub use emg_recording::EmgRecording;
 pub use model_activity::{ModelActivity, model_activity};
 

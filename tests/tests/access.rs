@@ -74,11 +74,14 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
 }
 
 /// The pages, as in the router. A page that is not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 73] = [
+const PAGES: [(&str, Option<Right>); 76] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
     ("post /studies/new/check", Some(Right::Run)),
+    ("post /studies/sample", Some(Right::Run)),
+    ("get /studies/{id}/details", Some(Right::Read)),
+    ("post /studies/{id}/details", Some(Right::Run)),
     ("get /studies/compare", Some(Right::Read)),
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),

@@ -4,6 +4,7 @@
 // Without this script the page is current after a reload, and sorting and filtering reload it.
 
 import { holdsEdits } from "./edited_fields.mjs";
+import { showLocalTimes } from "./local_times.mjs";
 
 const live = /** @type {HTMLElement | null} */ (document.getElementById("live"));
 
@@ -33,6 +34,18 @@ function replace(part, next) {
     else part.insertBefore(node, before);
   }
 }
+
+/** States in which a study needs a person, or has nothing left to do. */
+const NOTIFIED = ["waiting", "paused", "finished", "stopped"];
+const title = document.title;
+
+/** @type {(state: string) => void} Puts the state in the title of a tab that nobody looks at, until somebody does. */
+function notify(state) {
+  document.title = document.hidden && NOTIFIED.includes(state) ? `(${state}) ${title}` : title;
+}
+document.addEventListener("visibilitychange", () => {
+  if (!document.hidden) document.title = title;
+});
 
 /**
  * Removes the walker of a gait that is no longer the recommended one.
@@ -89,12 +102,15 @@ if (live) {
     try {
       const answer = await fetch(`/studies/${study}/live${location.search}`);
       if (answer.ok) {
-        update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
+        const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
+        showLocalTimes(fresh);
+        update(live, fresh);
         removeFormerWalker(live);
       }
       if (state() !== last) {
         last = state();
         announced.textContent = `The study is now: ${last}.`;
+        notify(last);
       }
       // The subject withdrew consent: the page shows nothing of the study any more.
       if (answer.status === 409) location.reload();
