@@ -41,7 +41,7 @@ const title = document.title;
 
 /** @type {(state: string) => void} Puts the state in the title of a tab that nobody looks at, until somebody does. */
 function notify(state) {
-  document.title = document.hidden && NOTIFIED.includes(state) ? `(${state}) ${title}` : title;
+  document.title = document.hidden && NOTIFIED.some((word) => state.startsWith(word)) ? `(${state}) ${title}` : title;
 }
 document.addEventListener("visibilitychange", () => {
   if (!document.hidden) document.title = title;

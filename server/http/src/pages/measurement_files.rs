@@ -67,6 +67,7 @@ async fn previewed(app: &mut AppState, fields: &EmgFields) -> Result<Preview, Er
         let preview = new.preview()?;
         let charts = lab_charts::preview(&preview).iter().map(Drawn::new).collect();
         let EmgPreview { columns, strides, refused, .. } = preview;
+        let refused = refused.as_ref().map(form_errors::in_words);
         Ok::<_, Error>(Preview { columns, channels: lab_charts::muscles(), charts, strides, refused })
     };
     app.compute(draw).await?

@@ -237,6 +237,17 @@ pub(super) const NEW_SUBJECT: &str = "new";
 /// The fields that describe a new subject.
 pub(super) const DESCRIPTION: [&str; 3] = ["pseudonym", "height_m", "body_mass_kg"];
 
+/// The place of a field in the form.
+pub(super) fn place_in_form(field: &str) -> usize {
+    const BEFORE_BOUNDS: [&str; 7] =
+        ["subject", "pseudonym", "height_m", "body_mass_kg", "device", "reference_gait", "muscles"];
+    const AFTER_BOUNDS: [&str; 7] =
+        ["feedback_mode", "trial_budget", "name", "learner", "unchanged_limit", "parallel_trials", "seed"];
+    let before = BEFORE_BOUNDS.iter().position(|known| *known == field);
+    let after = || AFTER_BOUNDS.iter().position(|known| *known == field).map(|place| place + BEFORE_BOUNDS.len() + 1);
+    before.or_else(after).unwrap_or(if field.len() < 4 || field.contains("_a") { 7 } else { usize::MAX })
+}
+
 /// The label of a field.
 fn label(field: &str) -> String {
     let named = match field {

@@ -1,6 +1,6 @@
 //! The study that the form describes: checked, planned and created.
 
-use super::fields::{DESCRIPTION, Fields, KEPT, LEARNERS, NEW_SUBJECT, as_refusal, learner};
+use super::fields::{DESCRIPTION, Fields, KEPT, LEARNERS, NEW_SUBJECT, as_refusal, learner, place_in_form};
 use super::space_editor::SpaceEditor;
 use crate::accessible::Named;
 use crate::body_measures;
@@ -69,21 +69,23 @@ pub(super) async fn faults(
 ) -> Result<(Vec<FieldError>, Option<StudyPlan>), Error> {
     let mut repaired = fields.clone();
     let mut found: Vec<FieldError> = Vec::new();
-    loop {
+    let plan = loop {
         let editor = SpaceEditor::typed(&repaired.space)?;
         let fault = match planned(db, reach, &repaired, &editor).await {
-            Ok(plan) => return Ok((found, Some(plan))),
+            Ok(plan) => break Some(plan),
             Err(error) => as_refusal(error, &repaired)?,
         };
-        let is_new = found.iter().all(|known| known.field != fault.field);
-        let goes_on = is_new && repaired.repair(&fault.field);
-        if is_new {
-            found.push(fault);
+        if found.iter().any(|known| known.field == fault.field) {
+            break None;
         }
+        let goes_on = repaired.repair(&fault.field);
+        found.push(fault);
         if !goes_on {
-            return Ok((found, None));
+            break None;
         }
-    }
+    };
+    found.sort_by_key(|fault| place_in_form(&fault.field));
+    Ok((found, plan))
 }
 
 /// The name of the study. A typed name must differ from those of the studies that the caller can see; the default name

@@ -9,7 +9,7 @@ use gait_optimizer::emg::{CHANNELS, is_plausible, strides_between};
 const INTERVALS: usize = 400;
 
 /// A preview of an EMG recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct EmgPreview {
     /// Names of the columns of the file.
     pub columns: Vec<String>,
@@ -18,7 +18,7 @@ pub struct EmgPreview {
     /// The strides between the heel strikes; empty if heel strikes are unknown.
     pub strides: Vec<Stride>,
     /// Why the file would be refused as it is; `None` if it would be accepted.
-    pub refused: Option<String>,
+    pub refused: Option<Error>,
 }
 
 /// The raw trace of a channel.
@@ -87,7 +87,7 @@ impl NewEmg {
         Ok(EmgPreview {
             traces: CHANNELS.into_iter().filter_map(trace).collect(),
             strides: (1..).zip(strides_between(&strikes)).map(stride).collect(),
-            refused: self.reading.check(&self.recording).err().map(|error| error.to_string()),
+            refused: self.reading.check(&self.recording).err(),
             columns: whole.channels.into_iter().map(|(name, _)| name).collect(),
         })
     }
@@ -146,6 +146,6 @@ mod tests {
     fn preview_without_heel_strikes_says_what_is_missing() {
         let shown = recording(Vec::new()).preview().unwrap();
         assert!(shown.strides.is_empty() && shown.traces.len() == 2);
-        assert!(shown.refused.unwrap().contains("at least two heel-strike times"));
+        assert!(shown.refused.unwrap().to_string().contains("at least two heel-strike times"));
     }
 }
