@@ -632,7 +632,8 @@ async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
     ] {
         assert!(refused.text.contains(says), "{says}: {}", refused.text);
     }
-    for kept in ["value=\"human\" checked", "value=\"173\" inputmode=\"decimal\"", "value=\"65,7\"", "value=\"0,high\""] {
+    for kept in ["value=\"human\" checked", "value=\"173\" inputmode=\"decimal\"", "value=\"65,7\"", "value=\"0,high\""]
+    {
         assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
     }
     assert_eq!(refused.text.matches(" autofocus").count(), 1);
@@ -654,7 +655,8 @@ async fn height_and_mass_are_accepted_in_customary_units() {
 #[tokio::test]
 async fn subject_form_reports_every_refused_field() {
     let (_folder, service) = service().await;
-    let refused = service.post_text("/subjects", FORM, "pseudonym=a%40b&height_m=tall&body_mass_kg=20&notes=quiet").await;
+    let refused =
+        service.post_text("/subjects", FORM, "pseudonym=a%40b&height_m=tall&body_mass_kg=20&notes=quiet").await;
     is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "a code assigned by the site");
     for says in ["\u{201c}Height, m\u{201d}", "\u{201c}Body mass, kg\u{201d}", "quiet</textarea>", "value=\"tall\""] {
         assert!(refused.text.contains(says), "{says}: {}", refused.text);
@@ -724,7 +726,9 @@ async fn clone_has_the_set_up_of_its_study_with_relaxed_bounds() {
     service.wait_for(study, &[StudyState::Finished]).await;
     let form = service.fetch(&format!("/studies/new?like={study}&relax=a7%3D35")).await;
     is_page(&form, StatusCode::OK, "with relaxed <a href=\"#bounds\">bounds</a>");
-    for filled in ["name=\"seed\" value=\"7\"", "name=\"values_a7\" value=\"35, 50\"", "name=\"trial_budget\" value=\"3\""] {
+    for filled in
+        ["name=\"seed\" value=\"7\"", "name=\"values_a7\" value=\"35, 50\"", "name=\"trial_budget\" value=\"3\""]
+    {
         assert!(form.text.contains(filled), "{filled}");
     }
     let subject = service.subject().await;
@@ -746,9 +750,17 @@ async fn equal_names_are_refused_or_numbered_without_naming_hidden_studies() {
     let admin = signed_in(&service, Role::Admin).await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let subject = service.subject().await;
-    let body = |name: &str, extra: &str| format!("{STUDY}&subject={subject}&trial_budget=1&seed=1&values_a5=0,0.02&name={name}{extra}");
-    let send_as = async |who: &callers::As, body: &str| send(&service, who, &Method::POST, "/studies/new", FORM, body).await;
-    made(&send_as(&admin, &body("Secret", "&restricted=on")).await);
+    let body = |name: &str, extra: &str| {
+        format!("{STUDY}&subject={subject}&trial_budget=1&seed=1&values_a5=0,0.02&name={name}{extra}")
+    };
+    let send_as =
+        async |who: &callers::As, body: &str| send(&service, who, &Method::POST, "/studies/new", FORM, body).await;
+    let secret = made(&send_as(&admin, &body("Secret", "&restricted=on")).await);
+    let clone = format!("/studies/new?like={secret}");
+    assert_eq!(send(&service, &admin, &Method::GET, &clone, "", "").await.status, StatusCode::OK);
+    is_page(&send(&service, &clinician, &Method::GET, &clone, "", "").await, StatusCode::NOT_FOUND, "no such study");
+    let like = format!("&like={secret}");
+    is_page(&send_as(&clinician, &body("Copy", &like)).await, StatusCode::NOT_FOUND, "no such study");
     made(&send_as(&admin, &body("Open", "")).await);
     is_page(&send_as(&admin, &body("Secret", "")).await, StatusCode::UNPROCESSABLE_ENTITY, "Secret (2)");
     is_page(&send_as(&clinician, &body("Open", "")).await, StatusCode::UNPROCESSABLE_ENTITY, "Open (2)");

@@ -613,15 +613,24 @@ async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_l
     let page = format!("/lab-sessions/{}/measurement-files/emg", id(&session));
     let file = electromyogram(1.0).replace("RF_L", "EMG 1");
     let send = async |rest: &str| {
-        service.post_text(&page, FORM, &format!("walk=1&format=csv&recording={file}&heel_strike_threshold=0.5&{rest}")).await
+        service
+            .post_text(&page, FORM, &format!("walk=1&format=csv&recording={file}&heel_strike_threshold=0.5&{rest}"))
+            .await
     };
-    let files = async || service.fetch(&format!("/api/v1/lab-sessions/{}/measurement-files", id(&session))).await.items();
+    let files =
+        async || service.fetch(&format!("/api/v1/lab-sessions/{}/measurement-files", id(&session))).await.items();
 
-    let columns = "column_RF_L=EMG+1&column_TA_L=TA_L&column_BF_L=BF_L&column_GAS_L=GAS_L&column_RF_R=RF_R&column_BF_R=BF_R";
+    let columns =
+        "column_RF_L=EMG+1&column_TA_L=TA_L&column_BF_L=BF_L&column_GAS_L=GAS_L&column_RF_R=RF_R&column_BF_R=BF_R";
     let first = send("act=preview").await;
     assert_eq!(first.status, StatusCode::OK, "{}", first.text);
-    assert!(first.text.contains("Not ready for upload") && first.text.contains("<option>EMG 1</option>"), "{}", first.text);
-    let shown = send(&format!("act=preview&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
+    assert!(
+        first.text.contains("Not ready for upload") && first.text.contains("<option>EMG 1</option>"),
+        "{}",
+        first.text
+    );
+    let shown =
+        send(&format!("act=preview&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
     assert!(shown.text.contains("The file can be uploaded: walk1.csv."), "{}", shown.text);
     assert_eq!(shown.text.matches("raw signal</span>").count(), 6, "a chart for each channel");
     assert!(shown.text.contains("<option selected>EMG 1</option>") && shown.text.contains("<td>rejected</td>"));
@@ -630,8 +639,13 @@ async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_l
     assert_eq!(unreadable.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", unreadable.text);
 
     let beyond = send(&format!("act=upload&heel_strike_column=heel&rejected_strides=9&{columns}")).await;
-    assert!(beyond.status == StatusCode::UNPROCESSABLE_ENTITY && beyond.text.contains("Rejected strides"), "{}", beyond.text);
-    let kept = send(&format!("act=upload&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
+    assert!(
+        beyond.status == StatusCode::UNPROCESSABLE_ENTITY && beyond.text.contains("Rejected strides"),
+        "{}",
+        beyond.text
+    );
+    let kept =
+        send(&format!("act=upload&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
     assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     assert_eq!(files().await[0]["file_name"], "walk1.csv");
     let result = service.post(&format!("/api/v1/lab-sessions/{}/emg-results", id(&session)), &json!({})).await.json();

@@ -200,7 +200,9 @@ impl Explanation {
         let limits: Vec<String> = conflict.bounds.iter().map(GivenBound::limit_in_words).collect();
         Some(match limits.as_slice() {
             [] => "No value of the tuned bounds gives a gait: fixed constraints conflict.".to_owned(),
+            [one] if conflict.undecided => format!("With {one}, there is probably no gait, whatever the other bounds."),
             [one] => format!("With {one}, there is no gait, whatever the other bounds."),
+            _ if conflict.undecided => format!("These bounds probably conflict: {}.", list(&limits)),
             _ => format!("These bounds conflict: {}.", list(&limits)),
         })
     }

@@ -11,9 +11,9 @@ const KILOGRAMS_PER_POUND: f64 = 0.453_592_37;
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(crate) fn height_m(field: &str, text: &str) -> Result<f64, Error> {
-    read_height(text)
-        .map(|height| round(height, 1000.0))
-        .ok_or_else(|| Error::invalid(field, text, "a number in metres, such as 1.75, or feet and inches, such as 5 ft 9 in"))
+    read_height(text).map(|height| round(height, 1000.0)).ok_or_else(|| {
+        Error::invalid(field, text, "a number in metres, such as 1.75, or feet and inches, such as 5 ft 9 in")
+    })
 }
 
 /// Reads a body mass: `65.7`, `65.7 kg`, `145 lb`; kg, to 10 g.

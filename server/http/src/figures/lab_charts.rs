@@ -5,9 +5,7 @@ use gait_optimizer::emg::CycleActivity;
 use gait_optimizer::phase_portrait::JOINTS;
 use gaitwright_charts::gait_charts::orbit;
 use gaitwright_charts::{Chart, Figure, Span, Stroke};
-use gaitwright_service::studies::lab::{
-    Condition, EmgPreview, EmgView, LabSessionView, LimitCycles, Stride, Trace,
-};
+use gaitwright_service::studies::lab::{Condition, EmgPreview, EmgView, LabSessionView, LimitCycles, Stride, Trace};
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
 /// Names of the EMG channels.
@@ -57,7 +55,14 @@ pub(crate) fn preview(preview: &EmgPreview) -> Vec<Chart> {
         let mut chart = Chart::new(&title, "time, s", "raw signal");
         chart = chart.with("raw signal", 0, Stroke::Solid, trace.points.clone());
         if !trace.at_strikes.is_empty() {
-            chart = chart.with("right heel strike", 1, Stroke::Points, trace.at_strikes.clone());
+            // Above the trace, which would hide them.
+            let (low, high) = trace
+                .points
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, y)| (low.min(*y), high.max(*y)));
+            let above = high + 0.1 * (high - low);
+            let marks = trace.at_strikes.iter().map(|(time, _)| (*time, above)).collect();
+            chart = chart.with("right heel strike", 1, Stroke::Points, marks);
         }
         chart.spans = preview.strides.iter().map(span).collect();
         chart

@@ -111,7 +111,8 @@ impl EmgFields {
     /// The columns chosen in lists, or else those that are typed.
     fn columns(&self) -> Result<BTreeMap<String, String>, Error> {
         let chosen = self.chosen().into_iter().filter(|(_, column)| !column.is_empty());
-        let chosen: BTreeMap<String, String> = chosen.map(|(channel, column)| (channel.into(), column.into())).collect();
+        let chosen: BTreeMap<String, String> =
+            chosen.map(|(channel, column)| (channel.into(), column.into())).collect();
         if chosen.is_empty() { pairs(&self.channels) } else { Ok(chosen) }
     }
 

@@ -345,7 +345,9 @@ pub(super) async fn withdraw(
     let done = if form.confirmed.as_deref() == Some("yes") {
         end(&app, &authorized, id, &why).await
     } else {
-        Err(Error::conflict("Nothing was changed. First tick the box to confirm that all studies of this subject stop."))
+        Err(Error::conflict(
+            "Nothing was changed. First tick the box to confirm that all studies of this subject stop.",
+        ))
     };
     answer(&app, id, &authorized.caller, done, Typed::Withdrawal(why.reason)).await
 }

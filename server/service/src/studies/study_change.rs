@@ -62,7 +62,9 @@ pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
     checked.sort();
     checked.dedup();
     if checked.len() > MOST_TAGS {
-        return Err(FieldError::described("tags", &format!("a list of {}", checked.len()), "a list of at most 10").into());
+        return Err(
+            FieldError::described("tags", &format!("a list of {}", checked.len()), "a list of at most 10").into()
+        );
     }
     Ok(checked)
 }

@@ -213,7 +213,9 @@ pub async fn free_name(db: &mut Connection, reach: Reach, name: &str) -> Result<
 
 /// The refusal of a name that another study in reach has.
 pub fn name_is_taken(name: &str, free: &str) -> Error {
-    let message = format!("Another study is named \u{201c}{name}\u{201d}. Choose another name, for example \u{201c}{free}\u{201d}.");
+    let message = format!(
+        "Another study is named \u{201c}{name}\u{201d}. Choose another name, for example \u{201c}{free}\u{201d}."
+    );
     FieldError::in_words("name", &message).into()
 }
 

@@ -1,8 +1,8 @@
 //! The fields of the form for a new study: their defaults, those of a clone, and their labels.
 
+use crate::form_errors;
 use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::{BasinChoice, TunedBounds};
-use crate::form_errors;
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::StudyId;
 use gaitwright_store::studies::{Study, StudyPlan};
@@ -294,7 +294,6 @@ pub(super) fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Er
         other => Err(other),
     }
 }
-
 
 #[cfg(test)]
 mod tests {

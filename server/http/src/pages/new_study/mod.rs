@@ -283,4 +283,3 @@ async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error>
         ),
     })
 }
-

@@ -40,12 +40,7 @@ pub(super) async fn make(
 }
 
 /// The study that [`make`] would create.
-async fn planned(
-    db: &mut Connection,
-    reach: Reach,
-    fields: &Fields,
-    editor: &SpaceEditor,
-) -> Result<StudyPlan, Error> {
+async fn planned(db: &mut Connection, reach: Reach, fields: &Fields, editor: &SpaceEditor) -> Result<StudyPlan, Error> {
     let like = cloned(db, reach, fields).await?;
     let plan = match subject_of(fields)? {
         Chosen::New(new) => {

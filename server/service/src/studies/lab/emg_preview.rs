@@ -99,7 +99,10 @@ fn extremes(samples: &[f64]) -> Vec<(usize, f64)> {
     let mut points = Vec::new();
     for (interval, part) in samples.chunks(length).enumerate() {
         let place = |best: fn(&f64, &f64) -> std::cmp::Ordering| {
-            part.iter().enumerate().max_by(|a, b| best(a.1, b.1)).map(|(place, value)| (interval * length + place, *value))
+            part.iter()
+                .enumerate()
+                .max_by(|a, b| best(a.1, b.1))
+                .map(|(place, value)| (interval * length + place, *value))
         };
         let (low, high) = (place(|a, b| b.total_cmp(a)), place(f64::total_cmp));
         let mut both: Vec<(usize, f64)> = low.into_iter().chain(high).collect();
@@ -125,7 +128,8 @@ mod tests {
             writeln!(text, "{time},{value},{}", 2.0 * value).unwrap();
         }
         let channels = [("RF_L".to_owned(), "E1".to_owned()), ("TA_L".to_owned(), "E2".to_owned())].into();
-        let reading = EmgReading { channels, heel_strikes_s: strikes, rejected_strides: vec![2], ..EmgReading::default() };
+        let reading =
+            EmgReading { channels, heel_strikes_s: strikes, rejected_strides: vec![2], ..EmgReading::default() };
         NewEmg { walk: 1, recording: text, reading }
     }
 

@@ -141,7 +141,11 @@ impl EmgReading {
             .map(|(stride, _)| stride)
             .collect();
         if kept.is_empty() {
-            return Err(FieldError::in_words("reading.rejected_strides", "Every stride is rejected. Keep at least one.").into());
+            return Err(FieldError::in_words(
+                "reading.rejected_strides",
+                "Every stride is rejected. Keep at least one.",
+            )
+            .into());
         }
         Ok(kept)
     }
