@@ -76,7 +76,7 @@ async fn new_studies_use_the_recorded_muscles_of_their_subject() {
     service.wait_for(before, &[StudyState::Finished]).await;
     let (page, api) = (format!("/subjects/{subject}/muscles"), format!("/api/v1/subjects/{subject}/muscles"));
     for (typed, expected) in [
-        ("sol_max_force_n=1", "\u{201c}soleus: maximum isometric force, N\u{201d} is 1.0; it must be 50 to 20000."),
+        ("sol_max_force_n=1", "\u{201c}soleus: maximum isometric force, N\u{201d} is 1; it must be 50 to 20000."),
         ("sol_max_force_n=much", "a number, or empty"),
         ("sol_knee_lever_m=0.05", "sol does not span the knee"),
         ("sol_colour=1", "a field of this form"),

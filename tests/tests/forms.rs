@@ -428,8 +428,8 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
         format!("{changed}&subject={subject}&muscles=on&feedback_mode=automatic&parallel_trials=1&{}", rest.join("&"))
     };
     for (changed, field, said) in [
-        ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5.0; it must be 0.05 to 50000"),
-        ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0.0; it must be 0.001 to 2000"),
+        ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5; it must be 0.05 to 50000"),
+        ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0; it must be 0.001 to 2000"),
         ("values_a1=15,x", "values_a1", "\u{201c}Values of a1\u{201d} is "),
         ("trial_budget=many", "trial_budget", "\u{201c}Trials\u{201d} is "),
         ("seed=x", "seed", "\u{201c}Seed\u{201d} is "),

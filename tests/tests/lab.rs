@@ -557,7 +557,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         (
             "emg",
             "walk=1&format=opensim&recording=x&rate_hz=1000",
-            "\u{201c}Sampling rate, Hz\u{201d} is 1000.0; it must be omitted",
+            "\u{201c}Sampling rate, Hz\u{201d} is 1000; it must be omitted",
         ),
         (
             "emg",
