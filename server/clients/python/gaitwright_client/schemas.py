@@ -451,12 +451,18 @@ class CertifiedSubject(TypedDict):
 class Change(TypedDict, total=False):
     """Changes to a study. Absent fields keep their values."""
 
+    # Whether the study is archived, so that lists do not show it. Possible before its start and after its end.
+    archived: Optional[bool]
     # Name shown to users.
     name: Optional[str]
+    # Notes of people.
+    notes: Optional[str]
     # Number of trials that run in parallel.
     parallel_trials: Optional[int]
     # Priority, -10 to 10. Higher values run first.
     priority: Optional[int]
+    # Tags, at most 10 of at most 40 characters. They replace the present ones.
+    tags: Optional[list[str]]
 
 
 class Closing(TypedDict, total=False):
@@ -703,6 +709,8 @@ class EmgReading(TypedDict, total=False):
     # Column of each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R). By default the columns have the names of the
     # channels.
     channels: dict[str, str]
+    # Name of the file, for people.
+    file_name: Optional[str]
     # File format.
     format: MeasurementFormat
     # Column of a switch under the right heel, or of the vertical force under the right foot.
@@ -713,6 +721,8 @@ class EmgReading(TypedDict, total=False):
     heel_strikes_s: list[float]
     # Sampling rate of a CSV file without a `time_s` column, Hz.
     rate_hz: Optional[float]
+    # Numbers of strides to leave out, from 1, in the order of the heel strikes.
+    rejected_strides: list[int]
 
 
 class EmgResult(TypedDict):
@@ -1275,9 +1285,7 @@ class Me(_MeRequired, total=False):
     role: Optional[Role]
 
 
-class MeasurementFile(TypedDict):
-    """Measurement file, without its content."""
-
+class _MeasurementFileRequired(TypedDict):
     # Who uploaded it.
     actor: str
     # Time of the upload.
@@ -1292,6 +1300,13 @@ class MeasurementFile(TypedDict):
     session_id: LabSessionId
     # Number of the walk, 1 to 3.
     walk: int
+
+
+class MeasurementFile(_MeasurementFileRequired, total=False):
+    """Measurement file, without its content."""
+
+    # Name of the file, if it is known.
+    file_name: Optional[str]
 
 
 class _MemberRequired(TypedDict):
@@ -1368,6 +1383,8 @@ class MotionReading(TypedDict, total=False):
 
     # Cut-off frequency of the low-pass filter before differentiation, Hz.
     cutoff_hz: float
+    # Name of the file, for people.
+    file_name: Optional[str]
     # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     # knee_R_rad, ankle_R_rad.
     format: MeasurementFormat
@@ -1719,8 +1736,7 @@ class NewStudy(_NewStudyRequired, total=False):
     parallel_trials: int
     # Priority, -10 to 10. Higher values run first.
     priority: int
-    # Reference gait for Gait RMSE. By default the one nearest to the subject in height and body mass, or the built-in
-    # one if no reference gait states height and mass.
+    # Reference gait for Gait RMSE. By default `falisse-2019`, whichever others are imported.
     reference_gait_id: Optional[ReferenceGaitId]
     # Whether a trial may have an action whose gait is known from another trial, as in the paper. By default, only if
     # the learner may repeat actions. Has no effect if scripts evaluate the trials.
@@ -2405,12 +2421,16 @@ class _StudyRequired(StudyPlan):
     created_at: Instant
     # Identifier.
     id: StudyId
+    # Notes of people.
+    notes: str
     # Revision, which increases with each change.
     revision: int
     # State.
     state: StudyState
     # Reason for the state; may be empty.
     state_reason: str
+    # Tags, by which people find the study.
+    tags: list[str]
     # Time of the last change.
     updated_at: Instant
 
@@ -2418,6 +2438,8 @@ class _StudyRequired(StudyPlan):
 class Study(_StudyRequired, total=False):
     """Study."""
 
+    # Time at which it was archived. Lists do not show archived studies unless asked.
+    archived_at: Optional[Instant]
     # Parent, if the study is a fork.
     forked_from: Optional[StudyId]
 

@@ -81,7 +81,7 @@ class StudiesMethods(Transport):
 
         Changes the name, priority or number of parallel trials.
 
-        Fields: optionally name, parallel_trials, priority.
+        Fields: optionally archived, name, notes, parallel_trials, priority, tags.
         """
         return cast(
             StudyView,
