@@ -9,6 +9,7 @@
 //! many walks end without a fall. It depends on the gait and the seed only, whatever the number of threads.
 
 mod actuator;
+mod control_period;
 mod disturbance;
 mod foot_contact;
 mod gains;
@@ -40,8 +41,6 @@ use serde::{Deserialize, Serialize};
 use simulated_walk::{End, WalkOutcome, Walker};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Period of the controllers, s.
-const CONTROL_PERIOD_S: f64 = 1e-3;
 /// Version of the layout of [`ExecutionReport`] and of the simulation.
 pub const FORMAT_VERSION: u32 = 2;
 /// Strides before the push of the ladder, which comes in mid-stance of the prosthesis.

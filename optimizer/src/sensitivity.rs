@@ -43,7 +43,7 @@ pub struct BoundSensitivity {
     /// Values of the bound between which the active constraints stay the same, to first order; `None` if they do for every
     /// value in that direction.
     pub interval: (Option<f64>, Option<f64>),
-    /// Whether a constraint is about to become active or inactive, so that the derivatives to both sides differ.
+    /// Whether a constraint is about to become active or inactive, so that the derivatives on the two sides differ.
     pub is_weakly_active: bool,
 }
 

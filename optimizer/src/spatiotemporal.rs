@@ -69,14 +69,4 @@ impl Spatiotemporal {
             right: leg(gait.stride_length_m - gait.right_step_length_m, false),
         })
     }
-
-    /// Ratio of the left to the right step length; 1 if symmetric.
-    pub fn step_length_ratio(&self) -> f64 {
-        self.left.step_length_m / self.right.step_length_m
-    }
-
-    /// Ratio of the left to the right step time; 1 if symmetric.
-    pub fn step_time_ratio(&self) -> f64 {
-        self.left.step_time_s / self.right.step_time_s
-    }
 }

@@ -138,33 +138,56 @@ fn activations_do_not_alternate_with_the_default_weights() {
     }
 }
 
-/// Expected iterations of cold starts, by subject, variant and initial guess: means over four accuracies of the linear
-/// algebra. Rounding changes a single one by up to a third, and the sum of all eight by up to 6 %.
+/// A row of `tests/data/iterations.csv`, which `examples/iteration_spread.rs` writes.
+#[derive(serde::Deserialize)]
+struct PerturbedStart {
+    subject: u32,
+    muscles: bool,
+    guess: String,
+    status: String,
+    iterations: f64,
+}
+
+/// Mean and variance of the iterations of a cold start under different rounding errors.
+fn spread(rows: &[PerturbedStart], subject: u32, muscles: bool, guess: &str) -> (f64, f64) {
+    let of_start = |row: &&PerturbedStart| (row.subject, row.muscles, row.guess.as_str()) == (subject, muscles, guess);
+    let counts: Vec<f64> = rows.iter().filter(of_start).map(|row| row.iterations).collect();
+    assert!(counts.len() > 30, "{subject} {muscles} {guess}: {}", counts.len());
+    let mean = counts.iter().sum::<f64>() / counts.len() as f64;
+    let squares: f64 = counts.iter().map(|count| (count - mean).powi(2)).sum();
+    (mean, squares / (counts.len() - 1) as f64)
+}
+
+/// Four standard deviations above the mean.
+fn limit((mean, variance): (f64, f64)) -> f64 {
+    mean + 4.0 * variance.sqrt()
+}
+
+/// The limits come from the distribution over rounding errors, because a processor with other vector instructions rounds
+/// differently. A change of the solver that moves the distribution comes with a new file of iterations.
 #[test]
 fn cold_starts_take_at_most_the_expected_iterations() {
-    let known = [
-        ((1, false, InitialGuess::NATURAL), 92),
-        ((1, false, InitialGuess::EARLY_RISE), 97),
-        ((2, false, InitialGuess::NATURAL), 84),
-        ((2, false, InitialGuess::EARLY_RISE), 101),
-        ((1, true, InitialGuess::NATURAL), 147),
-        ((1, true, InitialGuess::EARLY_RISE), 160),
-        ((2, true, InitialGuess::NATURAL), 166),
-        ((2, true, InitialGuess::EARLY_RISE), 167),
-    ];
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/iterations.csv");
+    let rows: Vec<PerturbedStart> = csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect();
+    assert!(rows.iter().all(|row| row.status == "Converged"));
+    let guesses = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE];
+    let starts = [(1, false), (2, false), (1, true), (2, true)].map(|(s, m)| guesses.map(|guess| (s, m, guess)));
     let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
-    let (mut taken, mut expected) = (0, 0);
-    for ((subject, muscles, guess), iterations) in known.into_iter().take(if long { 8 } else { 2 }) {
+    let (mut taken, mut expected) = (0.0, (0.0, 0.0));
+    for (subject, muscles, guess) in starts.into_iter().flatten().take(if long { 8 } else { 2 }) {
         let problem = GaitProblem::new(Subject::builtin(subject).unwrap(), muscles).unwrap();
         let problem = GaitProblem { settings: GaitSettings::reference_problem(), ..problem };
         let options = SolveOptions::default();
         let outcome = solve_from_guesses(&problem, &[guess], &options, &mut |_| {}, &CancelToken::new()).unwrap();
         let report = outcome.report;
-        println!("subject {subject} muscles {muscles} {}: {}", guess.label(), report.iterations);
+        let spread = spread(&rows, subject, muscles, &guess.label());
+        println!("subject {subject} muscles {muscles} {}: {} of {spread:?}", guess.label(), report.iterations);
         assert_eq!(report.status, SolveStatus::Converged);
-        assert!(report.iterations <= iterations + iterations / 3, "{}: {}", guess.label(), report.iterations);
-        taken += report.iterations;
-        expected += iterations;
+        let iterations = report.iterations as f64;
+        assert!(iterations <= limit(spread), "{}: {iterations} of {spread:?}", guess.label());
+        taken += iterations;
+        expected = (expected.0 + spread.0, expected.1 + spread.1);
     }
-    assert!(taken <= expected + expected / 8, "{taken} together, {expected} before");
+    // The starts are independent, so their variances add up.
+    assert!(taken <= limit(expected), "{taken} of {expected:?} together");
 }

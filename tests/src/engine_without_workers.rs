@@ -39,7 +39,7 @@ impl Dispatch for Away {
         })
     }
 
-    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+    fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()> {
         Box::pin(async move { self.jobs.lock().unwrap().retain(|attempt| attempt.trial != trial) })
     }
 

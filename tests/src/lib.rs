@@ -16,6 +16,7 @@ pub mod consistent_gaits;
 pub mod engine_without_workers;
 pub mod every_table;
 pub mod explained;
+pub mod imports;
 pub mod large;
 pub mod measured;
 pub mod read_allocations;

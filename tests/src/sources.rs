@@ -1,10 +1,15 @@
-//! The source files of the service, for tests that check a rule on all of them.
+//! The source files, for tests that check a rule on all of them.
 
 use std::path::{Path, PathBuf};
 
 /// Every Rust file below `server/`, by its path from there (`http/src/router.rs`), with its text.
 pub fn of_server() -> Vec<(String, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../server");
+    below("server")
+}
+
+/// Every Rust file below a folder of the repository, by its path from there, with its text.
+pub fn below(folder: &str) -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
     let mut files = Vec::new();
     collect(&root, &mut files);
     files.sort();

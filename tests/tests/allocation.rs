@@ -688,7 +688,8 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_d
     assert_ne!(gait, other, "walk 3 is with the other gait");
 
     let session = get(&service, &clinician, &format!("/api/v1/lab-sessions/{id}")).await.json();
-    let files: Vec<_> = session["device_files"].as_array().unwrap().iter().map(|f| f["to_device"].clone()).collect();
+    let files: Vec<_> =
+        session["controller_files"].as_array().unwrap().iter().map(|f| f["to_device"].clone()).collect();
     assert_eq!(files, [json!(true), json!(false)]);
     let mut writer = service.store.write().await.unwrap();
     for walk in 1..=3 {

@@ -345,8 +345,8 @@ impl Dispatch for Refuses {
         self.inner.submit(assignment)
     }
 
-    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
-        self.inner.withdraw(trial)
+    fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        self.inner.cancel(trial)
     }
 
     fn next(&self) -> BoxFuture<'_, News> {
@@ -429,8 +429,8 @@ impl Dispatch for Changed {
         self.engine.submit(assignment)
     }
 
-    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
-        self.engine.withdraw(trial)
+    fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        self.engine.cancel(trial)
     }
 
     fn next(&self) -> BoxFuture<'_, News> {

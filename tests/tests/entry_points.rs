@@ -42,7 +42,7 @@ enum EntryPoint {
     /// The answer of a subject about two walks.
     WalkAnswer,
     /// A controller file of a trial.
-    DeviceFile,
+    ControllerFile,
     /// A controller file of a walk.
     WalkFile,
     /// Bounds to take.
@@ -86,7 +86,7 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
         "post /api/v1/studies/{id}/lab-sessions" | "post /studies/{id}/lab" => EntryPoint::Plan,
         "post /api/v1/lab-sessions/{id}/walks" | "post /lab/{id}" => EntryPoint::Walk,
         "post /api/v1/lab-sessions/{id}/answers" | "post /lab/{id}/answer" => EntryPoint::WalkAnswer,
-        "get /api/v1/trials/{id}/controller.json" => EntryPoint::DeviceFile,
+        "get /api/v1/trials/{id}/controller.json" => EntryPoint::ControllerFile,
         "get /api/v1/lab-sessions/{id}/controller.json" => EntryPoint::WalkFile,
         "get /api/v1/studies/{id}/recommendation" | "get /api/v1/studies/{id}/recommendation.csv" => {
             EntryPoint::Recommendation
@@ -315,13 +315,13 @@ async fn call(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session:
 /// Whether a rule applies to an entry point; the reason if it cannot be broken there.
 fn expected(entry_point: EntryPoint, rule: Rule) -> Result<(), &'static str> {
     match (entry_point, rule) {
-        (EntryPoint::Plan | EntryPoint::Walk | EntryPoint::DeviceFile | EntryPoint::WalkFile, Rule::Duplicate) => {
+        (EntryPoint::Plan | EntryPoint::Walk | EntryPoint::ControllerFile | EntryPoint::WalkFile, Rule::Duplicate) => {
             Err("the same gaits may be walked with again")
         }
         (EntryPoint::Walk | EntryPoint::WalkFile, Rule::EqualGaits | Rule::NotConverged) => {
             Err("a session with such a pair cannot be planned")
         }
-        (EntryPoint::DeviceFile, Rule::EqualGaits) => Err("a file is of one gait"),
+        (EntryPoint::ControllerFile, Rule::EqualGaits) => Err("a file is of one gait"),
         _ => Ok(()),
     }
 }
@@ -401,7 +401,7 @@ async fn every_entry_point_applies_every_rule() {
                     | EntryPoint::Suggestion
                     | EntryPoint::Plan
                     | EntryPoint::Walk
-                    | EntryPoint::DeviceFile
+                    | EntryPoint::ControllerFile
                     | EntryPoint::WalkFile
             )
         })
@@ -426,7 +426,7 @@ async fn every_entry_point_applies_every_rule() {
             let scene = Scene::new().await;
             let session = scene.session(1).await;
             let mut pair = scene.violate(rule).await;
-            if (*entry_point, rule) == (EntryPoint::DeviceFile, Rule::NotConverged) {
+            if (*entry_point, rule) == (EntryPoint::ControllerFile, Rule::NotConverged) {
                 pair = (pair.1, pair.0);
             }
             let before = scene.rows().await;

@@ -9,7 +9,6 @@ use gaitwright_store::studies::StudyState;
 use gaitwright_store::{Store, StoreError, backup, read_only};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
-use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use std::path::Path;
@@ -214,34 +213,4 @@ async fn backup_of_a_running_service_is_complete_and_usable() {
     again.stop().await;
     std::fs::write(&copy, b"not a database at all").unwrap();
     assert!(read_only::check(&copy).await.is_err());
-}
-
-/// Files of the server, and modules that they must not name.
-const WALLS: [(&str, &[&str]); 5] = [
-    ("http/src/api/", &["crate::pages"]),
-    ("http/src/pages/", &["crate::api"]),
-    ("http/src/figures/", &["crate::api", "crate::pages"]),
-    ("service/src/access/", &["crate::studies", "crate::workers"]),
-    ("service/src/workers/", &["crate::access", "crate::studies"]),
-];
-
-#[test]
-fn modules_do_not_depend_on_each_other_across_the_walls_of_the_architecture() {
-    let files = sources::of_server();
-    for (folder, forbidden) in WALLS {
-        let behind: Vec<_> = files.iter().filter(|(file, _)| file.starts_with(folder)).collect();
-        assert!(behind.len() > 3, "{folder} has moved");
-        for (file, text) in behind {
-            let crossed = forbidden.iter().find(|module| text.contains(*module));
-            assert_eq!(crossed, None, "{file}");
-        }
-    }
-}
-
-/// SQL needs the crate `sqlx`.
-#[test]
-fn only_the_store_contains_sql() {
-    for (file, text) in sources::of_server() {
-        assert!(file.starts_with("store/") || !text.contains("sqlx"), "{file}");
-    }
 }

@@ -225,8 +225,8 @@ impl Dispatch for Breaks {
     fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>> {
         self.inner.submit(assignment)
     }
-    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
-        self.inner.withdraw(trial)
+    fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        self.inner.cancel(trial)
     }
     fn next(&self) -> BoxFuture<'_, News> {
         assert!(!self.broken.load(Ordering::SeqCst), "the engine broke");

@@ -1,9 +1,12 @@
 //! Mean activity of a muscle over the gait cycle, and EMG RMSE.
 
-use super::{CYCLE_POINTS, Envelope};
+use super::envelope::Envelope;
 use crate::reference::STRIDE_RANGE_S;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
+
+/// Number of points of a gait cycle: 0, 1, ..., 100 %.
+pub const CYCLE_POINTS: usize = 101;
 
 /// Activity of one channel at 0, 1, ..., 100 % of the gait cycle, as mean over strides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -66,7 +66,7 @@ pub(super) struct Disturbance {
     pub(super) push: Push,
     pub(super) delay_periods: usize,
     pub(super) terrain: Terrain,
-    /// Depth of the ground under body weight, m.
+    /// How far the ground yields under body weight, m.
     pub(super) yield_m: f64,
     /// Noise of the sensors: the constant error of the thigh angle in rad, and a stream.
     pub(super) noise: Option<(f64, Random)>,

@@ -6,8 +6,8 @@
 //! instead of tracking its own angle, and the hip of a swinging leg tracks the thigh in space, as people do. The person
 //! senses the own body without error, so the hip position over the toe of the stance leg tells the time of the stride.
 
-use super::CONTROL_PERIOD_S;
 use super::actuator::LaggedJoint;
+use super::control_period::CONTROL_PERIOD_S;
 use super::foot_contact::FootContact;
 use super::gains::Gains;
 use super::planned_stride::PlannedStride;

@@ -1,6 +1,6 @@
 //! The gait as the controllers store it: set points and feed-forward torques, sampled at their rate.
 
-use super::CONTROL_PERIOD_S;
+use super::control_period::CONTROL_PERIOD_S;
 use crate::gait::Gait;
 use crate::gait::motion::instant;
 

@@ -5,8 +5,8 @@
 //! the foot is on the ground, the linearised hip position over its toe is the phase variable; in swing it is the thigh
 //! angle. A heel strike restarts the clock.
 
-use super::CONTROL_PERIOD_S;
 use super::actuator::Drive;
+use super::control_period::CONTROL_PERIOD_S;
 use super::foot_contact::FootContact;
 use super::gains::Gains;
 use super::planned_stride::PlannedStride;

@@ -4,7 +4,7 @@ use super::simulated_walk::{End, WalkOutcome};
 use crate::statistics::wilson_interval;
 use serde::{Deserialize, Serialize};
 
-/// Simulated walks on one ground.
+/// Simulated walks on one kind of ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WalksOnGround {
@@ -16,7 +16,7 @@ pub struct WalksOnGround {
     pub completed: u32,
     /// Walks that ended with a fall.
     pub fell: u32,
-    /// Walks that ended without a further step.
+    /// Walks that ended with a halt: the walker took no further step.
     pub halted: u32,
     /// Share of completed walks.
     pub completed_share: f64,
@@ -24,13 +24,15 @@ pub struct WalksOnGround {
     pub completed_share_interval: [f64; 2],
     /// Mean number of completed strides.
     pub mean_strides: f64,
-    /// Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    /// Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
     pub knee_saturated_share: f64,
-    /// The same for its ankle.
+    /// Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
     pub ankle_saturated_share: f64,
-    /// Share of the time in which the knee wanted to change its torque faster than it can.
+    /// Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
+    /// make.
     pub knee_rate_limited_share: f64,
-    /// The same for the ankle.
+    /// Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
+    /// make.
     pub ankle_rate_limited_share: f64,
 }
 
@@ -43,7 +45,7 @@ pub struct SurvivedPushes {
     pub forwards_n_s: f64,
     /// Backwards, N s.
     pub backwards_n_s: f64,
-    /// Largest push of the ladder, N s.
+    /// Largest push of the series, N s.
     pub largest_tried_n_s: f64,
 }
 
@@ -51,7 +53,7 @@ pub struct SurvivedPushes {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StridesOnYield {
-    /// Depth of the ground under body weight, m.
+    /// How far the ground yields under body weight, m.
     pub yield_m: f64,
     /// Completed strides.
     pub strides: u32,
@@ -69,13 +71,14 @@ pub struct ExecutionReport {
     pub seed: u64,
     /// Strides of a complete simulated walk.
     pub strides: u32,
-    /// Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    /// Range from which the body masses of disturbed walks are drawn, kg: ±5 %, limited to the range of the model.
     pub body_mass_kg: [f64; 2],
     /// Completed strides without any disturbance.
     pub undisturbed_strides: u32,
-    /// Randomly disturbed walks, for each ground.
+    /// Randomly disturbed walks, for each kind of ground.
     pub grounds: Vec<WalksOnGround>,
-    /// Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    /// Undisturbed walks on level ground, ordered from hard ground to soft ground. In all other walks the ground yields
+    /// 0.01 m under body weight.
     pub strides_by_yield: Vec<StridesOnYield>,
     /// Pushes. `None` if the walker does not complete the undisturbed walk.
     pub pushes: Option<SurvivedPushes>,

@@ -4,7 +4,7 @@
 //! resolution and noise are not published. Encoders of 14 bits are those of the Open-Source Leg (Azocar et al. 2020);
 //! their rates come from the motors, through a gear of about 50. The other values are assumptions.
 
-use super::CONTROL_PERIOD_S;
+use super::control_period::CONTROL_PERIOD_S;
 use super::plant::Motion;
 use super::random::Random;
 use crate::body::Side;

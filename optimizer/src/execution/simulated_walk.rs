@@ -1,6 +1,6 @@
 //! One simulated walk: plant, controllers and disturbance, until the last stride, a fall or a halt.
 
-use super::CONTROL_PERIOD_S;
+use super::control_period::CONTROL_PERIOD_S;
 use super::disturbance::{Disturbance, PUSH_DURATION_S};
 use super::human::Human;
 use super::planned_stride::PlannedStride;

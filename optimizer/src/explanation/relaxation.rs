@@ -54,7 +54,7 @@ pub struct RelaxedBound {
 /// the way to its loosest value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointRelaxation {
-    /// The bounds, one of each conflict.
+    /// The bounds, one from each conflict.
     pub bounds: Vec<RelaxedBound>,
     /// As in a [`Relaxation`].
     pub undecided: bool,

@@ -12,7 +12,7 @@ const WEAK_RATIO: f64 = 100.0;
 pub struct ActiveConstraint {
     /// Domain, node and quantity, as in `SS1_R node 3, velocity of knee_R`.
     pub place: String,
-    /// Multiplier of the scaled constraint: decrease of the objective per unit that the constraint is relaxed.
+    /// Multiplier of the scaled constraint: decrease of the objective per unit by which the constraint is relaxed.
     pub multiplier: f64,
 }
 

@@ -15,15 +15,16 @@ const LARGEST_CHANGE: f64 = 1e-5;
 pub struct FigureDerivatives {
     /// Of the objective.
     pub objective: f64,
-    /// Of the mechanical cost of transport.
+    /// Derivative of the mechanical cost of transport.
     pub cost_of_transport: f64,
-    /// Of Gait RMSE, rad.
+    /// Derivative of Gait RMSE, rad per unit of the bound.
     pub gait_rmse_rad: f64,
-    /// Of the mean walking speed, m/s.
+    /// Derivative of the mean walking speed, m/s per unit of the bound.
     pub speed_m_s: f64,
-    /// Of the largest angle at a node of torso, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, rad.
+    /// Derivatives of the largest angle over all nodes, rad per unit of the bound, for torso, hip_L, knee_L, ankle_L,
+    /// hip_R, knee_R and ankle_R in this order.
     pub largest_angles_rad: [f64; 7],
-    /// Of the smallest angle at a node, rad.
+    /// Derivatives of the smallest angle over all nodes, in the order of the largest angles, rad per unit of the bound.
     pub smallest_angles_rad: [f64; 7],
 }
 

@@ -33,9 +33,6 @@ const ANGLES: [(&str, usize, usize); 5] = [
 const COORDINATES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
-/// Colour of the right leg, as in the stick figures; the left one has the first colour.
-const RIGHT: usize = 3;
-
 /// Figures that belong together.
 #[derive(Debug)]
 pub struct Group {

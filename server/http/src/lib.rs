@@ -9,6 +9,7 @@ pub mod api;
 mod authentication;
 mod authorization;
 mod blind_motion;
+mod body_limits;
 mod body_measures;
 mod client_address;
 pub mod connections;
@@ -55,10 +56,3 @@ pub use host_header::{Hosts, is_loopback_name};
 pub use network::{NETWORKS, Network};
 pub use router::{router, with_layers};
 pub use shared_state::{AccessState, AppState};
-
-/// Largest request body.
-const BODY_LIMIT_BYTES: usize = 1 << 20;
-/// The same for callers who are not signed in.
-const ANONYMOUS_BODY_LIMIT_BYTES: usize = 64 << 10;
-/// The same for uploads of measurement files.
-const RECORDING_LIMIT_BYTES: usize = 16 << 20;

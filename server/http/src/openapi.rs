@@ -18,9 +18,12 @@ use utoipa_axum::router::OpenApiRouter;
     info(
         title = "Gaitwright",
         description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
-                       not a medical device.\n\nLengths are in metres, masses in kilograms and angles in radians, unless \
-                       a name or a description says otherwise. Times are RFC 3339 in UTC. Whole numbers are written without a fraction: 10, \
-                       not 10.0.\n\nLists come in pages: `items` has the entries, and `next` is the `cursor` of the next page.",
+                       not a medical device.\n\nThe published method, or the paper, is: Li, Tucker, Gehlhar, Yue, Ames, \
+                       Natural Multicontact Walking for Robotic Assistive Devices via Musculoskeletal Models and \
+                       Hybrid Zero Dynamics, IEEE Robotics and Automation Letters 2022.\n\nLengths are in metres, masses \
+                       in kilograms and angles in radians, unless a name or a description says otherwise. Times are \
+                       RFC 3339 in UTC. Whole numbers are written without a fraction: 10, not 10.0.\n\nLists come in \
+                       pages: `items` has the entries, and `next` is the `cursor` of the next page.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/"))

@@ -397,8 +397,8 @@ fn device(name: &str) -> Value {
     json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
 }
 
-/// The schema of muscle parameters: omitted values are those of the published table, and a muscle has moment arms only
-/// at the joints that it spans.
+/// The schema of muscle parameters: omitted values are the default ones, and a muscle has moment arms only at the
+/// joints that it spans.
 fn muscles() -> Value {
     let published = MuscleParameters::default();
     let mut properties = Map::new();

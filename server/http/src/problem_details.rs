@@ -21,7 +21,8 @@ pub(super) const PROBLEM_JSON: &str = "application/problem+json";
 /// A problem document.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub(super) struct Problem {
-    /// Address that identifies the kind of problem. It does not change between versions, and its page explains the kind.
+    /// Address that identifies the kind of problem, and of a page that explains it. It does not change between
+    /// versions.
     #[serde(rename = "type")]
     pub(super) kind: &'static str,
     /// Name of this kind of problem.

@@ -1,7 +1,7 @@
 //! Receives the whole body of a request before anything decides about the request. A decision that was made while the
 //! body was still on its way could be out of date when it takes effect.
 
-use super::{ANONYMOUS_BODY_LIMIT_BYTES, BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
+use super::body_limits::{ANONYMOUS_BODY_LIMIT_BYTES, BODY_LIMIT_BYTES, MEASUREMENT_FILE_LIMIT_BYTES};
 use axum::body::{Body, HttpBody};
 use axum::extract::{MatchedPath, Request};
 use futures_util::StreamExt;
@@ -22,7 +22,7 @@ pub(super) fn limit(request: &Request, is_signed_in: bool) -> usize {
     let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
     match route {
         _ if !is_signed_in => ANONYMOUS_BODY_LIMIT_BYTES,
-        Some(route) if UPLOADS.contains(&route) => RECORDING_LIMIT_BYTES,
+        Some(route) if UPLOADS.contains(&route) => MEASUREMENT_FILE_LIMIT_BYTES,
         _ => BODY_LIMIT_BYTES,
     }
 }
@@ -36,7 +36,7 @@ pub(super) async fn receive(request: Request, limit: usize) -> Result<Request, E
     let (parts, body) = request.into_parts();
     let too_large = || {
         Error::TooLarge(format!(
-            "The body is too large. The limit is {BODY_LIMIT_BYTES} bytes, {RECORDING_LIMIT_BYTES} for uploads of \
+            "The body is too large. The limit is {BODY_LIMIT_BYTES} bytes, {MEASUREMENT_FILE_LIMIT_BYTES} for uploads of \
              measurement files, and {ANONYMOUS_BODY_LIMIT_BYTES} without sign-in."
         ))
     };

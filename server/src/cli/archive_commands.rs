@@ -94,8 +94,8 @@ impl NewKey {
 
 #[derive(Debug, Args)]
 pub(super) struct Prune {
-    /// Delete trajectories of studies that ended more than this many days ago. Keeps gaits that are or may be
-    /// recommended, their warm starts, and gaits of lab sessions.
+    /// Delete the motions of gaits in studies that ended more than this many days ago. Keeps those of gaits that are or
+    /// may be recommended, of the gaits that these were warm-started from, and of gaits of lab sessions.
     #[arg(long, value_name = "DAYS", value_parser = days, allow_negative_numbers = true)]
     older_than_days: u32,
     #[command(flatten)]

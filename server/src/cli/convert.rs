@@ -22,7 +22,7 @@ enum Form {
     Mot,
     /// The stride as a row of pictures (SVG).
     Tiles,
-    /// Animation of the walker in a loop (SVG).
+    /// Looping animation of the walker (SVG).
     Animation,
 }
 

@@ -10,7 +10,10 @@ type Choice = (&'static str, &'static str);
 /// Formats of a file of joint angles.
 pub(super) const JOINT_ANGLE_FORMATS: [Choice; 3] = [
     ("opensim", "OpenSim motion or storage file (.mot, .sto) of a gait model"),
-    ("camargo", "The `data` table of an `ik` file of Camargo 2021, written by MATLAB's writetable"),
+    (
+        "camargo",
+        "The `data` table of an `ik` file from the data set Camargo 2021, exported as CSV with MATLAB's writetable",
+    ),
     ("csv", "time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad; optionally knee_R_rad, right_force_n"),
 ];
 /// Units of angles.
@@ -23,7 +26,7 @@ pub(super) const HEEL_STRIKES: [Choice; 3] = [
 ];
 /// Formats of an EMG recording.
 pub(super) const EMG_FORMATS: [Choice; 2] =
-    [("csv", "A header with the names of the columns"), ("opensim", "OpenSim storage file (.sto)")];
+    [("csv", "CSV file whose header names the columns"), ("opensim", "OpenSim storage file (.sto)")];
 
 /// Reads one of these names as the REST interface reads it.
 pub(super) fn one_of<T>(choices: impl IntoIterator<Item = Choice>) -> impl TypedValueParser<Value = T>

@@ -63,6 +63,9 @@ enum Ended {
 /// A preference-learning tuning service for walking gaits of powered prostheses.
 ///
 /// Research software; not a medical device.
+///
+/// The paper is K. Li, M. Tucker, R. Gehlhar, Y. Yue, A. D. Ames, Natural Multicontact Walking for Robotic Assistive
+/// Devices via Musculoskeletal Models and Hybrid Zero Dynamics, IEEE Robotics and Automation Letters, 2022.
 #[derive(Debug, Parser)]
 #[command(name = "gaitwright", version, about)]
 struct Cli {
@@ -74,11 +77,11 @@ struct Cli {
 enum Command {
     /// Run the service: web pages, REST interface and the studies in a database.
     Serve(serve::Serve),
-    /// Run solves for a service on another machine, through a NATS broker.
+    /// Run solves on this machine for a service on another machine, through a NATS broker.
     Worker(worker::Worker),
     /// Run an unattended study in which Gait RMSE, not a person, decides the comparisons.
     ///
-    /// Continues an unfinished study with the same settings.
+    /// If the record has an unfinished study with the same settings, continues it instead of creating another one.
     Tune(tune::Tune),
     /// Reproduce the paper's comparison of gaits with and without muscles.
     Reproduce(reproduce::Reproduce),
@@ -110,7 +113,7 @@ enum Command {
     Backup(backup::Backup),
     /// Replace a record with a backup, while the service is stopped.
     ///
-    /// The replaced record is kept next to it.
+    /// The replaced record is kept in the same folder under another name.
     Restore(backup::Restore),
     /// Export a study to an archive, even while the service is running.
     Export(archive_commands::Export),

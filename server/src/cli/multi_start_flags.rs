@@ -11,12 +11,12 @@ fn initial_guesses(text: &str) -> Result<usize, String> {
 
 #[derive(Debug, Clone, Args)]
 pub(super) struct MultiStartFlags {
-    /// Number of initial guesses that a cold start always tries (default: 2). They may lead to different gaits, called
-    /// local optima or basins.
+    /// Smallest number of initial guesses that a cold start tries (default: 2). They may lead to different local
+    /// optima, that is, different gaits.
     #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
     initial_guesses: Option<usize>,
-    /// Choose the gait nearest to the reference among those whose objective is within this percentage of the lowest
-    /// (default: the lowest objective).
+    /// Among the gaits whose objective is within this percentage of the lowest, choose the one with the lowest Gait
+    /// RMSE (default: the gait with the lowest objective).
     #[arg(long, value_name = "PERCENT", value_parser = number, allow_negative_numbers = true)]
     nearest_within: Option<f64>,
 }

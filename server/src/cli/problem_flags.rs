@@ -107,7 +107,8 @@ pub(super) struct ProblemFlags {
     /// Scaled optimality tolerance (default: 1e-6).
     #[arg(long, value_name = "NUMBER", value_parser = number, allow_negative_numbers = true)]
     tolerance: Option<f64>,
-    /// Maximum number of iterations of each phase (default: 1000). Phases that track the reference have at most 200.
+    /// Maximum number of iterations in each stage of a solve (default: 1000). Stages that track the reference gait are
+    /// limited to 200.
     #[arg(long, value_name = "NUMBER", value_parser = iterations, allow_negative_numbers = true)]
     max_iterations: Option<usize>,
     /// Time limit of a solve (default: none).

@@ -16,10 +16,10 @@ pub(super) struct Simulate {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// Number of simulated walks on each ground.
+    /// Number of simulated walks for each value of --ground.
     #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().walks, value_parser = walks, allow_negative_numbers = true)]
     walks: u32,
-    /// Largest height and depth of the uneven ground, 0 to 50 mm (default: 0, 5 and 10 in turn).
+    /// Largest height of bumps and depth of dips in the ground, 0 (level) to 50 mm (default: 0, 5 and 10 in turn).
     #[arg(long, value_name = "MILLIMETRES", value_parser = ground, allow_negative_numbers = true)]
     ground: Option<f64>,
     /// Seed for the disturbances.

@@ -52,14 +52,15 @@ pub(super) struct Solve {
         ]
     )]
     problem: Option<PathBuf>,
-    /// Start from another local optimum (basin) in the file given to --warm. Basins are numbered from 1, in the order
-    /// in which the initial guesses reached them; `solve` prints the list if there are several (default: the basin of
+    /// Start from another local optimum in the file given to --warm. They are numbered from 1, in the order in which
+    /// the initial guesses reached them; `solve` prints the list if there are several (default: the local optimum of
     /// the gait in that file).
     #[arg(long, value_name = "NUMBER", requires = "warm", value_parser = basin, allow_negative_numbers = true)]
     warm_basin: Option<usize>,
     #[command(flatten)]
     multi_start: MultiStartFlags,
-    /// Output file (JSON) for the results, the gait, its multipliers and lineage, and the gaits of other local optima.
+    /// Output file (JSON) for the results, the gait, its multipliers, the gaits that it was warm-started from, and the
+    /// gaits of other local optima.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the results as one JSON object.
@@ -72,9 +73,9 @@ pub(super) struct Solve {
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
     #[arg(long)]
     certify: bool,
-    /// For a converged gait, print for each tuned bound how the results change with it (to first order), where it is
-    /// active, and how far it can move before the set of active constraints changes. With --json, adds the member
-    /// `sensitivities`.
+    /// For a converged gait, print for each of the bounds a1 to a8 how the results change with it (to first order),
+    /// where it is active, and how far it can move before the set of active constraints changes. With --json, adds the
+    /// member `sensitivities`.
     #[arg(long)]
     sensitivities: bool,
 }

@@ -11,10 +11,10 @@ pub(super) struct Body {
     /// Subject from the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg) (default: 1).
     #[arg(long, value_name = "NUMBER", value_parser = subject, allow_negative_numbers = true, conflicts_with_all = ["height_m", "mass_kg"])]
     subject: Option<u32>,
-    /// Body height, m.
+    /// Body height, m; with --mass-kg, instead of --subject.
     #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true, requires = "mass_kg")]
     height_m: Option<f64>,
-    /// Body mass, kg.
+    /// Body mass, kg; with --height-m, instead of --subject.
     #[arg(long, value_name = "KILOGRAMS", value_parser = number, allow_negative_numbers = true, requires = "height_m")]
     mass_kg: Option<f64>,
 }
@@ -32,9 +32,9 @@ impl Body {
 /// Whether to solve with muscles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Switch {
-    /// With muscles (C1-C12).
+    /// With muscles (constraints C1 to C12 of the paper).
     On,
-    /// Without muscles (C1-C4).
+    /// Without muscles (constraints C1 to C4 of the paper).
     Off,
 }
 

@@ -25,7 +25,7 @@ use std::sync::Arc;
 pub(super) struct Tune {
     #[command(flatten)]
     body: Body,
-    /// Solve with muscles (C1-C12) or without (C1-C4).
+    /// Whether to solve with muscles.
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
     #[command(flatten)]
@@ -38,7 +38,8 @@ pub(super) struct Tune {
     /// Seed for all random draws.
     #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Number of trials that run in parallel (default: number of cores). Only 1 is reproducible bit for bit.
+    /// Number of trials that run in parallel (default: number of cores). A study is reproducible bit for bit only with
+    /// 1.
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
     /// Also try actions whose gait is known from another trial, as the paper does.

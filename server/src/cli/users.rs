@@ -17,7 +17,7 @@ pub(super) struct Users {
 
 #[derive(Debug, Subcommand)]
 enum UsersCommand {
-    /// List users with their name, role, sign-in method and whether they are disabled.
+    /// List users: name, role, sign-in method, and whether the account is disabled.
     List {
         #[command(flatten)]
         record: AnchoredFlags,

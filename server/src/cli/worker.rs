@@ -16,7 +16,8 @@ use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, Args)]
 pub(super) struct Worker {
-    /// TOML settings file (default: GAITWRIGHT_CONFIG, or gaitwright.toml if it exists).
+    /// TOML settings file (default: the file that the environment variable GAITWRIGHT_CONFIG names, or gaitwright.toml
+    /// in the current folder if it exists).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Address of the NATS broker, nats://HOST:PORT.

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of an access.
+/// Kind of access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = AccessKind)]
@@ -58,7 +58,7 @@ pub struct Access {
     pub method: String,
     /// Route, or command.
     pub route: String,
-    /// Requested address, without secrets.
+    /// Requested URL, without secrets.
     pub object: String,
     /// HTTP status; 0 for the command line.
     pub status: u16,
@@ -98,7 +98,7 @@ pub struct AccessRow {
     pub method: String,
     /// Route, or command.
     pub route: String,
-    /// Requested address, without secrets.
+    /// Requested URL, without secrets.
     pub object: String,
     /// HTTP status; 0 for the command line.
     pub status: u16,

@@ -15,9 +15,9 @@ pub struct Assessment {
     pub id: AssessmentId,
     /// The study.
     pub study_id: StudyId,
-    /// Trial of one gait.
+    /// The trial with the first of the two gaits.
     pub first: TrialId,
-    /// Trial of the other gait.
+    /// The trial with the second of the two gaits.
     pub second: TrialId,
     /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
     pub answer: Judgement,

@@ -73,16 +73,16 @@ pub struct AuditRow {
     pub at: Instant,
     /// Who made the change.
     pub actor: String,
-    /// Action, such as `subject.add` or `study.pause`.
+    /// Kind of change, such as `subject.add` or `study.pause`.
     pub action: String,
-    /// Object of the action, such as `study 0190...`.
+    /// What was changed, such as `study 0190...`.
     pub object: String,
     /// Details of the change, with the reason if there is one.
     #[schema(value_type = openapi_schemas::AuditDetail)]
     pub detail: Value,
     /// Hash of the previous row.
     pub previous: String,
-    /// Hash of this row and the previous hash.
+    /// Hash over this row and the hash of the previous row.
     pub hash: String,
 }
 

@@ -1,12 +1,12 @@
 //! Borrowed connections: while one is held, the store cannot compute.
 
-use super::{Store, Writer};
+use super::Writer;
 use sqlx::Sqlite;
 use sqlx::pool::PoolConnection;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
-/// A resource that borrows the store until it is dropped, so that [`Store::compute`] cannot be called.
+/// A resource that borrows the store until it is dropped, so that [`Store::compute`](super::Store::compute) cannot be called.
 #[derive(Debug)]
 pub struct Lent<'a, T> {
     inner: T,
@@ -15,7 +15,7 @@ pub struct Lent<'a, T> {
 
 /// Has a destructor, so that the borrow lasts until the end of the scope instead of the last use.
 #[derive(Debug)]
-struct Borrowed<'a>(PhantomData<&'a Store>);
+struct Borrowed<'a>(PhantomData<&'a ()>);
 
 impl Drop for Borrowed<'_> {
     fn drop(&mut self) {}

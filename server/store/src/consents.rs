@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use utoipa::ToSchema;
 
-/// Kind of an entry.
+/// Kind of entry: consent or withdrawal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ConsentKind {
@@ -28,7 +28,7 @@ impl ConsentKind {
     }
 }
 
-/// Consent or withdrawal of a subject. The newest entry applies.
+/// A subject's consent, or withdrawal of consent. The newest entry applies.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Consent {
     /// Sequence number.

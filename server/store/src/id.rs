@@ -84,7 +84,7 @@ identifier!(SafetyReportId, "safety report");
 identifier!(SafetyReviewId, "safety review");
 identifier!(LabSessionId, "lab session");
 identifier!(MeasurementFileId, "measurement file of a lab session");
-identifier!(LabDeviceFileId, "controller file of a lab session");
+identifier!(LabControllerFileId, "controller file of a lab session");
 identifier!(EmgResultId, "result of EMG processing");
 
 macro_rules! holds_safety_reports {

@@ -45,7 +45,7 @@ pub struct OpenSolve {
     pub study_id: StudyId,
     /// Number of times that it was given to a worker.
     pub attempts: u32,
-    /// Attempts that ended with a panic or an error.
+    /// Attempts that crashed or ended with an error.
     pub failures: u32,
     /// Attempts whose worker stopped responding.
     pub losses: u32,

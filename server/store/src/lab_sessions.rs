@@ -67,9 +67,9 @@ pub struct LabSession {
     pub study_id: StudyId,
     /// Number in the study, from 1.
     pub number: u32,
-    /// Trial of one gait.
+    /// The trial with the first of the two gaits.
     pub gait_one: TrialId,
-    /// Trial of the other gait.
+    /// The trial with the second of the two gaits.
     pub gait_two: TrialId,
     /// What may be known of its allocation.
     pub allocation: OfSession,
@@ -110,9 +110,9 @@ pub struct NewLabSession<'a> {
     pub study_id: StudyId,
     /// Number in the study, from 1.
     pub number: u32,
-    /// Trial of one gait.
+    /// The trial with the first of the two gaits.
     pub gait_one: TrialId,
-    /// Trial of the other gait.
+    /// The trial with the second of the two gaits.
     pub gait_two: TrialId,
     /// Free text.
     pub notes: &'a str,

@@ -84,9 +84,9 @@ pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use free_disk_space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use id::{
-    AssessmentId, BackupId, DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabSessionId, MeasurementFileId,
-    MemberId, PresentationId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId,
-    TrialId, UserId,
+    AssessmentId, BackupId, DeviceId, EmgResultId, FeedbackId, JobId, LabControllerFileId, LabSessionId,
+    MeasurementFileId, MemberId, PresentationId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId,
+    SubjectId, TokenId, TrialId, UserId,
 };
 pub use schema_versions::SCHEMA_VERSION;
 pub use time::{Instant, now, set_machine_clock};

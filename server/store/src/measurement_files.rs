@@ -13,7 +13,7 @@ use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of a measurement file.
+/// Kind of measurement file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeasurementKind {

@@ -32,7 +32,7 @@ pub(super) fn binds(reach: Reach) -> (bool, bool, Option<String>) {
     (reach.is_every(), reach.is_open(), principal)
 }
 
-/// Kind of a member.
+/// Kind of member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MemberKind {

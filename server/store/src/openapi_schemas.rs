@@ -30,7 +30,7 @@ document! {
     ReferenceGaitDocument
 }
 document! {
-    /// What exactly was changed; its fields depend on the action.
+    /// What exactly was changed; its fields depend on the kind of change.
     AuditDetail
 }
 
@@ -48,7 +48,7 @@ document! {
     LearnerSettings
 }
 document! {
-    /// Muscle values that differ from the published table.
+    /// Muscle values that differ from the default ones.
     MuscleParameters
 }
 document! {
@@ -83,7 +83,7 @@ pub struct Dimension {
     pub name: String,
     /// Its values, ascending.
     pub values: Vec<f64>,
-    /// Difference between values within which gaits are expected to have similar utility.
+    /// How far apart two values can be while their gaits are still expected to have similar utility.
     pub lengthscale: f64,
 }
 
@@ -130,7 +130,8 @@ pub struct Conflict {
     pub bounds: Vec<GivenBound>,
     /// Bounds of other conflicts that were relaxed when this one was found.
     pub without: Option<Vec<String>>,
-    /// Naturalness terms involved in a conflict between fixed constraints; absent if there are none.
+    /// Requirements for natural walking that take part in a conflict between fixed constraints, in words; absent if
+    /// there are none.
     pub naturalness_terms: Option<Vec<String>>,
     /// Violations in the motion closest to feasibility that the search found, with all other tuned bounds at their
     /// loosest, worst first.
@@ -154,7 +155,7 @@ pub struct Relaxation {
     pub to: Option<f64>,
     /// The loosest value tried that does not give a gait.
     pub not_with: f64,
-    /// Whether a solve with that value gave up, so that infeasibility is not certain.
+    /// Whether the solve at the `not_with` value gave up, so that infeasibility is not certain.
     pub undecided: bool,
     /// Number of solves.
     pub solves: u64,
@@ -182,7 +183,7 @@ pub struct RelaxedBound {
 /// Computed if no single relaxation gives a gait.
 #[derive(Debug, ToSchema)]
 pub struct JointRelaxation {
-    /// The bounds, one of each conflict.
+    /// The bounds, one from each conflict.
     pub bounds: Vec<RelaxedBound>,
     /// Whether a solve at the `not_with` values gave up, so that infeasibility is not certain.
     pub undecided: bool,
@@ -260,11 +261,11 @@ pub struct SolveReport {
     pub gait_rmse_rad: f64,
     /// Parts of Gait RMSE: torso, `hip_L`, `knee_L`, `ankle_L`, `hip_R`.
     pub gait_rmse_parts_rad: Vec<f64>,
-    /// Largest violation of a constraint row or bound, scaled.
+    /// Largest violation of a constraint or of a limit on a variable, scaled.
     pub max_violation: f64,
     /// How well the conditions of a local optimum are met. Null if unknown.
     pub optimality: Option<Optimality>,
-    /// Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes as well.
+    /// Number of limits that were tightened at nodes, so that the gait satisfies them between the nodes as well.
     pub tightened_bounds: u64,
     /// For each tuned bound, the range of values for which the gait remains a solution, even if several bounds change
     /// at once. Empty if the solve did not converge, or if unknown.
@@ -306,7 +307,7 @@ pub struct UnchangedBound {
     pub most: Option<f64>,
 }
 
-/// One attempt of a solve.
+/// One attempt within a solve, from one starting point.
 #[derive(Debug, ToSchema)]
 pub struct SolveAttempt {
     /// Strategy, in words.
@@ -323,7 +324,7 @@ pub struct SolveAttempt {
     pub gait_rmse_rad: f64,
     /// Reason if it could not be completed; otherwise empty.
     pub reason: String,
-    /// Which local optimum it ended in, from 1; null if it did not converge.
+    /// Number of the local optimum in which it ended, counted from 1; null if it did not converge.
     pub basin: Option<u64>,
     /// Whether its gait is the result of the solve.
     pub chosen: bool,
@@ -334,7 +335,7 @@ pub struct SolveAttempt {
 pub struct Optimality {
     /// Largest entry of the Lagrangian's gradient.
     pub dual_infeasibility: f64,
-    /// Largest product of a distance to a bound and its multiplier.
+    /// Largest product of the distance to a limit and its multiplier.
     pub complementarity: f64,
     /// Last barrier parameter.
     pub barrier: f64,
@@ -357,7 +358,7 @@ pub struct LinearAlgebra {
     pub fallbacks: u64,
 }
 
-/// A certificate: what an independent simulation of a gait found.
+/// A certificate: the result of checking a gait independently of the optimiser.
 #[derive(Debug, ToSchema)]
 pub struct Certificate {
     /// Version of this layout and of its checks.
@@ -582,20 +583,21 @@ pub struct ExecutionReport {
     pub seed: u64,
     /// Strides of a complete simulated walk.
     pub strides: u32,
-    /// Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    /// Range from which the body masses of disturbed walks are drawn, kg: ±5 %, limited to the range of the model.
     #[schema(min_items = 2, max_items = 2)]
     pub body_mass_kg: Vec<f64>,
     /// Completed strides without any disturbance.
     pub undisturbed_strides: u32,
-    /// Randomly disturbed walks, for each ground.
+    /// Randomly disturbed walks, for each kind of ground.
     pub grounds: Vec<WalksOnGround>,
-    /// Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    /// Undisturbed walks on level ground, ordered from hard ground to soft ground. In all other walks the ground yields
+    /// 0.01 m under body weight.
     pub strides_by_yield: Vec<StridesOnYield>,
     /// Largest pushes survived. Null if the walker does not complete the undisturbed walk.
     pub pushes: Option<SurvivedPushes>,
 }
 
-/// Simulated walks on one ground.
+/// Simulated walks on one kind of ground.
 #[derive(Debug, ToSchema)]
 pub struct WalksOnGround {
     /// Largest height and depth of the plateaus of the ground, m.
@@ -606,7 +608,7 @@ pub struct WalksOnGround {
     pub completed: u32,
     /// Walks that ended with a fall.
     pub fell: u32,
-    /// Walks that ended without a further step.
+    /// Walks that ended with a halt: the walker took no further step.
     pub halted: u32,
     /// Share of completed walks.
     pub completed_share: f64,
@@ -615,33 +617,35 @@ pub struct WalksOnGround {
     pub completed_share_interval: Vec<f64>,
     /// Mean number of completed strides.
     pub mean_strides: f64,
-    /// Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    /// Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
     pub knee_saturated_share: f64,
-    /// The same for its ankle.
+    /// Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
     pub ankle_saturated_share: f64,
-    /// Share of the time in which the knee wanted to change its torque faster than it can.
+    /// Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
+    /// make.
     pub knee_rate_limited_share: f64,
-    /// The same for the ankle.
+    /// Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
+    /// make.
     pub ankle_rate_limited_share: f64,
 }
 
-/// Undisturbed simulated walk on ground of some stiffness.
+/// Undisturbed simulated walk on ground of a given stiffness.
 #[derive(Debug, ToSchema)]
 pub struct StridesOnYield {
-    /// Depth of the ground under body weight, m.
+    /// How far the ground yields under body weight, m.
     pub yield_m: f64,
     /// Completed strides.
     pub strides: u32,
 }
 
-/// Largest pushes of a fixed ladder that the walker survives, without other disturbances.
+/// Largest pushes, of a fixed series of increasing ones, that the walker survives without other disturbances.
 #[derive(Debug, ToSchema)]
 pub struct SurvivedPushes {
     /// Forwards, N s; 0 if it survives none.
     pub forwards_n_s: f64,
     /// Backwards, N s.
     pub backwards_n_s: f64,
-    /// Largest push of the ladder, N s.
+    /// Largest push of the series, N s.
     pub largest_tried_n_s: f64,
 }
 
@@ -650,7 +654,7 @@ pub struct SurvivedPushes {
 pub struct ActiveConstraint {
     /// Domain, node and quantity.
     pub place: String,
-    /// Multiplier of the scaled constraint: decrease of the objective per unit that the constraint is relaxed.
+    /// Multiplier of the scaled constraint: decrease of the objective per unit by which the constraint is relaxed.
     pub multiplier: f64,
 }
 
@@ -659,16 +663,17 @@ pub struct ActiveConstraint {
 pub struct FigureDerivatives {
     /// Of the objective.
     pub objective: f64,
-    /// Of the mechanical cost of transport.
+    /// Derivative of the mechanical cost of transport.
     pub cost_of_transport: f64,
-    /// Of Gait RMSE, rad.
+    /// Derivative of Gait RMSE, rad per unit of the bound.
     pub gait_rmse_rad: f64,
-    /// Of the mean walking speed, m/s.
+    /// Derivative of the mean walking speed, m/s per unit of the bound.
     pub speed_m_s: f64,
-    /// Of the largest angle at a node of torso, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, rad.
+    /// Derivatives of the largest angle over all nodes, rad per unit of the bound, for torso, hip_L, knee_L, ankle_L,
+    /// hip_R, knee_R and ankle_R in this order.
     #[schema(min_items = 7, max_items = 7)]
     pub largest_angles_rad: Vec<f64>,
-    /// Of the smallest angle at a node, rad.
+    /// Derivatives of the smallest angle over all nodes, in the order of the largest angles, rad per unit of the bound.
     #[schema(min_items = 7, max_items = 7)]
     pub smallest_angles_rad: Vec<f64>,
 }

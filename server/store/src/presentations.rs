@@ -12,7 +12,8 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Why a pair is shown.
+/// Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement; `null`,
+/// the same gait twice, in older records only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = PresentationKind)]

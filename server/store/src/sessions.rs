@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 /// Session of a user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Session {
-    /// Identifier, which is not the secret.
+    /// Identifier. It is not the value of the session cookie.
     pub id: SessionId,
     /// Identifier of the user.
     pub user_id: UserId,

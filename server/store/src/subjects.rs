@@ -206,7 +206,7 @@ pub async fn corrections(db: &mut Connection, id: SubjectId) -> StoreResult<Vec<
     rows.fetch_all(db).await?.iter().map(correction).collect()
 }
 
-/// The measured muscle values of a subject, which override the published table.
+/// The measured muscle values of a subject, which override the default ones.
 ///
 /// # Errors
 /// Errors of the database.

@@ -1,9 +1,11 @@
 //! A gait over its cycle: from right heel strike, or for each leg from its own.
 
-use super::RIGHT;
 use crate::gait_series::{Point, points};
 use crate::{Chart, LegCycle, Span, Stroke};
 use gait_optimizer::Gait;
+
+/// Colour of the right leg, as in the stick figures; the left one has the first colour.
+pub(super) const RIGHT: usize = 3;
 
 /// Number of moments of a stride at which the cursor is shown on an orbit.
 const MOMENTS: usize = 101;

@@ -25,7 +25,7 @@ use gaitwright_store::{AssessmentId, StudyId, studies};
     operation_id = "list_assessments",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "A page, by time", body = Page<Assessment>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, oldest first", body = Page<Assessment>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(

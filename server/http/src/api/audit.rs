@@ -26,7 +26,7 @@ pub(super) struct Filter {
     path = "/audit",
     operation_id = "list_audit_trail",
     tag = "operation",
-    params(("contains" = Option<String>, Query, max_length = 200, description = "Text to find in the actor, action or object")),
+    params(("contains" = Option<String>, Query, max_length = 200, description = "Text to find in the actor, the kind of change or the object")),
     responses((status = 200, description = "A page", body = Page<AuditRow>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]

@@ -36,9 +36,9 @@ pub(super) struct From {
 
 /// Follow the events of a study
 ///
-/// Sends `study_state` with the current state, then recorded events with an id, which are replayed after
-/// `Last-Event-ID`, and `progress` of running solves. The stream stays open after the end of the study, because the
-/// study can be extended.
+/// Sends `study_state` with the current state first, then the recorded events, each with an id, and `progress` events
+/// of running solves. A client that sends `Last-Event-ID` receives the recorded events that followed it. The stream
+/// stays open after the end of the study, because the study can be extended.
 #[utoipa::path(
     get,
     path = "/studies/{id}/events",

@@ -44,7 +44,7 @@ impl From<KeptReport> for TrialExecutionReport {
 
 /// Get the execution report of a trial
 ///
-/// The newest report: how simulated walks with the gait end outside the optimiser's model.
+/// The newest report of walks that were simulated with the gait outside the optimiser's model.
 #[utoipa::path(
     get,
     path = "/trials/{id}/execution-report",
@@ -66,8 +66,8 @@ pub(super) async fn get(
 
 /// Request the execution report of a trial
 ///
-/// The gait of the trial must have converged. Walks on level ground, on ground of ±5 mm and of ±10 mm are simulated. The
-/// same number of walks and seed give the same report.
+/// The gait of the trial must have converged. Walks on level ground, and on ground uneven by ±5 mm and by ±10 mm, are
+/// simulated. The same number of walks and seed give the same report.
 #[utoipa::path(
     post,
     path = "/trials/{id}/execution-report",
@@ -76,7 +76,7 @@ pub(super) async fn get(
     params(("id" = TrialId, Path, description = "The trial")),
     request_body = WalksAsked,
     responses(
-        (status = 200, description = "Finished job, if the newest report has these walks", body = Job),
+        (status = 200, description = "Finished job, if the newest report has this number of walks and this seed", body = Job),
         (status = 202, description = "Job that simulates the walks, with lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),

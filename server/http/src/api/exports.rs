@@ -85,7 +85,7 @@ pub(super) async fn motion_file(
 
 /// Download the controller file of a trial
 ///
-/// The gait must be walkable: converged, with a certificate, and without an open safety report.
+/// The gait must be walkable: converged, with a certificate, and without a safety report in force.
 #[utoipa::path(
     get,
     path = "/trials/{id}/controller.json",
@@ -112,11 +112,11 @@ pub(super) async fn controller(
     let number = gait.number();
     let write = move |pool: &OnPool| gait.controller_file(&trajectory.unpack(pool)?, sampling.rate_hz);
     let text = app.compute(write).await??;
-    Ok(device_file(&format!("controller-trial-{number}.json"), text, vec![id]))
+    Ok(controller_file_response(&format!("controller-trial-{number}.json"), text, vec![id]))
 }
 
 /// A controller file, which is sent only if every gait that it may be of is still walkable then.
-pub(super) fn device_file(name: &str, text: String, gaits: Vec<TrialId>) -> Response {
+pub(super) fn controller_file_response(name: &str, text: String, gaits: Vec<TrialId>) -> Response {
     let mut answer = file("application/json", name, text);
     answer.extensions_mut().insert(OnlyWhileWalkable(gaits));
     answer

@@ -115,8 +115,8 @@ pub(super) async fn of_session(
     params(
         ("id" = StudyId, Path, description = "The study"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("x" = Option<String>, Query, description = "Bound on the horizontal axis of maps. The first one by default"),
-        ("y" = Option<String>, Query, description = "Bound on the vertical axis of maps. The second one by default")
+        ("x" = Option<String>, Query, description = "The bound to show on the horizontal axis of a map. The first one by default"),
+        ("y" = Option<String>, Query, description = "The bound to show on the vertical axis of a map. The second one by default")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),

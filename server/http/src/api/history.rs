@@ -21,14 +21,14 @@ use std::sync::Arc;
 
 /// Get the history of the recommendation
 ///
-/// The best trial after each iteration.
+/// The best trial after each iteration of the study, that is, after each result.
 #[utoipa::path(
     get,
     path = "/studies/{id}/history",
     operation_id = "get_study_history",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "A page, by iteration", body = Page<Milestone>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, in order of iterations", body = Page<Milestone>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -42,14 +42,14 @@ pub(super) async fn of_study(
 
 /// Download the history as CSV
 ///
-/// The best trial after each iteration.
+/// The best trial after each iteration of the study, that is, after each result.
 #[utoipa::path(
     get,
     path = "/studies/{id}/history.csv",
     operation_id = "get_study_history_csv",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "One row for each iteration", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "One row for each iteration of the study", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(

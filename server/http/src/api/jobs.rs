@@ -36,7 +36,7 @@ pub(super) struct Job {
     result: Option<String>,
     /// Reason if it failed. Null otherwise.
     reason: Option<String>,
-    /// Share of the work that is done, 0 to 1, where it is known: while walks are simulated. Null otherwise.
+    /// Share of the work that is done, 0 to 1. Known only while walks are simulated; null otherwise.
     progress: Option<f64>,
     /// Attempts and worker of an open solve. Null otherwise.
     solve: Option<OpenSolve>,

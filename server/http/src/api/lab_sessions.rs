@@ -31,7 +31,7 @@ use utoipa::ToSchema;
     operation_id = "list_lab_sessions",
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Lab sessions, by number", body = Page<LabSessionView>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Lab sessions, in order of number", body = Page<LabSessionView>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -147,7 +147,7 @@ pub(super) async fn controller(
         GaitOfWalk::Two => two,
     };
     let name = format!("controller-walk-{}.json", of.walk);
-    Ok(exports::device_file(&name, text, vec![session.gait_one, session.gait_two]))
+    Ok(exports::controller_file_response(&name, text, vec![session.gait_one, session.gait_two]))
 }
 
 /// Closing of a session.

@@ -22,7 +22,7 @@ pub(crate) struct Motion {
     stride_time_s: f64,
     /// Stride length, m.
     stride_length_m: f64,
-    /// Nodes by time. Interpolate linearly between them.
+    /// Nodes in order of time. Interpolate linearly between them.
     frames: Vec<Frame>,
 }
 

@@ -28,7 +28,7 @@ use utoipa::ToSchema;
     operation_id = "list_preferences",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "A page, by time", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, oldest first", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -52,7 +52,7 @@ pub(super) async fn of_study(
     operation_id = "list_preferences_csv",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "All preferences, by time", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "All preferences, oldest first", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(

@@ -23,7 +23,7 @@ use utoipa::ToSchema;
 /// Safety report about a gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct SafetyReport {
-    /// Identifier of the report. A report from a blinded pair, an assessment or a lab session has the identifier of that
+    /// Identifier of the report. A report from a blind pair, an assessment or a lab session has the identifier of that
     /// object, so reports about both of its gaits share one identifier.
     id: SafetyReportId,
     /// Trial of the gait.
@@ -32,7 +32,8 @@ pub(super) struct SafetyReport {
     author: String,
     /// Time of the report.
     created_at: Instant,
-    /// Whether the report is open, so that the gait must not be walked.
+    /// Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. The gait must
+    /// not be walked.
     open: bool,
     /// Newest review. Null while the report awaits review.
     review: Option<SafetyReview>,
@@ -49,15 +50,16 @@ impl From<Closed> for SafetyReport {
 
 /// List safety reports of a study
 ///
-/// Includes safety reports from raters, assessments and lab sessions, and reports about a single gait, even if the gait was
-/// cleared for walking. Omits retracted reports. A report from a blinded lab session is listed for both of its gaits.
+/// Includes safety reports from raters, assessments and lab sessions, and reports about a single gait. A report stays
+/// in the list after its gait is cleared for walking; a retracted report does not. A report from a blinded lab session
+/// is listed for both of its gaits.
 #[utoipa::path(
     get,
     path = "/studies/{id}/safety-reports",
     operation_id = "list_safety_reports",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Safety reports, by time", body = Page<SafetyReport>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Safety reports, oldest first", body = Page<SafetyReport>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(

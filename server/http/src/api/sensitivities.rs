@@ -22,7 +22,7 @@ pub(super) struct TrialSensitivities {
     sentences: Vec<String>,
     /// Mechanical cost of transport of the gait.
     cost_of_transport: f64,
-    /// Each tuned bound, in the order of an action.
+    /// One entry for each tuned bound, a1 to a8.
     bounds: Vec<SensitivityToBound>,
 }
 
@@ -39,11 +39,11 @@ struct SensitivityToBound {
     /// Derivatives of the figures of the gait.
     #[schema(value_type = openapi_schemas::FigureDerivatives)]
     derivatives: FigureDerivatives,
-    /// Values of the bound between which the active constraints stay the same, to first order. Null: for every value in
-    /// that direction.
+    /// Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
+    /// is null if there is no limit in that direction.
     #[schema(value_type = Vec<Option<f64>>, min_items = 2, max_items = 2)]
     interval: (Option<f64>, Option<f64>),
-    /// Whether a constraint is about to become active or inactive, so that the derivatives to both sides differ.
+    /// Whether a constraint is about to become active or inactive, so that the derivatives on the two sides differ.
     is_weakly_active: bool,
     /// Change of the bound by one step of the study's grid. Null if the study does not tune the bound.
     grid_step: Option<GridStep>,
@@ -77,7 +77,8 @@ impl SensitivityToBound {
 
 /// Get the sensitivities of a trial
 ///
-/// What changes, to first order, if a tuned bound moves. They are computed on request from the stored solution.
+/// How the figures of a gait change, to first order, with each tuned bound. Computed on request from the stored
+/// solution.
 #[utoipa::path(
     get,
     path = "/trials/{id}/sensitivities",

@@ -280,7 +280,7 @@ pub(super) async fn patch(
 
 /// Raise the trial budget of a study
 ///
-/// A study that has ended resumes.
+/// If the study has ended, it resumes.
 #[utoipa::path(
     post,
     path = "/studies/{id}/extend",

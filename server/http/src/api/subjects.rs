@@ -207,7 +207,7 @@ pub(super) async fn correct(
 
 /// Get measured muscle values of a subject
 ///
-/// Values that override the published table.
+/// Values that override the default muscle values.
 #[utoipa::path(
     get,
     path = "/subjects/{id}/muscles",
@@ -236,7 +236,7 @@ pub(super) async fn muscles(
     operation_id = "set_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    request_body(content = openapi_schemas::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the published table"),
+    request_body(content = openapi_schemas::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the default values"),
     responses((status = 200, description = "Muscle values", body = openapi_schemas::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

@@ -24,7 +24,7 @@ use gaitwright_store::{StudyId, studies};
     operation_id = "list_suggestions",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "A page, by time", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, oldest first", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(

@@ -43,7 +43,7 @@ fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
 
 /// List trials of a study
 ///
-/// By number, unless `sort` names another column.
+/// In order of number, unless `sort` names another column.
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials",
@@ -97,7 +97,7 @@ pub(super) async fn of_study(
     operation_id = "list_trials_csv",
     tag = "trials",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "All trials, by number", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "All trials, in order of number", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(

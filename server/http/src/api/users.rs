@@ -138,7 +138,7 @@ pub(super) async fn link(
 
 /// Disable a user
 ///
-/// Ends the sessions, links and tokens of the user.
+/// Ends the user's sessions, and revokes the user's links and tokens.
 #[utoipa::path(
     post,
     path = "/users/{id}/disable",

@@ -1,4 +1,4 @@
-//! The form for measured muscle parameters of a subject, which override the published table.
+//! The form for measured muscle parameters of a subject, which override the default ones.
 
 use crate::AppState;
 use crate::accessible::Id;

@@ -19,9 +19,9 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewAssessment)]
 pub struct NewAssessment {
-    /// Trial of one gait.
+    /// The trial with the first of the two gaits.
     pub first: TrialId,
-    /// Trial of the other gait.
+    /// The trial with the second of the two gaits.
     pub second: TrialId,
     /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. To state which gait is better, record a preference instead.
     pub answer: Judgement,

@@ -16,12 +16,12 @@ use utoipa::ToSchema;
 /// Largest number of simulated walks on a ground: some minutes of processor time.
 pub const MOST_WALKS: u32 = 1000;
 
-/// The simulated walks of a request. There are three grounds: level, ±5 mm and ±10 mm.
+/// A request to simulate walks. There are three kinds of ground: level, and uneven by ±5 mm or ±10 mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schema(as = NewExecutionReport)]
 pub struct WalksAsked {
-    /// Number of simulated walks on each ground, 1 to 1000.
+    /// Number of simulated walks on each kind of ground, 1 to 1000.
     #[schema(minimum = 1, maximum = 1000)]
     pub walks: u32,
     /// Seed of the disturbances. The same seed gives the same report.

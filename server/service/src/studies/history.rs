@@ -12,12 +12,12 @@ use serde::Serialize;
 use std::collections::HashMap;
 use utoipa::ToSchema;
 
-/// The recommendation after an iteration.
+/// The recommendation after one iteration of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Milestone {
     /// Number of results so far, from 1.
     pub iteration: u32,
-    /// Best trial after this iteration.
+    /// Best trial after this iteration of the study.
     pub trial_id: TrialId,
     /// Number of the best trial.
     pub number: u32,

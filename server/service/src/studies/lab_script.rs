@@ -28,7 +28,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ask {
-    /// Name of the evaluator, which has at most one open trial. Defaults to the caller's name.
+    /// Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub worker: Option<String>,

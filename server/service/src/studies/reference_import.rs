@@ -27,7 +27,7 @@ pub enum JointAngleFormat {
     /// OpenSim motion or storage file (.mot, .sto) of a gait model.
     #[default]
     Opensim,
-    /// The `data` table of an `ik` file of Camargo 2021, written by MATLAB's writetable.
+    /// The `data` table of an `ik` file from the data set Camargo 2021, exported as CSV with MATLAB's writetable.
     Camargo,
     /// CSV: time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad; optionally knee_R_rad, right_force_n.
     Csv,
@@ -52,16 +52,18 @@ impl From<Unit> for AngleUnit {
     }
 }
 
-/// How to find right heel strikes.
+/// How to find right heel strikes: `force`, where the vertical force under the right foot rises above 20 N; `kinematics`,
+/// where the right heel is farthest ahead of the pelvis; `ends`, at the first and the last row of a recording of one
+/// stride.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Strikes {
-    /// At instants where the vertical force under the right foot rises above 20 N.
+    /// From the vertical force.
     Force,
-    /// At instants where the right heel is farthest ahead of the pelvis.
+    /// From the position of the heel.
     #[default]
     Kinematics,
-    /// At the first and the last row: the recording is one stride, like an exported gait.
+    /// The ends of a recording that is one stride, like an exported gait.
     Ends,
 }
 

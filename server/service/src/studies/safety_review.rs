@@ -27,8 +27,8 @@ pub struct Decision {
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
-    /// The open safety reports that the reviewer has seen. The decision is refused if an open report is not among them. By
-    /// default, all open reports count as seen.
+    /// The safety reports in force that the reviewer has seen. The decision is refused if one of them is missing. By
+    /// default, all of them count as seen.
     #[serde(default)]
     pub reports: Option<Vec<SafetyReportId>>,
 }

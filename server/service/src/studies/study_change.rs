@@ -140,7 +140,7 @@ pub struct Extend {
     pub trial_budget: u32,
 }
 
-/// Raises the trial budget of a study. A study that has ended resumes.
+/// Raises the trial budget of a study. If the study has ended, it resumes.
 ///
 /// # Errors
 /// [`Error::Invalid`] if the budget would not increase, [`Error::NotFound`].

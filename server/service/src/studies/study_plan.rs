@@ -33,7 +33,8 @@ pub struct NewStudy {
     /// Reference gait for Gait RMSE. By default `falisse-2019`, whichever others are imported.
     #[serde(default)]
     pub reference_gait_id: Option<ReferenceGaitId>,
-    /// Whether to solve with muscles (C1-C12) or without (C1-C4).
+    /// Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
+    /// C4).
     #[serde(default = "yes")]
     pub muscles: bool,
     /// Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
@@ -52,7 +53,7 @@ pub struct NewStudy {
     #[serde(default)]
     #[schema(value_type = Option<openapi_schemas::SearchSpace>)]
     pub search_space: Option<GivenSpace>,
-    /// Settings of the learner. Absent settings take the values that the method recommends.
+    /// Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
     #[serde(default)]
     #[schema(value_type = openapi_schemas::LearnerSettings)]
     pub learner: LearnerSettings,
@@ -73,8 +74,8 @@ pub struct NewStudy {
     #[serde(default)]
     #[schema(minimum = 1, maximum = 10000)]
     pub unchanged_limit: Option<u32>,
-    /// Whether a trial may have an action whose gait is known from another trial, as in the paper. By default, only if
-    /// the learner may repeat actions. Has no effect if scripts evaluate the trials.
+    /// Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
+    /// Defaults to the `repeats` setting of the learner. Has no effect if scripts evaluate the trials.
     #[serde(default)]
     pub repeat_results: Option<bool>,
     /// Number of trials that run in parallel.

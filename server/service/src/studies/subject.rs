@@ -122,10 +122,11 @@ pub async fn correct(
     Ok(correction)
 }
 
-/// Records measured muscle values that override the published table. New studies use them.
+/// Records measured muscle values that override the default ones. New studies use them.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent.
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew
+/// consent.
 pub async fn set_muscles(
     writer: &mut Writer,
     actor: &Actor,

@@ -158,7 +158,7 @@ pub trait Dispatch: Send + Sync + 'static {
     fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>>;
 
     /// Cancels the solve of a trial, which stops within one iteration.
-    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()>;
+    fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()>;
 
     /// The next message. Dropping the future loses none.
     fn next(&self) -> BoxFuture<'_, News>;

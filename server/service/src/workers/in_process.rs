@@ -124,7 +124,7 @@ impl Dispatch for InProcess {
         Box::pin(async move { self.begin(assignment) })
     }
 
-    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+    fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()> {
         Box::pin(async move {
             // A hanging thread keeps its memory, but does not block others.
             if let Some((_, cancel)) = self.running().remove(&trial) {

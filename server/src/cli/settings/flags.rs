@@ -7,7 +7,8 @@ use std::path::PathBuf;
 /// Flags of every command that reads a record.
 #[derive(Debug, Clone, Default, Args)]
 pub(in crate::cli) struct RecordFlags {
-    /// TOML settings file (default: GAITWRIGHT_CONFIG, or gaitwright.toml if it exists).
+    /// TOML settings file (default: the file that the environment variable GAITWRIGHT_CONFIG names, or gaitwright.toml
+    /// in the current folder if it exists).
     #[arg(long, value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
     /// SQLite file of the record (default: gaitwright.db).
@@ -20,7 +21,8 @@ pub(in crate::cli) struct RecordFlags {
 pub(in crate::cli) struct AnchoredFlags {
     #[command(flatten)]
     pub(super) record: RecordFlags,
-    /// Second anchor file for the newest hashes of the record, preferably on another disk. An empty name means none.
+    /// Second anchor file, for the newest hashes of the record, preferably on another disk; the first one is next to
+    /// the database (default: none). An empty name overrides the settings file: no second anchor file.
     #[arg(long, value_name = "FILE")]
     pub(super) anchor: Option<String>,
 }

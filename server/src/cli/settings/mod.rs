@@ -3,6 +3,7 @@
 
 mod file;
 mod flags;
+mod known_settings;
 mod values;
 
 pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
@@ -10,6 +11,7 @@ pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
 use super::output::data;
 use file::{parse, read};
 use gaitwright_service::error::Error;
+use known_settings::KNOWN;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -19,37 +21,6 @@ const DEFAULT_FILE: &str = "gaitwright.toml";
 
 /// The environment variable that names another settings file.
 const FILE_VARIABLE: &str = "GAITWRIGHT_CONFIG";
-
-/// Every setting: name in the file, default, meaning. Flag and environment variable derive from the name.
-const KNOWN: &[(&str, &str, &str)] = &[
-    ("listen", "127.0.0.1:8080", "address and port to listen on"),
-    ("database", "gaitwright.db", "SQLite file"),
-    ("anchor", "", "second anchor file, preferably on another disk; the first one is next to the database"),
-    ("backup_folder", "", "folder for scheduled backups, preferably on another disk; empty: no backups"),
-    ("backup_hours", "24", "hours between scheduled backups"),
-    ("backup_keep", "14", "number of scheduled backups to keep"),
-    ("host_names", "", "comma-separated host names of the service, besides its address and localhost"),
-    ("workers", "cores", "number of solves that run in parallel; with nats, the total of all workers"),
-    ("nats", "", "NATS broker for remote workers, nats://HOST:PORT; empty: solve in this process"),
-    ("nats_queue", "gaitwright", "name of this service on the broker; its workers must use the same name"),
-    ("sign_in", "true", "whether users and programs must sign in; false only on a loopback address"),
-    ("idle_minutes", "60", "minutes without a request after which a session ends"),
-    ("session_hours", "12", "hours after which a session ends in any case"),
-    ("tls_certificate", "", "PEM file with the certificate chain; enables HTTPS, with tls_key"),
-    ("tls_key", "", "PEM file with the private key"),
-    ("trusted_proxies", "", "comma-separated addresses and networks of reverse proxies whose headers are trusted"),
-    (
-        "proxy_headers",
-        "x-forwarded",
-        "headers of the trusted proxies: x-forwarded (X-Forwarded-For, -Proto, -Host) or forwarded",
-    ),
-    ("connections", "1000", "maximum number of open connections, if the system has enough file descriptors"),
-    ("connections_per_address", "100", "maximum number of connections from one address; trusted proxies are exempt"),
-    ("access_log_days", "0", "days for which rows of the access log are kept; 0: forever"),
-    ("reserve_mb", "500", "free disk space, MB, below which no new study or solve starts"),
-    ("log", "warn,gaitwright=info", "log filter, as in RUST_LOG"),
-    ("log_format", "text", "log format: text or json"),
-];
 
 /// The origin of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]

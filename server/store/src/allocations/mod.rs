@@ -10,7 +10,9 @@ pub use biased_coin::Lot;
 
 use super::audit::Actor;
 use super::presentations::{Judgement, Presentation, SELECT};
-use super::{Connection, Instant, LabDeviceFileId, LabSessionId, PresentationId, StoreResult, StudyId, TrialId, now};
+use super::{
+    Connection, Instant, LabControllerFileId, LabSessionId, PresentationId, StoreResult, StudyId, TrialId, now,
+};
 use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
@@ -54,12 +56,12 @@ pub struct OfSession {
     /// Whether walk 2 uses gait one; `None` while the session is blinded.
     pub gait_one_first: Option<bool>,
     /// Who fetched controller files of its walks, in order.
-    pub files: Vec<DeviceFile>,
+    pub files: Vec<ControllerFileDownload>,
 }
 
 /// Download of the controller file of a walk.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct DeviceFile {
+pub struct ControllerFileDownload {
     /// Number of the walk, 2 or 3.
     pub walk: u8,
     /// Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
@@ -83,12 +85,12 @@ pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<OfSes
     let included = order.is_some();
     let gait_one_first = order.map(|row| row.try_get(0)).transpose()?.flatten();
     let files = sqlx::query("select * from lab_device_files where session_id = ? order by id").bind(id);
-    let files = files.fetch_all(db).await?.iter().map(device_file).collect::<StoreResult<_>>()?;
+    let files = files.fetch_all(db).await?.iter().map(controller_file).collect::<StoreResult<_>>()?;
     Ok(OfSession { included, gait_one_first, files })
 }
 
-fn device_file(row: &SqliteRow) -> StoreResult<DeviceFile> {
-    Ok(DeviceFile {
+fn controller_file(row: &SqliteRow) -> StoreResult<ControllerFileDownload> {
+    Ok(ControllerFileDownload {
         walk: row.try_get("walk")?,
         to_device: row.try_get("to_device")?,
         actor: row.try_get("actor")?,
@@ -107,7 +109,7 @@ pub async fn for_device(
     walk: u8,
     (actor, to_device): (&Actor, bool),
 ) -> StoreResult<Option<bool>> {
-    let id = LabDeviceFileId::fresh();
+    let id = LabControllerFileId::fresh();
     sqlx::query(
         "insert into lab_device_files (id, session_id, walk, to_device, actor, created_at) values (?, ?, ?, ?, ?, ?)",
     )

@@ -31,7 +31,7 @@ pub struct FeedbackRow {
     pub note: String,
     /// Whether it comes from a rater's blind comparison.
     pub by_rater: bool,
-    /// Whether that rater could have known the allocation, so that it does not count as blind.
+    /// Whether the rater could have known the allocation, so that the entry does not count as blind.
     pub unblinded: bool,
     /// Time of recording.
     pub created_at: Instant,
@@ -312,22 +312,6 @@ pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<LogVers
 pub async fn count(db: &mut Connection, study: StudyId) -> StoreResult<u32> {
     let row = sqlx::query("select count(*) from feedback where study_id = ?").bind(study).fetch_one(db).await?;
     Ok(row.try_get(0)?)
-}
-
-/// The converged trial of a study that was recorded last, other than `except`.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn last_converged(db: &mut Connection, study: StudyId, except: TrialId) -> StoreResult<Option<TrialId>> {
-    let row = sqlx::query(
-        "select trial_a from feedback where study_id = ? and kind = 'label' and category > 0 and trial_a <> ? \
-         order by seq desc limit 1",
-    )
-    .bind(study)
-    .bind(except)
-    .fetch_optional(db)
-    .await?;
-    Ok(row.map(|r| r.try_get(0)).transpose()?)
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {

@@ -85,7 +85,8 @@ pub struct StudyPlan {
     pub device_id: DeviceId,
     /// Reference gait for Gait RMSE.
     pub reference_gait_id: ReferenceGaitId,
-    /// Whether to solve with muscles (C1-C12) or without (C1-C4).
+    /// Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
+    /// C4).
     pub muscles: bool,
     /// Settings of the gait problem.
     #[schema(value_type = openapi_schemas::GaitSettings)]
@@ -112,8 +113,8 @@ pub struct StudyPlan {
     pub solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.
     pub unchanged_limit: Option<u32>,
-    /// Whether a trial may have an action whose gait is known from another trial, as in the paper. Always true for
-    /// studies created by versions without this setting.
+    /// Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
+    /// Always true for studies created by versions without this setting.
     pub repeat_results: bool,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     pub parallel_trials: u32,

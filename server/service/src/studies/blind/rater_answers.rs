@@ -45,8 +45,9 @@ pub struct RaterAnswer {
     pub note: String,
 }
 
-/// Confirmation of a rater's answer. It contains neither the gaits nor the answer, because the copy kept for repeated
-/// requests would otherwise reveal to readers of the study which gait was shown on which side.
+/// Confirmation of a rater's answer. The response is stored, to be sent again if the request is repeated. It contains
+/// neither the gaits nor the answer, so that anybody who can read the study does not learn which gait was shown on
+/// which side.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Answered {
     /// Number of the pair for this rater.
@@ -97,7 +98,7 @@ pub async fn next<'a>(
             let open = own_pair(&mut writer, caller, &open.token).await?;
             return Ok((writer, Some(open)));
         }
-        withdraw(&mut writer, open).await?;
+        cancel(&mut writer, open).await?;
     }
     let Some(pair) = question.filter(|pair| !safety_reports.is_skipped(*pair)) else { return Ok((writer, None)) };
     // The study may go on asking others; this person has answered, here or elsewhere.
@@ -148,7 +149,7 @@ async fn is_answered(
     Ok(preference::current_answer(db, study, pair, rater).await?.is_some())
 }
 
-async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
+async fn cancel(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
     let retracted = NewAnswer {
         judgement: Judgement::Retracted,
         response_ms: None,

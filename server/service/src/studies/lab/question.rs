@@ -26,8 +26,8 @@ pub struct AnswerView {
     pub actor: String,
     /// Time of recording.
     pub at: Instant,
-    /// Whether the answer is not blind: it was recorded after unblinding, or by a user who had fetched a controller
-    /// file.
+    /// Whether the person who recorded the answer could have known the allocation: it was recorded after unblinding, or
+    /// by a user who had fetched a controller file.
     pub could_have_known: bool,
 }
 

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::same_motion::is_same_gait;
 use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
-use gaitwright_store::allocations::{self, DeviceFile, Lot};
+use gaitwright_store::allocations::{self, ControllerFileDownload, Lot};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, Act, LabSession, LabSessionStep};
 use gaitwright_store::trials::{self, Trial, TrialState};
@@ -23,9 +23,9 @@ const LONGEST_NOTE: usize = 2000;
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewLabSession {
-    /// Converged trial of one gait.
+    /// Converged trial with one of the two gaits.
     pub gait_one: TrialId,
-    /// Converged trial of the other gait.
+    /// Converged trial with the other gait.
     pub gait_two: TrialId,
     /// Free text, at most 2000 characters.
     #[serde(default)]
@@ -102,9 +102,9 @@ pub struct LabSessionView {
     pub number: u32,
     /// State of the session.
     pub state: LabSessionState,
-    /// Trial of one gait. Does not imply the order of the walks.
+    /// The trial with the first of the two gaits. Does not imply the order of the walks.
     pub gait_one: TrialId,
-    /// Trial of the other gait.
+    /// The trial with the second of the two gaits.
     pub gait_two: TrialId,
     /// Free text.
     pub notes: String,
@@ -118,7 +118,7 @@ pub struct LabSessionView {
     /// it.
     pub allocation_included: bool,
     /// Who fetched controller files of the walks.
-    pub device_files: Vec<DeviceFile>,
+    pub controller_files: Vec<ControllerFileDownload>,
     /// Who closed the session, and when.
     pub closed: Option<LabSessionStep>,
     /// Who planned the session.
@@ -155,7 +155,7 @@ impl From<&LabSession> for LabSessionView {
             answer: session.answer().map(|answer| AnswerView::of(session, answer)),
             unblinded: session.done(Act::Unblinded).cloned(),
             allocation_included: session.allocation.included,
-            device_files: session.allocation.files.clone(),
+            controller_files: session.allocation.files.clone(),
             closed: session.done(Act::Closed).cloned(),
             planned_by: session.actor.clone(),
             created_at: session.created_at,
@@ -207,7 +207,7 @@ pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, 
     let to_device = caller.is_device();
     let is_one = allocations::for_device(writer, id, walk, (&caller.actor, to_device)).await?;
     let detail = json!({ "walk": walk, "to_device": to_device });
-    audit::append(writer, &caller.actor, "lab_session.device_file", &format!("lab session {id}"), &detail).await?;
+    audit::append(writer, &caller.actor, "lab_session.controller_file", &format!("lab session {id}"), &detail).await?;
     Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::One } else { GaitOfWalk::Two })
 }
 
@@ -336,7 +336,8 @@ pub struct LabSessionProgress {
     pub report_number: Option<u32>,
     /// Current answer of the subject.
     pub answer: Option<AnswerView>,
-    /// Whether the current answer can be retracted in the lab view.
+    /// Whether the current answer can be retracted: the session is neither closed nor unblinded, and the answer is not
+    /// a safety report.
     pub can_be_retracted: bool,
     /// Whether the session is closed.
     pub closed: bool,

@@ -56,7 +56,7 @@ impl Scheduler {
             }
         }
         if self.busy().await? > self.0.engine.size() {
-            self.withdraw(self.0.prefetches.forget_running()).await;
+            self.cancel_solves(self.0.prefetches.forget_running()).await;
         }
         if let Err(error) = self.0.engine.submit(assignment).await {
             // An expired lease is dispatched again.
@@ -74,9 +74,9 @@ impl Scheduler {
         Ok(leased as usize + self.0.prefetches.running())
     }
 
-    pub(super) async fn withdraw(&self, names: Vec<TrialId>) {
+    pub(super) async fn cancel_solves(&self, names: Vec<TrialId>) {
         for name in names {
-            self.0.engine.withdraw(name).await;
+            self.0.engine.cancel(name).await;
         }
     }
 }

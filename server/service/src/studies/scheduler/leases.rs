@@ -43,7 +43,7 @@ impl Scheduler {
             return Ok(());
         }
         *known = storages;
-        self.withdraw(self.0.prefetches.forget_running()).await;
+        self.cancel_solves(self.0.prefetches.forget_running()).await;
         let leased = jobs::leased(&mut *self.0.store.read().await?, Some(self.0.engine.name())).await?;
         for lease in leased {
             self.replace_unstarted(&lease).await?;

@@ -215,7 +215,7 @@ impl Scheduler {
 
     /// Cancels the solve of a trial, which stops within one iteration.
     pub async fn cancel_solve(&self, trial: TrialId) {
-        self.0.engine.withdraw(self.0.prefetches.name_of(trial)).await;
+        self.0.engine.cancel(self.0.prefetches.name_of(trial)).await;
         self.0.board.close(trial);
     }
 
@@ -258,7 +258,7 @@ impl Scheduler {
         );
         self.0.tasks.close();
         self.0.tasks.wait().await;
-        self.withdraw(self.0.prefetches.forget_running()).await;
+        self.cancel_solves(self.0.prefetches.forget_running()).await;
         self.take_back_leases().await
     }
 

@@ -76,7 +76,7 @@ impl Scheduler {
     /// Starts planning for each active study, in parallel, so that a large study does not delay the others.
     pub(super) async fn begin_plans(&self, plans: &mut Plans) -> Result<(), Error> {
         let active = studies::active(&mut *self.0.store.read().await?).await?;
-        self.withdraw(self.0.prefetches.forget(|id| active.iter().any(|study| study.id == id))).await;
+        self.cancel_solves(self.0.prefetches.forget(|id| active.iter().any(|study| study.id == id))).await;
         plans.keep(|id| active.iter().any(|study| study.id == id));
         for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
             let scheduler = self.clone();

@@ -33,7 +33,7 @@ impl Scheduler {
     pub(super) async fn prefetch(&self, likely: &mut LikelyNext, snapshot: &StudySnapshot) -> Result<(), Error> {
         let study = &snapshot.study;
         if !likely.knows(snapshot) {
-            self.withdraw(self.0.prefetches.forget(|other| other != study.id)).await;
+            self.cancel_solves(self.0.prefetches.forget(|other| other != study.id)).await;
         }
         let mut store = self.0.store.clone();
         let mut unpacking = self.0.unpacking.clone();
@@ -53,7 +53,7 @@ impl Scheduler {
                 && self.0.prefetches.begin(study.id, &assignment)
                 && let Err(error) = self.0.engine.submit(assignment).await
             {
-                self.withdraw(self.0.prefetches.forget_running()).await;
+                self.cancel_solves(self.0.prefetches.forget_running()).await;
                 return Err(error.into());
             }
         }

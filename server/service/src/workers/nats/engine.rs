@@ -1,7 +1,7 @@
 //! The engine of the service for remote workers: publishes jobs, receives heartbeats and results.
 
+use super::broker_connection::{AGAIN, BROKER_HEARTBEAT, BrokerConnection, EXPIRES, unreachable};
 use super::message::{Order, PROGRAM, ResultMessage, Sign, pack, unpack};
-use super::{AGAIN, BROKER_HEARTBEAT, BrokerConnection, EXPIRES, unreachable};
 use crate::workers::Assignment;
 use crate::workers::dispatch::{Dispatch, DispatchError, News, Receipt};
 use async_nats::jetstream::stream::{LastRawMessageErrorKind, Stream};
@@ -131,7 +131,7 @@ impl Dispatch for JetStream {
         Box::pin(self.publish(assignment))
     }
 
-    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+    fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()> {
         Box::pin(async move {
             if let Err(error) = self.recall(trial).await {
                 // Its result will arrive late and be ignored.

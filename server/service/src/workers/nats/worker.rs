@@ -1,7 +1,7 @@
 //! The remote worker: pulls jobs from the broker, solves them on its own threads, and publishes heartbeats and results.
 
+use super::broker_connection::{AGAIN, BrokerConnection, unreachable};
 use super::message::{Order, PROGRAM, ResultMessage, Sign, pack, unpack};
-use super::{AGAIN, BrokerConnection, unreachable};
 use crate::workers::dispatch::{Attempt, Dispatch, DispatchError, Finding, News};
 use crate::workers::{Evaluate, InProcess};
 use async_nats::jetstream::message::Acker;
@@ -156,7 +156,7 @@ impl Worker {
         }
         let attempt = order.assignment.attempt;
         // The broker redelivers jobs without heartbeats, so an older solve of this trial is obsolete.
-        self.engine.withdraw(attempt.trial).await;
+        self.engine.cancel(attempt.trial).await;
         tracing::info!(trial = %attempt.trial, attempt = attempt.number, "started a job");
         if let Err(error) = self.engine.submit(order.assignment).await {
             tracing::error!(%error, "cannot start a job; leaving it to other workers");
@@ -211,7 +211,7 @@ impl Worker {
 
     async fn drop_job(&self, held: &mut HashMap<TrialId, Held>, trial: TrialId, kind: AckKind) {
         if let Some(job) = held.remove(&trial) {
-            self.engine.withdraw(trial).await;
+            self.engine.cancel(trial).await;
             answer(&job.acker, kind).await;
         }
     }
