@@ -48,9 +48,9 @@ class FiguresMethods(Transport):
     ) -> bytes:
         """Download a figure of the posterior.
 
-        x: Bound on the horizontal axis of maps. The first one by default.
+        x: The bound to show on the horizontal axis of a map. The first one by default.
 
-        y: Bound on the vertical axis of maps. The second one by default.
+        y: The bound to show on the vertical axis of a map. The second one by default.
         """
         return self.request_bytes(
             "GET",
