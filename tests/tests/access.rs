@@ -181,7 +181,10 @@ async fn every_page_is_shown_to_users_with_its_right() {
                 if entry == "get /" && rights.contains(&Right::Rate) && !rights.contains(needed) {
                     assert_eq!(answer.headers["location"], "/rate", "{what}");
                 } else if rights.contains(needed) {
-                    assert!(!matches!(answer.status, StatusCode::SEE_OTHER | StatusCode::FORBIDDEN), "{what}");
+                    // The sample study needs no fields, so it is created.
+                    let created = entry == "post /studies/sample" && answer.status == StatusCode::SEE_OTHER;
+                    let refused = matches!(answer.status, StatusCode::SEE_OTHER | StatusCode::FORBIDDEN);
+                    assert!(created || !refused, "{what}");
                 } else if matches!(who, As::Nobody) && method == Method::POST {
                     assert_eq!(answer.status, StatusCode::UNAUTHORIZED, "{what}");
                 } else if matches!(who, As::Nobody) {
