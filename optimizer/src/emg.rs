@@ -13,7 +13,7 @@ mod filter_settings;
 mod model_activity;
 
 pub use activity::Activity;
-pub use cycle::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse};
+pub use cycle::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse, is_plausible, strides_between};
 pub use emg_recording::EmgRecording;
 pub use envelope::Envelope;
 pub use filter_settings::EmgSettings;

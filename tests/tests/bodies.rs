@@ -35,7 +35,7 @@ async fn device_is_copied_from_another_and_errors_appear_at_their_field() {
     let page = service.fetch(&path).await.text;
     assert!(page.contains("name=\"shank_mass_kg\"") && page.contains("0.2 to 15") && page.contains("prosthetic shank"));
     for (field, value, expected) in [
-        ("shank_mass_kg", "99", "shank_mass_kg is &#34;99&#34;; it must be 0.2 to 15."),
+        ("shank_mass_kg", "99", "is \u{201c}99\u{201d}; it must be 0.2 to 15."),
         ("shank_length_m", "long", "it must be 0.2 to 0.6"),
         ("name", "", "1 to 80 printable characters"),
         ("colour", "red", "a field of this form"),
@@ -76,7 +76,7 @@ async fn new_studies_use_the_recorded_muscles_of_their_subject() {
     service.wait_for(before, &[StudyState::Finished]).await;
     let (page, api) = (format!("/subjects/{subject}/muscles"), format!("/api/v1/subjects/{subject}/muscles"));
     for (typed, expected) in [
-        ("sol_max_force_n=1", "\u{201c}soleus: maximum isometric force, N\u{201d} is 1.0; it must be 50 to 20000."),
+        ("sol_max_force_n=1", "\u{201c}soleus: maximum isometric force, N\u{201d} is 1; it must be 50 to 20000."),
         ("sol_max_force_n=much", "a number, or empty"),
         ("sol_knee_lever_m=0.05", "sol does not span the knee"),
         ("sol_colour=1", "a field of this form"),

@@ -1,4 +1,4 @@
-//! No cell of a CSV file that the program writes begins a formula.
+//! CSV files: no cell begins a formula, and the history has a row for each iteration.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -110,5 +110,19 @@ async fn csv_endpoints_return_no_formulas() {
     for text in [format!("'{FORMULA}"), "'+1+1".to_owned(), "'@SUM(1)".to_owned(), "'-2+3".to_owned()] {
         assert!(cells(&csv).iter().flatten().any(|cell| *cell == text), "{text}: {csv}");
     }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn history_has_a_row_for_each_iteration_of_parallel_trials() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 3).await;
+    let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (14, 3)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let text = service.fetch(&format!("/api/v1/studies/{study}/history.csv")).await.text;
+    let iterations: Vec<u32> =
+        text.lines().skip(1).map(|line| line.split(',').next().unwrap().parse().unwrap()).collect();
+    let expected: Vec<u32> = (iterations[0]..=14).collect();
+    assert_eq!(iterations, expected, "{text}");
     service.stop().await;
 }

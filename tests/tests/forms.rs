@@ -428,8 +428,8 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
         format!("{changed}&subject={subject}&muscles=on&feedback_mode=automatic&parallel_trials=1&{}", rest.join("&"))
     };
     for (changed, field, said) in [
-        ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5.0; it must be 0.05 to 50000"),
-        ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0.0; it must be 0.001 to 2000"),
+        ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5; it must be 0.05 to 50000"),
+        ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0; it must be 0.001 to 2000"),
         ("values_a1=15,x", "values_a1", "\u{201c}Values of a1\u{201d} is "),
         ("trial_budget=many", "trial_budget", "\u{201c}Trials\u{201d} is "),
         ("seed=x", "seed", "\u{201c}Seed\u{201d} is "),
@@ -601,5 +601,222 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     assert!(!refused.text.contains("gait_"), "no secret");
     let nothing = send("act=make_token&name=treadmill&days=").await;
     is_page(&nothing, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Scopes\u{201d} must be one or more of");
+    service.stop().await;
+}
+
+/// The fields of the form for a new study, without subject.
+const STUDY: &str = "muscles=off&feedback_mode=human&parallel_trials=1&tuned_a5=on&device=&reference_gait=";
+
+/// The study that a redirect leads to.
+#[track_caller]
+fn made(answer: &Answer) -> StudyId {
+    assert_eq!(answer.status, StatusCode::SEE_OTHER, "{}", answer.text);
+    answer.headers["location"].to_str().unwrap().rsplit('/').next().unwrap().parse().unwrap()
+}
+
+#[tokio::test]
+async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
+    let (_folder, service) = service().await;
+    let body = format!(
+        "{STUDY}&subject=new&pseudonym=&height_m=173&body_mass_kg=65,7&trial_budget=0&seed=-1&values_a5=0,high"
+    );
+    let refused = service.post_text("/studies/new", FORM, &body).await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "6 fields need a correction");
+    for says in [
+        "\u{201c}Pseudonym\u{201d} must be",
+        "Did you mean 1.73 m?",
+        "Did you mean 65.7 kg?",
+        "\u{201c}Trials\u{201d} is 0",
+        "\u{201c}Seed\u{201d}",
+        "\u{201c}Values of a5\u{201d}",
+    ] {
+        assert!(refused.text.contains(says), "{says}: {}", refused.text);
+    }
+    for kept in ["value=\"human\" checked", "value=\"173\" inputmode=\"decimal\"", "value=\"65,7\"", "value=\"0,high\""]
+    {
+        assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
+    }
+    assert_eq!(refused.text.matches(" autofocus").count(), 1);
+    assert!(refused.text.contains("<svg class=\"chart\""), "the chosen reference gait stays");
+    assert_eq!(service.fetch("/api/v1/studies").await.items(), json!([]));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn height_and_mass_are_accepted_in_customary_units() {
+    let (_folder, service) = service().await;
+    let body = format!("{STUDY}&subject=new&pseudonym=S7&height_m=5+ft+8+in&body_mass_kg=145+lb&trial_budget=1&seed=1");
+    let study = made(&service.post_text("/studies/new", FORM, &body).await);
+    let body = service.get(study).await.plan.body.unwrap();
+    assert_eq!((body.height_m, body.body_mass_kg), (1.727, 65.77));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn subject_form_reports_every_refused_field() {
+    let (_folder, service) = service().await;
+    let refused =
+        service.post_text("/subjects", FORM, "pseudonym=a%40b&height_m=tall&body_mass_kg=20&notes=quiet").await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "a code assigned by the site");
+    for says in ["\u{201c}Height, m\u{201d}", "\u{201c}Body mass, kg\u{201d}", "quiet</textarea>", "value=\"tall\""] {
+        assert!(refused.text.contains(says), "{says}: {}", refused.text);
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn study_is_renamed_tagged_found_and_archived() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| new.trial_budget = 2).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let other = service.study(|new| (new.trial_budget, new.name) = (1, Some("Other".to_owned()))).await;
+    service.wait_for(other, &[StudyState::Finished]).await;
+    let details = format!("/studies/{study}/details");
+    let form = "act=save&name=Visit+2&tags=treadmill,+pilot,pilot&notes=shoes%0D%0Anew";
+    assert_eq!(made(&service.post_text(&details, FORM, form).await), study);
+    let stored = service.get(study).await;
+    assert_eq!((stored.plan.name.as_str(), stored.tags.join(" ")), ("Visit 2", "pilot treadmill".to_owned()));
+    assert_eq!(stored.notes, "shoes\nnew");
+    let lists = async |query: &str| {
+        let page = service.fetch(&format!("/{query}")).await.text;
+        [study, other].map(|id| page.contains(&format!("<a href=\"/studies/{id}\">")))
+    };
+    assert_eq!(lists("").await, [true, true]);
+    for query in ["?text=visit", "?text=SHOES", "?tag=pilot", "?text=treadm&state=finished"] {
+        assert_eq!(lists(query).await, [true, false], "{query}");
+    }
+    assert_eq!(lists("?state=draft").await, [false, false]);
+    assert_eq!(lists("?text=%25").await, [false, false], "no wildcard");
+    is_page(&service.fetch("/?state=lost").await, StatusCode::UNPROCESSABLE_ENTITY, "a state from the list");
+
+    let taken = service.post_text(&details, FORM, "act=save&name=Other&tags=&notes=kept").await;
+    is_page(&taken, StatusCode::UNPROCESSABLE_ENTITY, "for example \u{201c}Other (2)\u{201d}");
+    assert!(taken.text.contains("kept</textarea>"), "{}", taken.text);
+    let long = format!("act=save&name=x&tags={}&notes=", "t".repeat(41));
+    is_page(&service.post_text(&details, FORM, &long).await, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Tags\u{201d}");
+
+    assert_eq!(service.post_text(&details, FORM, "act=archive").await.status, StatusCode::SEE_OTHER);
+    assert_eq!((lists("").await, lists("?archived=yes").await), ([false, true], [true, false]));
+    assert!(service.fetch(&format!("/studies/{study}")).await.status.is_success(), "it is still there");
+    assert_eq!(service.post_text(&details, FORM, "act=restore").await.status, StatusCode::SEE_OTHER);
+    assert_eq!(lists("").await, [true, true]);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn running_study_cannot_be_archived() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let refused = service.post_text(&format!("/studies/{study}/details"), FORM, "act=archive").await;
+    is_page(&refused, StatusCode::CONFLICT, "A study that has not ended cannot be archived");
+    assert!(service.get(study).await.archived_at.is_none());
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn clone_has_the_set_up_of_its_study_with_relaxed_bounds() {
+    let (_folder, service) = service().await;
+    let study = service
+        .study(|new| {
+            (new.trial_budget, new.seed, new.priority, new.solve_seconds_budget) = (3, 7, 4, Some(500.0));
+            new.base_bounds.a6 = 0.25;
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let form = service.fetch(&format!("/studies/new?like={study}&relax=a7%3D35")).await;
+    is_page(&form, StatusCode::OK, "with relaxed <a href=\"#bounds\">bounds</a>");
+    for filled in
+        ["name=\"seed\" value=\"7\"", "name=\"values_a7\" value=\"35, 50\"", "name=\"trial_budget\" value=\"3\""]
+    {
+        assert!(form.text.contains(filled), "{filled}");
+    }
+    let subject = service.subject().await;
+    let body = format!("{STUDY}&subject={subject}&trial_budget=1&seed=8&values_a5=0,0.02&like={study}");
+    let clone = service.get(made(&service.post_text("/studies/new", FORM, &body).await)).await.plan;
+    assert_eq!((clone.seed, clone.priority, clone.solve_seconds_budget), (8, 4, Some(500.0)), "the rest is copied");
+    is_page(&service.fetch(&format!("/studies/new?like={UNKNOWN}")).await, StatusCode::NOT_FOUND, "There is no");
+    is_page(
+        &service.fetch(&format!("/studies/new?like={study}&relax=a7%3D900")).await,
+        StatusCode::UNPROCESSABLE_ENTITY,
+        "5 to 68",
+    );
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn equal_names_are_refused_or_numbered_without_naming_hidden_studies() {
+    let (_folder, service) = callers::service().await;
+    let admin = signed_in(&service, Role::Admin).await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let subject = service.subject().await;
+    let body = |name: &str, extra: &str| {
+        format!("{STUDY}&subject={subject}&trial_budget=1&seed=1&values_a5=0,0.02&name={name}{extra}")
+    };
+    let send_as =
+        async |who: &callers::As, body: &str| send(&service, who, &Method::POST, "/studies/new", FORM, body).await;
+    let secret = made(&send_as(&admin, &body("Secret", "&restricted=on")).await);
+    let clone = format!("/studies/new?like={secret}");
+    assert_eq!(send(&service, &admin, &Method::GET, &clone, "", "").await.status, StatusCode::OK);
+    is_page(&send(&service, &clinician, &Method::GET, &clone, "", "").await, StatusCode::NOT_FOUND, "no such study");
+    let like = format!("&like={secret}");
+    is_page(&send_as(&clinician, &body("Copy", &like)).await, StatusCode::NOT_FOUND, "no such study");
+    made(&send_as(&admin, &body("Open", "")).await);
+    is_page(&send_as(&admin, &body("Secret", "")).await, StatusCode::UNPROCESSABLE_ENTITY, "Secret (2)");
+    is_page(&send_as(&clinician, &body("Open", "")).await, StatusCode::UNPROCESSABLE_ENTITY, "Open (2)");
+    made(&send_as(&clinician, &body("Secret", "")).await);
+    let first = made(&send_as(&clinician, &body("", "")).await);
+    let second = made(&send_as(&clinician, &body("", "")).await);
+    let name = service.get(first).await.plan.name;
+    assert_eq!(service.get(second).await.plan.name, format!("{name} (2)"), "a default name is numbered");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn empty_record_offers_a_sample_study() {
+    let (_folder, service) = service().await;
+    assert!(service.fetch("/").await.text.contains("action=\"/studies/sample\""));
+    let study = made(&service.post_text("/studies/sample", FORM, "").await);
+    service.wait_for(study, &[StudyState::Finished]).await;
+    assert_eq!(service.get(study).await.plan.name, "Sample study");
+    assert!(!service.fetch("/").await.text.contains("action=\"/studies/sample\""));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn withdrawal_needs_confirmation_and_the_subject_is_offered_no_more() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let page = format!("/subjects/{subject}/withdraw");
+    let refused = service.post_text(&page, FORM, "reason=moved+away").await;
+    is_page(&refused, StatusCode::CONFLICT, "First tick the box");
+    assert!(refused.text.contains("value=\"moved away\""), "the reason is kept");
+    let option = format!("<option value=\"{subject}\"");
+    assert!(service.fetch("/studies/new").await.text.contains(&option));
+    let done = service.post_text(&page, FORM, "reason=moved+away&confirmed=yes").await;
+    assert_eq!(done.status, StatusCode::SEE_OTHER);
+    for page in ["/studies/new", "/reference-gaits"] {
+        assert!(!service.fetch(page).await.text.contains(&option), "{page}");
+    }
+    assert!(service.fetch("/subjects").await.text.contains("consent withdrawn"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn navigation_marks_the_present_page() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    for (path, marked) in [
+        ("/".to_owned(), "href=\"/\" aria-current=\"page\""),
+        ("/studies/new".to_owned(), "href=\"/studies/new\" aria-current=\"page\""),
+        ("/lab".to_owned(), "href=\"/lab\" aria-current=\"page\""),
+        (format!("/subjects/{subject}"), "href=\"/subjects\" aria-current=\"true\""),
+        ("/system".to_owned(), "href=\"/system\" aria-current=\"page\""),
+    ] {
+        let page = service.fetch(&path).await.text;
+        let navigation = page.split("<nav aria-label=\"Main\">").nth(1).unwrap().split("</nav>").next().unwrap();
+        assert!(navigation.contains(marked), "{path}: {navigation}");
+        assert_eq!(navigation.matches("aria-current").count(), 1, "{path}");
+    }
     service.stop().await;
 }

@@ -557,7 +557,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         (
             "emg",
             "walk=1&format=opensim&recording=x&rate_hz=1000",
-            "\u{201c}Sampling rate, Hz\u{201d} is 1000.0; it must be omitted",
+            "\u{201c}Sampling rate, Hz\u{201d} is 1000; it must be omitted",
         ),
         (
             "emg",
@@ -602,5 +602,54 @@ async fn limit_cycles_are_drawn_over_the_gait_after_unblinding() {
     service.post(&format!("{api}/unblind"), &json!({"reason": "all were walked"})).await;
     let after = service.fetch(&page).await.text;
     assert!(after.contains("limit cycle of the gait") && !after.contains("Right knee, walk 2"), "{after}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_left_out() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    let page = format!("/lab-sessions/{}/measurement-files/emg", id(&session));
+    let file = electromyogram(1.0).replace("RF_L", "EMG 1");
+    let send = async |rest: &str| {
+        service
+            .post_text(&page, FORM, &format!("walk=1&format=csv&recording={file}&heel_strike_threshold=0.5&{rest}"))
+            .await
+    };
+    let files =
+        async || service.fetch(&format!("/api/v1/lab-sessions/{}/measurement-files", id(&session))).await.items();
+
+    let columns =
+        "column_RF_L=EMG+1&column_TA_L=TA_L&column_BF_L=BF_L&column_GAS_L=GAS_L&column_RF_R=RF_R&column_BF_R=BF_R";
+    let first = send("act=preview").await;
+    assert_eq!(first.status, StatusCode::OK, "{}", first.text);
+    assert!(
+        first.text.contains("Not ready for upload") && first.text.contains("<option>EMG 1</option>"),
+        "{}",
+        first.text
+    );
+    let shown =
+        send(&format!("act=preview&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
+    assert!(shown.text.contains("The file can be uploaded: walk1.csv."), "{}", shown.text);
+    assert_eq!(shown.text.matches("raw signal</span>").count(), 6, "a chart for each channel");
+    assert!(shown.text.contains("<option selected>EMG 1</option>") && shown.text.contains("<td>rejected</td>"));
+    assert_eq!(files().await, json!([]), "a preview stores nothing");
+    let unreadable = service.post_text(&page, FORM, "walk=1&format=csv&recording=time_s,a%0A0,x&act=preview").await;
+    assert_eq!(unreadable.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", unreadable.text);
+
+    let beyond = send(&format!("act=upload&heel_strike_column=heel&rejected_strides=9&{columns}")).await;
+    assert!(
+        beyond.status == StatusCode::UNPROCESSABLE_ENTITY && beyond.text.contains("Rejected strides"),
+        "{}",
+        beyond.text
+    );
+    let kept =
+        send(&format!("act=upload&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
+    assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
+    assert_eq!(files().await[0]["file_name"], "walk1.csv");
+    let result = service.post(&format!("/api/v1/lab-sessions/{}/emg-results", id(&session)), &json!({})).await.json();
+    assert_eq!(result["result"]["walks"][0]["channels"][0]["strides"], 4, "{result}");
+    assert!(service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text.contains(">walk1.csv</a>"));
     service.stop().await;
 }

@@ -210,7 +210,7 @@ fn body_with(body: &Value, recording: &str) -> Value {
 }
 
 #[tokio::test]
-async fn new_study_uses_the_reference_gait_nearest_to_its_subject() {
+async fn import_does_not_change_the_reference_gait_of_new_studies() {
     let (_folder, service) = service().await;
     let near = service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json();
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await.json();
@@ -218,24 +218,28 @@ async fn new_study_uses_the_reference_gait_nearest_to_its_subject() {
     let kind = "application/x-www-form-urlencoded";
     let known = format!("{form}&subject={}&reference_gait=", service.subject().await);
     let tall = format!("{form}&subject=new&pseudonym=S09&height_m=1.98&body_mass_kg=66&reference_gait=");
-    for (body, reference) in [(known, &near), (tall.clone(), &far), (format!("{tall}{}", text(&near["id"])), &near)] {
+    for (body, nearest, is_chosen) in [
+        (known.clone(), &near, false),
+        (tall.clone(), &far, false),
+        (format!("{tall}{}", text(&near["id"])), &far, false),
+        (format!("{tall}{}", text(&far["id"])), &far, true),
+    ] {
         let checked = service.post_text("/studies/new/check", kind, &body).await.json();
         let shown = text(&checked["reference"]);
-        let is_nearest = body.ends_with('=');
-        assert_eq!(
-            shown.contains(&format!("{}: nearest to the subject", text(&reference["name"]))),
-            is_nearest,
-            "{checked}"
-        );
+        let name = text(&nearest["name"]);
+        let expected = if is_chosen { format!("{name}: nearest to the subject") } else { format!("{name} (distance") };
+        assert!(shown.contains(&expected), "{expected}: {checked}");
         assert_eq!(
             shown.contains("is nearer to the subject in height and body mass than this one"),
-            !is_nearest,
+            !is_chosen,
             "{checked}"
         );
     }
+    let default = service.study(|_| ()).await;
+    let default = service.get(default).await.plan.reference_gait_id;
     let made = service.post_text("/studies/new", kind, &tall).await;
     let study = made.headers["location"].to_str().unwrap().rsplit('/').next().unwrap().parse().unwrap();
-    assert_eq!(json!(service.get(study).await.plan.reference_gait_id), far["id"]);
+    assert_eq!(service.get(study).await.plan.reference_gait_id, default, "the built-in one");
     service.stop().await;
 }
 

@@ -21,7 +21,7 @@ const V1: &[u8] = include_bytes!("../records/v1.db.zst");
 /// Tables that sign-in alone fills, and the example does not.
 const OF_SIGN_IN: [&str; 3] = ["clock", "sign_in_failures", "sign_in_sources"];
 /// The records that are kept, by the form in which they were written.
-const RECORDS: [(i64, &[u8]); 8] = [
+const RECORDS: [(i64, &[u8]); 9] = [
     (1, V1),
     (7, include_bytes!("../records/v7.db.zst")),
     (8, include_bytes!("../records/v8.db.zst")),
@@ -30,6 +30,7 @@ const RECORDS: [(i64, &[u8]); 8] = [
     (11, include_bytes!("../records/v11.db.zst")),
     (12, include_bytes!("../records/v12.db.zst")),
     (13, include_bytes!("../records/v13.db.zst")),
+    (14, include_bytes!("../records/v14.db.zst")),
 ];
 
 fn unpacked(record: &[u8]) -> (TempDir, PathBuf) {

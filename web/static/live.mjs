@@ -4,6 +4,7 @@
 // Without this script the page is current after a reload, and sorting and filtering reload it.
 
 import { holdsEdits } from "./edited_fields.mjs";
+import { showLocalTimes } from "./local_times.mjs";
 
 const live = /** @type {HTMLElement | null} */ (document.getElementById("live"));
 
@@ -36,6 +37,18 @@ function replace(part, next) {
 
 /** @type {(shown: ParentNode) => HTMLElement | null} The place of the recommended gait. */
 const walkerOf = (shown) => shown.querySelector("[data-walker]");
+
+/** States in which a study needs a person, or has nothing left to do. */
+const NOTIFIED = ["waiting", "paused", "finished", "stopped"];
+const title = document.title;
+
+/** @type {(state: string) => void} Puts the state in the title of a tab that nobody looks at, until somebody does. */
+function notify(state) {
+  document.title = document.hidden && NOTIFIED.some((word) => state.startsWith(word)) ? `(${state}) ${title}` : title;
+}
+document.addEventListener("visibilitychange", () => {
+  if (!document.hidden) document.title = title;
+});
 
 /**
  * Shows another gait walking when it becomes the recommended one, but not while somebody uses the controls.
@@ -99,12 +112,14 @@ if (live) {
       const answer = await fetch(`/studies/${study}/live?${query}`);
       if (answer.ok) {
         const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
+        showLocalTimes(fresh);
         update(live, fresh);
         await updateWalker(live, fresh);
       }
       if (state() !== last) {
         last = state();
         announced.textContent = `The study is now: ${last}.`;
+        notify(last);
       }
       // The subject withdrew consent: the page shows nothing of the study any more.
       if (answer.status === 409) location.reload();

@@ -23,19 +23,20 @@ if (form) {
     if (turn !== asked) return;
     if (answer?.status === 401) outlook.textContent = "You are no longer signed in. If you send the form, it is kept until you have signed in again.";
     if (!answer?.ok) return;
-    const { field, text, reference } = await answer.json();
+    /** @type {{ faults: { field: string, text: string }[], text: string, reference?: string }} */
+    const { faults, text, reference } = await answer.json();
     for (const input of form.querySelectorAll("[aria-invalid]")) {
       input.removeAttribute("aria-invalid");
       if (input.getAttribute("aria-describedby") === outlook.id) input.removeAttribute("aria-describedby");
     }
-    if (field) {
+    for (const { field } of faults) {
       const input = form.querySelector(`[name="${CSS.escape(field)}"]`);
       input?.setAttribute("aria-invalid", "true");
       if (!input?.hasAttribute("aria-describedby")) input?.setAttribute("aria-describedby", outlook.id);
       input?.closest("details")?.setAttribute("open", "");
     }
-    outlook.classList.toggle("bad", Boolean(field));
-    outlook.textContent = text;
+    outlook.classList.toggle("bad", faults.length > 0);
+    outlook.textContent = text || faults.map((fault) => fault.text).join(" ");
     if (reference && reference !== drawn) {
       drawn = reference;
       chosen?.replaceChildren(...new DOMParser().parseFromString(reference, "text/html").body.childNodes);

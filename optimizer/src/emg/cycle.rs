@@ -21,6 +21,16 @@ pub struct CycleActivity {
     pub strides: usize,
 }
 
+/// The strides between successive heel strikes, s.
+pub fn strides_between(heel_strikes_s: &[f64]) -> Vec<(f64, f64)> {
+    heel_strikes_s.windows(2).map(|pair| (pair[0], pair[1])).collect()
+}
+
+/// Whether a stride, s, lasts as long as strides do.
+pub fn is_plausible((start, end): (f64, f64)) -> bool {
+    (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start))
+}
+
 impl CycleActivity {
     /// Segments an envelope at heel strikes, in s and increasing. Drops strides of implausible duration and strides
     /// that the recording covers in part only.
@@ -28,10 +38,18 @@ impl CycleActivity {
     /// # Errors
     /// [`ModelError::Malformed`] if no stride is left.
     pub fn cut(envelope: &Envelope, heel_strikes_s: &[f64]) -> Result<Self, ModelError> {
-        let strides: Vec<(f64, f64)> = heel_strikes_s
-            .windows(2)
-            .map(|pair| (pair[0], pair[1]))
-            .filter(|(start, end)| (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start)))
+        Self::of_strides(envelope, &strides_between(heel_strikes_s))
+    }
+
+    /// The same for given strides, s.
+    ///
+    /// # Errors
+    /// As [`Self::cut`].
+    pub fn of_strides(envelope: &Envelope, strides: &[(f64, f64)]) -> Result<Self, ModelError> {
+        let strides: Vec<(f64, f64)> = strides
+            .iter()
+            .copied()
+            .filter(|stride| is_plausible(*stride))
             .filter(|(start, end)| *start >= envelope.start_s && *end <= envelope.end_s())
             .collect();
         if strides.is_empty() {

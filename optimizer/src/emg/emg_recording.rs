@@ -1,6 +1,6 @@
 //! Raw EMG signals, and the checks that they are raw.
 
-use super::{CycleActivity, EmgSettings, Envelope};
+use super::{CycleActivity, EmgSettings, Envelope, strides_between};
 use crate::model_error::ModelError;
 use crate::opensim::StorageFile;
 use crate::reference::{contacts, given};
@@ -207,7 +207,15 @@ impl EmgRecording {
     /// # Errors
     /// As [`Self::envelopes`] and [`CycleActivity::cut`].
     pub fn cycles(&self, heel_strikes_s: &[f64], settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
-        self.envelopes(settings)?.iter().map(|envelope| CycleActivity::cut(envelope, heel_strikes_s)).collect()
+        self.cycles_of(&strides_between(heel_strikes_s), settings)
+    }
+
+    /// The mean gait cycle of each channel over given strides, s.
+    ///
+    /// # Errors
+    /// As [`Self::cycles`].
+    pub fn cycles_of(&self, strides: &[(f64, f64)], settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
+        self.envelopes(settings)?.iter().map(|envelope| CycleActivity::of_strides(envelope, strides)).collect()
     }
 
     /// The envelope of each channel.

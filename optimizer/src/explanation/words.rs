@@ -4,6 +4,7 @@ use super::given_bound::GivenBound;
 use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
 use crate::number_format::figure;
 use crate::solve::{SolveStatus, Violation};
+use crate::tuned_bounds::TunedBounds;
 use crate::walking::CYCLE;
 
 /// The meaning of the status of a solve for its bounds; `None` if there is a gait.
@@ -177,7 +178,35 @@ impl JointRelaxation {
     }
 }
 
+impl GivenBound {
+    /// The limit in words: `a hip angle of at most 15 °`.
+    fn limit_in_words(&self) -> String {
+        let (limited, unit) = parts(&self.meaning);
+        let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound);
+        let is_lower = place.is_some_and(|place| TunedBounds::IS_LOWER[place]);
+        let quantity = limited.strip_suffix(" lower bound").or_else(|| limited.strip_suffix(" upper bound"));
+        let quantity = quantity.unwrap_or(limited);
+        format!("a {quantity} of at {} {}{unit}", if is_lower { "least" } else { "most" }, self.value)
+    }
+}
+
 impl Explanation {
+    /// The first conflict in one sentence, without details of the search; `None` if no conflict is known.
+    pub fn headline(&self) -> Option<String> {
+        if self.gait_found {
+            return Some("The bounds of this trial do not conflict: the solve missed a gait.".to_owned());
+        }
+        let conflict = self.conflicts.first()?;
+        let limits: Vec<String> = conflict.bounds.iter().map(GivenBound::limit_in_words).collect();
+        Some(match limits.as_slice() {
+            [] => "No value of the tuned bounds gives a gait: fixed constraints conflict.".to_owned(),
+            [one] if conflict.undecided => format!("With {one}, there is probably no gait, whatever the other bounds."),
+            [one] => format!("With {one}, there is no gait, whatever the other bounds."),
+            _ if conflict.undecided => format!("These bounds probably conflict: {}.", list(&limits)),
+            _ => format!("These bounds conflict: {}.", list(&limits)),
+        })
+    }
+
     /// The conflicts as sentences, the first one first. If they are unknown, the largest violation.
     pub fn conflicts_in_words(&self) -> Vec<String> {
         if self.gait_found {
@@ -225,7 +254,6 @@ impl Explanation {
 mod tests {
     use super::super::RelaxedBound;
     use super::*;
-    use crate::tuned_bounds::TunedBounds;
 
     fn named(bound: usize) -> (String, String) {
         (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned())
@@ -285,6 +313,32 @@ mod tests {
             together: Vec::new(),
             missed: None,
         }
+    }
+
+    #[test]
+    fn headline_names_limits_with_their_direction() {
+        let of = |bounds: &[(usize, f64)]| {
+            let empty = Explanation {
+                status: SolveStatus::Infeasible,
+                violations: Vec::new(),
+                conflicts: vec![conflict(bounds)],
+                gait_found: false,
+                at_limit: Vec::new(),
+                relaxations: Vec::new(),
+                together: Vec::new(),
+                missed: None,
+            };
+            empty.headline().unwrap()
+        };
+        assert_eq!(
+            of(&[(6, 15.0), (4, 0.1)]),
+            "These bounds conflict: a hip angle of at most 15 ° and a swing-foot clearance of at least 0.1 m."
+        );
+        assert_eq!(
+            of(&[(2, 1.5)]),
+            "With a hip velocity of at least 1.5 m/s, there is no gait, whatever the other bounds."
+        );
+        assert_eq!(of(&[]), "No value of the tuned bounds gives a gait: fixed constraints conflict.");
     }
 
     #[test]

@@ -82,7 +82,9 @@ pub(super) fn outcome(
     let violations = if status == SolveStatus::Converged {
         Vec::new()
     } else {
-        violations.iter().take(MAX_VIOLATIONS).map(|v| describe(program, v)).collect()
+        // NaN is a violation.
+        let above = violations.iter().filter(|v| v.amount.is_nan() || v.amount > context.options.tolerance);
+        above.take(MAX_VIOLATIONS).map(|v| describe(program, v)).collect()
     };
     SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
 }

@@ -213,6 +213,12 @@ pub(crate) async fn accessible<T: Located>(
     }
 }
 
+impl<T> From<T> for Named<T> {
+    fn from(id: T) -> Self {
+        Self(id)
+    }
+}
+
 impl<T: FromStr> FromStr for Named<T> {
     type Err = T::Err;
     fn from_str(text: &str) -> Result<Self, T::Err> {

@@ -1,5 +1,7 @@
-//! Refused form fields, in the words of the form.
+//! Refused form fields, in the words of the form, with what was probably meant where that can be known.
 
+use crate::body_measures::{likely, likely_height_m, likely_mass_kg};
+use gait_optimizer::TunedBounds;
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::TrialId;
 use serde_json::Value;
@@ -21,6 +23,8 @@ const LABELS: &[(&str, &str)] = &[
     ("recording", "File contents"),
     ("rate_hz", "Sampling rate, Hz"),
     ("channels", "Channel columns"),
+    ("rejected_strides", "Rejected strides"),
+    ("file_name", "File name"),
     ("heel_strikes_s", "Right heel strikes, s"),
     ("heel_strike_column", "Heel strike column"),
     ("heel_strike_threshold", "Contact threshold"),
@@ -46,10 +50,42 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
     let given = match &fault.value {
         // The form shows names in place of identifiers.
         Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => Some(quoted(text)),
-        Some(Value::Number(number)) => Some(number.to_string()),
+        Some(Value::Number(number)) => {
+            let text = number.to_string();
+            Some(text.strip_suffix(".0").unwrap_or(&text).to_owned())
+        }
         _ => None,
     };
-    FieldError::sentence(&quoted(label), given.as_deref(), allowed)
+    let sentence = FieldError::sentence(&quoted(label), given.as_deref(), allowed);
+    near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
+}
+
+/// What was probably meant: the same number in another unit, or with a decimal point in place of a comma.
+fn near_miss(fault: &FieldError) -> Option<String> {
+    let number = match fault.value.as_ref()? {
+        Value::Number(number) => number.as_f64()?,
+        Value::String(text) => text.trim().replace(',', ".").parse().ok().filter(|number: &f64| number.is_finite())?,
+        _ => return None,
+    };
+    let field = fault.field.rsplit('.').next().unwrap_or_default();
+    if field.ends_with("height_m") {
+        return likely_height_m(number).map(|height| format!("{height} m"));
+    }
+    if field.ends_with("body_mass_kg") {
+        return likely_mass_kg(number).map(|mass| format!("{mass} kg"));
+    }
+    let bound = field.rsplit('_').next().unwrap_or_default();
+    let place = TunedBounds::NAMES.iter().position(|name| *name == bound)?;
+    let (_, unit) = TunedBounds::MEANINGS[place].rsplit_once(", ")?;
+    let (low, high) = TunedBounds::RANGES[place];
+    let radian = 1_f64.to_degrees();
+    let meant = match unit {
+        "m" => likely(number, (low, high), [1.0, 0.01, 0.001]),
+        "rad" => likely(number, (low, high), [1.0, 1.0 / radian]),
+        "\u{b0}" => likely(number, (low, high), [1.0, radian]),
+        _ => None,
+    }?;
+    Some(format!("{meant} {unit}"))
 }
 
 /// The sentence of an error, with the label of the refused field: from `labels`, or else the common one.
@@ -75,4 +111,30 @@ fn labelled(fault: &FieldError, labels: &[(&str, &str)]) -> String {
     let name = fault.field.rsplit('.').next().unwrap_or_default();
     let found = labels.iter().chain(LABELS).find(|(field, _)| *field == name);
     found.map_or_else(|| fault.message.clone(), |(_, label)| of_field(label, fault))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refusal_suggests_the_value_in_the_unit_of_the_field() {
+        for (fault, expected) in [
+            (FieldError::new("height_m", 173.0, "1.4 to 2.2"), Some("1.73 m")),
+            (FieldError::new("height_m", "1,73", "a number"), Some("1.73 m")),
+            (FieldError::new("body_mass_kg", 250.0, "35 to 160"), Some("113 kg")),
+            (FieldError::new("subject.body_mass_kg", 250.0, "35 to 160"), Some("113 kg")),
+            (FieldError::new("values_a5", 50.0, "0 to 0.3"), Some("0.05 m")),
+            (FieldError::new("values_a5", 20.0, "0 to 0.3"), None),
+            (FieldError::new("fixed_a6", 20.0, "0 to 1"), Some("0.349 rad")),
+            (FieldError::new("fixed_a7", 0.35, "5 to 68"), Some("20.1 \u{b0}")),
+            (FieldError::new("height_m", 0.1, "1.4 to 2.2"), None),
+            (FieldError::new("height_m", "tall", "a number"), None),
+            (FieldError::new("seed", 1.5, "0 to 9"), None),
+        ] {
+            assert_eq!(near_miss(&fault).as_deref(), expected, "{fault:?}");
+        }
+        let shown = of_field("Height, m", &FieldError::new("height_m", 173.0, "1.4 to 2.2"));
+        assert_eq!(shown, "\u{201c}Height, m\u{201d} is 173; it must be 1.4 to 2.2. Did you mean 1.73 m?");
+    }
 }

@@ -8,6 +8,7 @@ use axum::http::{Method, Uri};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 use gaitwright_service::access::Role;
 use gaitwright_service::error::Error;
+use gaitwright_store::StudyId;
 
 /// An error of a page handler.
 #[derive(Debug)]
@@ -41,9 +42,20 @@ impl IntoResponse for PageError {
     }
 }
 
+/// A detail without the identifier of an object that does not exist, which means nothing to people.
+fn without_identifier(detail: &str) -> Option<String> {
+    let (start, id) = detail.strip_suffix('.')?.rsplit_once(' ')?;
+    let what = start.strip_prefix("There is no ")?;
+    // Every identifier has the form of a study's.
+    id.parse::<StudyId>().ok()?;
+    Some(format!("There is no such {what}, or you have no access to it."))
+}
+
 /// Renders a problem as a page with the navigation of the caller.
 pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
     let status = problem.status();
+    let detail = without_identifier(&problem.detail).unwrap_or_else(|| problem.detail.clone());
+    let problem = Problem { detail, ..problem };
     match (ErrorPage { problem, to }).render() {
         Ok(text) => (status, Html(text)).into_response(),
         Err(_) => status.into_response(),
@@ -75,4 +87,16 @@ pub(crate) async fn no_such_method(method: Method, uri: Uri) -> Refusal {
 pub(crate) fn is_for_programs(path: &str) -> bool {
     ["/api/", "/static/"].iter().any(|start| path.starts_with(start))
         || ["/health", "/ready", "/metrics"].contains(&path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_identifier;
+
+    #[test]
+    fn page_names_no_identifier_of_a_missing_object() {
+        let shown = without_identifier("There is no lab session 01890000-0000-7000-8000-000000000000.");
+        assert_eq!(shown.as_deref(), Some("There is no such lab session, or you have no access to it."));
+        assert_eq!(without_identifier("There is no address /nothing."), None);
+    }
 }

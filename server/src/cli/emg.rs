@@ -143,6 +143,7 @@ impl Emg {
             heel_strikes_s: heel_strikes_s.to_vec(),
             heel_strike_column: self.heel_strike_column.clone(),
             heel_strike_threshold: self.heel_strike_threshold,
+            ..EmgReading::default()
         };
         let (recording, strikes) = reading.read(&path.display().to_string(), &read(path)?)?;
         recording.check_channels()?;

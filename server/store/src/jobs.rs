@@ -327,6 +327,21 @@ pub async fn depth(db: &mut Connection) -> StoreResult<(u32, u32)> {
     Ok((row.try_get("queued")?, row.try_get("leased")?))
 }
 
+/// The numbers of queued and leased jobs of other studies than this one.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn depth_of_others(db: &mut Connection, study: StudyId) -> StoreResult<(u32, u32)> {
+    let row = sqlx::query(
+        "select coalesce(sum(j.state = 'queued'), 0) as queued, coalesce(sum(j.state = 'leased'), 0) as leased \
+         from jobs j join trials t on t.id = j.trial_id where j.state in ('queued', 'leased') and t.study_id <> ?",
+    )
+    .bind(study)
+    .fetch_one(db)
+    .await?;
+    Ok((row.try_get("queued")?, row.try_get("leased")?))
+}
+
 fn leases(rows: &[SqliteRow]) -> StoreResult<Vec<Lease>> {
     rows.iter()
         .map(|row| {

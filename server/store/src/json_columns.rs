@@ -16,7 +16,7 @@ const LARGEST_BYTES: u64 = 32 << 20;
 /// Largest accepted zstd window, as a power of two.
 const WINDOW_LOG: u32 = 23;
 
-pub(super) fn to_text<T: Serialize>(what: &'static str, value: &T) -> StoreResult<String> {
+pub(super) fn to_text<T: Serialize + ?Sized>(what: &'static str, value: &T) -> StoreResult<String> {
     serde_json::to_string(value).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
 }
 

@@ -54,6 +54,8 @@ pub struct MeasurementFile {
     pub walk: u8,
     /// Kind of measurement.
     pub kind: MeasurementKind,
+    /// Name of the file, if it is known.
+    pub file_name: Option<String>,
     /// SHA-256 of the file.
     pub raw_sha256: String,
     /// Who uploaded it.
@@ -85,6 +87,17 @@ impl PackedFile {
         })
     }
 
+    /// The name of the file, which is part of the reading instructions.
+    fn file_name(&self) -> StoreResult<Option<String>> {
+        #[derive(Deserialize)]
+        struct Reading {
+            #[serde(default)]
+            file_name: Option<String>,
+        }
+        let reading: Reading = json_columns::from_text("reading instructions of a measurement file", &self.reading)?;
+        Ok(reading.file_name)
+    }
+
     /// Whether it is identical to a stored file of the same kind.
     pub fn is_file_of(&self, recording: &MeasurementFile) -> bool {
         (self.kind, &self.raw_sha256) == (recording.kind, &recording.raw_sha256)
@@ -107,6 +120,7 @@ pub async fn insert(
         session_id: session,
         walk,
         kind: packed.kind,
+        file_name: packed.file_name()?,
         raw_sha256: packed.raw_sha256.clone(),
         actor: actor.as_str().to_owned(),
         created_at: now(),
@@ -130,7 +144,7 @@ pub async fn insert(
 }
 
 /// Selects files without their content.
-const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, created_at from measurement_files";
+const SELECT: &str = "select id, session_id, walk, kind, json_extract(reading, '$.file_name') as file_name, raw_sha256, actor, created_at from measurement_files";
 
 /// The file with this identifier, without its content.
 ///
@@ -218,6 +232,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<MeasurementFile> {
         session_id: row.try_get("session_id")?,
         walk: row.try_get("walk")?,
         kind: row.try_get::<&str, _>("kind")?.parse()?,
+        file_name: row.try_get("file_name")?,
         raw_sha256: row.try_get("raw_sha256")?,
         actor: row.try_get("actor")?,
         created_at: row.try_get("created_at")?,

@@ -21,6 +21,7 @@ const FILES: &[(i64, &str, &str)] = &[
     (11, "reviewed safety reports", include_str!("../migrations/0011_reviewed_safety_reports.sql")),
     (12, "names", include_str!("../migrations/0012_names.sql")),
     (13, "repeat results", include_str!("../migrations/0013_repeat_results.sql")),
+    (14, "study lists", include_str!("../migrations/0014_study_lists.sql")),
 ];
 
 /// Newest schema version.

@@ -119,6 +119,15 @@ pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
     rows.iter().map(from_row).collect()
 }
 
+/// Every subject who has not withdrawn consent, newest first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn consenting(db: &mut Connection) -> StoreResult<Vec<Subject>> {
+    let sql = select!("where s.id not in (select subject_id from withdrawn_subjects) order by s.id desc");
+    sqlx::query(sql).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
 /// At most `limit` subjects added before `before`, newest first.
 ///
 /// # Errors

@@ -112,6 +112,8 @@ async fn browser_explains_a_trial_without_a_gait() {
     let trials = site.service.trials(study).await;
     let without = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap();
     let page = browser.open(&site.at(&format!("/trials/{}", without.id))).await;
+    assert!(!page.text("#explanation").await.contains("swing foot clearance"), "rows of the problem are folded away");
+    page.run("for (const d of document.querySelectorAll('#explanation details')) d.open = true").await;
     let text = page.text("#explanation").await;
     assert!(text.contains("swing foot clearance") && text.contains("--explain"), "{text}");
     page.is_clean(&site.origin).await;
@@ -137,6 +139,12 @@ async fn browser_shows_an_explanation_when_it_is_ready() {
             && !text.contains("is solving this trial again"),
         "{text}"
     );
+    // The conflict in words comes first, and each way out leads to a study with it.
+    let headline = page.text("#explanation .headline").await;
+    assert!(headline.contains("swing-foot clearance of at least"), "{headline}");
+    page.click("#explanation .ways a").await;
+    page.wait_for("#bounds[open]").await;
+    assert_eq!(page.value("document.querySelector('[name=fixed_a5]').value").await, "0.03");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

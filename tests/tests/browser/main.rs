@@ -10,6 +10,7 @@ mod every_page;
 mod gait;
 mod lab;
 mod lab_session;
+mod lists;
 mod rater;
 mod sign_in;
 mod site;

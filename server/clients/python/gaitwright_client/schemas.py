@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Any, Literal, Optional, TypedDict, Union
 
-# Kind of an access.
+# Kind of access.
 AccessKind = Literal["view", "export", "refused"]
 
 AssessmentId = str
 
-# What exactly was changed; its fields depend on the action.
+# What exactly was changed; its fields depend on the kind of change.
 AuditDetail = dict[str, Any]
 
 BackupId = str
@@ -26,7 +26,7 @@ CertificateState = Literal["passed", "failed", "being_certified", "not_certified
 # Condition of a walk.
 Condition = Literal["normal", "gait_one", "gait_two"]
 
-# Kind of an entry.
+# Kind of entry: consent or withdrawal.
 ConsentKind = Literal["given", "withdrawn"]
 
 # The file that the controller of a device reads. It describes its own fields.
@@ -48,7 +48,7 @@ GaitDocument = dict[str, Any]
 # A time in the record.
 Instant = str
 
-# Kind of a job.
+# Kind of job.
 JobKind = Literal["backup", "certificate", "execution_report", "explanation", "solve"]
 
 # State of a job.
@@ -72,12 +72,12 @@ MeasurementFileId = str
 # Format of a measurement file.
 MeasurementFormat = Literal["csv", "opensim"]
 
-# Kind of a measurement file.
+# Kind of measurement file.
 MeasurementKind = Literal["electromyogram", "motion"]
 
 MemberId = str
 
-# Kind of a member.
+# Kind of member.
 MemberKind = Literal["user", "token"]
 
 # Outcome of a trial.
@@ -91,7 +91,8 @@ PersonSource = Literal["subject", "clinician", "script"]
 
 PresentationId = str
 
-# Why a pair is shown.
+# Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement; `null`, the
+# same gait twice, in older records only.
 PresentationKind = Literal["new", "repeat", "null"]
 
 # A reference gait: joint angles over the gait cycle, the measured person, and the processing.
@@ -126,7 +127,9 @@ Source = Literal["convergence", "gait_rmse", "subject", "clinician", "script"]
 # What a solve started from.
 StartedFrom = Literal["cold", "warm", "cold_after_warm"]
 
-# How to find right heel strikes.
+# How to find right heel strikes: `force`, where the vertical force under the right foot rises above 20 N; `kinematics`,
+# where the right heel is farthest ahead of the pelvis; `ends`, at the first and the last row of a recording of one
+# stride.
 Strikes = Literal["force", "kinematics", "ends"]
 
 StudyId = str
@@ -162,7 +165,7 @@ class _AccessRowRequired(TypedDict):
     last_at: Instant
     # HTTP method; empty for the command line.
     method: str
-    # Requested address, without secrets.
+    # Requested URL, without secrets.
     object: str
     # Route, or command.
     route: str
@@ -186,15 +189,16 @@ class AccessRow(_AccessRowRequired, total=False):
 class ActiveConstraint(TypedDict):
     """Constraint that is active at a node or over the stride."""
 
-    # Multiplier of the scaled constraint: decrease of the objective per unit that the constraint is relaxed.
+    # Multiplier of the scaled constraint: decrease of the objective per unit by which the constraint is relaxed.
     multiplier: float
     # Domain, node and quantity.
     place: str
 
 
 class Answered(TypedDict):
-    """Confirmation of a rater's answer. It contains neither the gaits nor the answer, because the copy kept for
-    repeated requests would otherwise reveal to readers of the study which gait was shown on which side.
+    """Confirmation of a rater's answer. The response is stored, to be sent again if the request is repeated. It
+    contains neither the gaits nor the answer, so that anybody who can read the study does not learn which gait was
+    shown on which side.
     """
 
     # Number of the pair for this rater.
@@ -204,7 +208,7 @@ class Answered(TypedDict):
 class Ask(TypedDict, total=False):
     """A request for a trial."""
 
-    # Name of the evaluator, which has at most one open trial. Defaults to the caller's name.
+    # Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
     worker: Optional[str]
 
 
@@ -215,13 +219,13 @@ class _AssessmentRequired(TypedDict):
     author: str
     # Time of recording.
     created_at: Instant
-    # Trial of one gait.
+    # The trial with the first of the two gaits.
     first: TrialId
     # Identifier.
     id: AssessmentId
     # Free text.
     note: str
-    # Trial of the other gait.
+    # The trial with the second of the two gaits.
     second: TrialId
     # Who answered.
     source: Source
@@ -261,7 +265,7 @@ class AttemptResult(_AttemptResultRequired, total=False):
 class AuditRow(TypedDict):
     """Row of the audit trail."""
 
-    # Action, such as `subject.add` or `study.pause`.
+    # Kind of change, such as `subject.add` or `study.pause`.
     action: str
     # Who made the change.
     actor: str
@@ -269,9 +273,9 @@ class AuditRow(TypedDict):
     at: Instant
     # Details of the change, with the reason if there is one.
     detail: AuditDetail
-    # Hash of this row and the previous hash.
+    # Hash over this row and the hash of the previous row.
     hash: str
-    # Object of the action, such as `study 0190...`.
+    # What was changed, such as `study 0190...`.
     object: str
     # Hash of the previous row.
     previous: str
@@ -376,7 +380,7 @@ class _CertificateRequired(TypedDict):
 
 
 class Certificate(_CertificateRequired, total=False):
-    """A certificate: what an independent simulation of a gait found."""
+    """A certificate: the result of checking a gait independently of the optimiser."""
 
     # The gait that was checked; null if it is malformed.
     certified: Optional[CertifiedGait]
@@ -451,12 +455,18 @@ class CertifiedSubject(TypedDict):
 class Change(TypedDict, total=False):
     """Changes to a study. Absent fields keep their values."""
 
+    # Whether the study is archived, so that lists do not show it. Possible before its start and after its end.
+    archived: Optional[bool]
     # Name shown to users.
     name: Optional[str]
+    # Notes of people.
+    notes: Optional[str]
     # Number of trials that run in parallel.
     parallel_trials: Optional[int]
     # Priority, -10 to 10. Higher values run first.
     priority: Optional[int]
+    # Tags, at most 10 of at most 40 characters. They replace the present ones.
+    tags: Optional[list[str]]
 
 
 class Closing(TypedDict, total=False):
@@ -483,14 +493,15 @@ class Conflict(_ConflictRequired, total=False):
     but relaxing any one of them gave a gait.
     """
 
-    # Naturalness terms involved in a conflict between fixed constraints; absent if there are none.
+    # Requirements for natural walking that take part in a conflict between fixed constraints, in words; absent if there
+    # are none.
     naturalness_terms: Optional[list[str]]
     # Bounds of other conflicts that were relaxed when this one was found.
     without: Optional[list[str]]
 
 
 class Consent(TypedDict):
-    """Consent or withdrawal of a subject. The newest entry applies."""
+    """A subject's consent, or withdrawal of consent. The newest entry applies."""
 
     # Who recorded it.
     actor: str
@@ -502,6 +513,19 @@ class Consent(TypedDict):
     note: str
     # Sequence number.
     seq: int
+
+
+class ControllerFileDownload(TypedDict):
+    """Download of the controller file of a walk."""
+
+    # Who fetched it.
+    actor: str
+    # Time.
+    at: Instant
+    # Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
+    to_device: bool
+    # Number of the walk, 2 or 3.
+    walk: int
 
 
 class Correction(TypedDict):
@@ -549,7 +573,7 @@ class _FeedbackRowRequired(TypedDict):
     source: Source
     # The study.
     study_id: StudyId
-    # Whether that rater could have known the allocation, so that it does not count as blind.
+    # Whether the rater could have known the allocation, so that the entry does not count as blind.
     unblinded: bool
 
 
@@ -673,23 +697,10 @@ class DeviceDefinition(_DeviceDefinitionRequired, total=False):
     sources: dict[str, str]
 
 
-class DeviceFile(TypedDict):
-    """Download of the controller file of a walk."""
-
-    # Who fetched it.
-    actor: str
-    # Time.
-    at: Instant
-    # Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
-    to_device: bool
-    # Number of the walk, 2 or 3.
-    walk: int
-
-
 class Dimension(TypedDict):
     """One tuned bound of a search space."""
 
-    # Difference between values within which gaits are expected to have similar utility.
+    # How far apart two values can be while their gaits are still expected to have similar utility.
     lengthscale: float
     # Name of the bound.
     name: Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]
@@ -703,6 +714,8 @@ class EmgReading(TypedDict, total=False):
     # Column of each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R). By default the columns have the names of the
     # channels.
     channels: dict[str, str]
+    # Name of the file, for people.
+    file_name: Optional[str]
     # File format.
     format: MeasurementFormat
     # Column of a switch under the right heel, or of the vertical force under the right foot.
@@ -713,6 +726,8 @@ class EmgReading(TypedDict, total=False):
     heel_strikes_s: list[float]
     # Sampling rate of a CSV file without a `time_s` column, Hz.
     rate_hz: Optional[float]
+    # Numbers of strides to leave out, from 1, in the order of the heel strikes.
+    rejected_strides: list[int]
 
 
 class EmgResult(TypedDict):
@@ -761,19 +776,20 @@ class EmgView(TypedDict):
 
 
 class _ExecutionReportRequired(TypedDict):
-    # Range from which the body masses of disturbed walks are drawn, kg: 5 % either way, cut at the range of the model.
+    # Range from which the body masses of disturbed walks are drawn, kg: ±5 %, limited to the range of the model.
     body_mass_kg: list[float]
     # Version of this layout and of the simulation.
     format_version: int
     # SHA-256 of the gait as compact JSON, as in its certificate.
     gait_sha256: str
-    # Randomly disturbed walks, for each ground.
+    # Randomly disturbed walks, for each kind of ground.
     grounds: list[WalksOnGround]
     # Seed of the disturbances.
     seed: int
     # Strides of a complete simulated walk.
     strides: int
-    # Undisturbed walks on level ground from hard to soft. All other walks are on ground that yields 0.01 m.
+    # Undisturbed walks on level ground, ordered from hard ground to soft ground. In all other walks the ground yields
+    # 0.01 m under body weight.
     strides_by_yield: list[StridesOnYield]
     # Completed strides without any disturbance.
     undisturbed_strides: int
@@ -836,17 +852,18 @@ class FeedbackContentSuggestion(TypedDict):
 class FigureDerivatives(TypedDict):
     """Derivatives of figures per unit of a tuned bound."""
 
-    # Of the mechanical cost of transport.
+    # Derivative of the mechanical cost of transport.
     cost_of_transport: float
-    # Of Gait RMSE, rad.
+    # Derivative of Gait RMSE, rad per unit of the bound.
     gait_rmse_rad: float
-    # Of the largest angle at a node of torso, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, rad.
+    # Derivatives of the largest angle over all nodes, rad per unit of the bound, for torso, hip_L, knee_L, ankle_L,
+    # hip_R, knee_R and ankle_R in this order.
     largest_angles_rad: list[float]
     # Of the objective.
     objective: float
-    # Of the smallest angle at a node, rad.
+    # Derivatives of the smallest angle over all nodes, in the order of the largest angles, rad per unit of the bound.
     smallest_angles_rad: list[float]
-    # Of the mean walking speed, m/s.
+    # Derivative of the mean walking speed, m/s per unit of the bound.
     speed_m_s: float
 
 
@@ -1057,7 +1074,7 @@ class _JobRequired(TypedDict):
 class Job(_JobRequired, total=False):
     """Background work of the service."""
 
-    # Share of the work that is done, 0 to 1, where it is known: while walks are simulated. Null otherwise.
+    # Share of the work that is done, 0 to 1. Known only while walks are simulated; null otherwise.
     progress: Optional[float]
     # Reason if it failed. Null otherwise.
     reason: Optional[str]
@@ -1076,7 +1093,7 @@ class JointRelaxation(TypedDict):
     Computed if no single relaxation gives a gait.
     """
 
-    # The bounds, one of each conflict.
+    # The bounds, one from each conflict.
     bounds: list[RelaxedBound]
     # Number of solves.
     solves: int
@@ -1095,7 +1112,8 @@ class LabAnswer(TypedDict):
     answer: Judgement
     # Time of recording.
     at: Instant
-    # Whether the answer is not blind: it was recorded after unblinding, or by a user who had fetched a controller file.
+    # Whether the person who recorded the answer could have known the allocation: it was recorded after unblinding, or
+    # by a user who had fetched a controller file.
     could_have_known: bool
     # Free text.
     note: str
@@ -1104,7 +1122,8 @@ class LabAnswer(TypedDict):
 
 
 class _LabSessionProgressRequired(TypedDict):
-    # Whether the current answer can be retracted in the lab view.
+    # Whether the current answer can be retracted: the session is neither closed nor unblinded, and the answer is not a
+    # safety report.
     can_be_retracted: bool
     # Whether the session is closed.
     closed: bool
@@ -1144,13 +1163,13 @@ class _LabSessionViewRequired(TypedDict):
     # Whether the allocation is in this record. A study that was imported while the session was blinded does not have
     # it.
     allocation_included: bool
+    # Who fetched controller files of the walks.
+    controller_files: list[ControllerFileDownload]
     # Time of planning.
     created_at: Instant
-    # Who fetched controller files of the walks.
-    device_files: list[DeviceFile]
-    # Trial of one gait. Does not imply the order of the walks.
+    # The trial with the first of the two gaits. Does not imply the order of the walks.
     gait_one: TrialId
-    # Trial of the other gait.
+    # The trial with the second of the two gaits.
     gait_two: TrialId
     # Identifier.
     id: LabSessionId
@@ -1275,9 +1294,7 @@ class Me(_MeRequired, total=False):
     role: Optional[Role]
 
 
-class MeasurementFile(TypedDict):
-    """Measurement file, without its content."""
-
+class _MeasurementFileRequired(TypedDict):
     # Who uploaded it.
     actor: str
     # Time of the upload.
@@ -1292,6 +1309,13 @@ class MeasurementFile(TypedDict):
     session_id: LabSessionId
     # Number of the walk, 1 to 3.
     walk: int
+
+
+class MeasurementFile(_MeasurementFileRequired, total=False):
+    """Measurement file, without its content."""
+
+    # Name of the file, if it is known.
+    file_name: Optional[str]
 
 
 class _MemberRequired(TypedDict):
@@ -1321,12 +1345,12 @@ class _MilestoneRequired(TypedDict):
     iteration: int
     # Number of the best trial.
     number: int
-    # Best trial after this iteration.
+    # Best trial after this iteration of the study.
     trial_id: TrialId
 
 
 class Milestone(_MilestoneRequired, total=False):
-    """The recommendation after an iteration."""
+    """The recommendation after one iteration of the study."""
 
     # Cost of transport of the best trial.
     cost_of_transport: Optional[float]
@@ -1355,7 +1379,7 @@ class ModelActivity(_ModelActivityRequired, total=False):
 class Motion(TypedDict):
     """Motion of a gait over one stride from right heel strike."""
 
-    # Nodes by time. Interpolate linearly between them.
+    # Nodes in order of time. Interpolate linearly between them.
     frames: list[Frame]
     # Stride length, m.
     stride_length_m: float
@@ -1368,6 +1392,8 @@ class MotionReading(TypedDict, total=False):
 
     # Cut-off frequency of the low-pass filter before differentiation, Hz.
     cutoff_hz: float
+    # Name of the file, for people.
+    file_name: Optional[str]
     # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     # knee_R_rad, ankle_R_rad.
     format: MeasurementFormat
@@ -1480,7 +1506,7 @@ class MuscleParametersVas(TypedDict, total=False):
 
 
 class MuscleParameters(TypedDict, total=False):
-    """Muscle values that differ from the published table."""
+    """Muscle values that differ from the default ones."""
 
     gas: MuscleParametersGas
     glu: MuscleParametersGlu
@@ -1496,9 +1522,9 @@ class _NewAssessmentRequired(TypedDict):
     # `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. To state which gait is better, record a
     # preference instead.
     answer: Literal["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
-    # Trial of one gait.
+    # The trial with the first of the two gaits.
     first: TrialId
-    # Trial of the other gait.
+    # The trial with the second of the two gaits.
     second: TrialId
 
 
@@ -1546,11 +1572,11 @@ class NewEmg(_NewEmgRequired, total=False):
 
 
 class NewExecutionReport(TypedDict, total=False):
-    """The simulated walks of a request. There are three grounds: level, ±5 mm and ±10 mm."""
+    """A request to simulate walks. There are three kinds of ground: level, and uneven by ±5 mm or ±10 mm."""
 
     # Seed of the disturbances. The same seed gives the same report.
     seed: int
-    # Number of simulated walks on each ground, 1 to 1000.
+    # Number of simulated walks on each kind of ground, 1 to 1000.
     walks: int
 
 
@@ -1570,9 +1596,9 @@ class NewLabAnswer(_NewLabAnswerRequired, total=False):
 
 
 class _NewLabSessionRequired(TypedDict):
-    # Converged trial of one gait.
+    # Converged trial with one of the two gaits.
     gait_one: TrialId
-    # Converged trial of the other gait.
+    # Converged trial with the other gait.
     gait_two: TrialId
 
 
@@ -1686,8 +1712,8 @@ class NewSafetyReview(_NewSafetyReviewRequired, total=False):
 
     # Name or pseudonym of the reviewer. Defaults to the caller's name.
     author: Optional[str]
-    # The open safety reports that the reviewer has seen. The decision is refused if an open report is not among them.
-    # By default, all open reports count as seen.
+    # The safety reports in force that the reviewer has seen. The decision is refused if one of them is missing. By
+    # default, all of them count as seen.
     reports: Optional[list[SafetyReportId]]
 
 
@@ -1709,9 +1735,10 @@ class NewStudy(_NewStudyRequired, total=False):
     feedback_mode: FeedbackMode
     # Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     gait_settings: GaitSettings
-    # Settings of the learner. Absent settings take the values that the method recommends.
+    # Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
     learner: LearnerSettings
-    # Whether to solve with muscles (C1-C12) or without (C1-C4).
+    # Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
+    # C4).
     muscles: bool
     # Name shown to users. Made from subject and variant by default.
     name: Optional[str]
@@ -1719,11 +1746,10 @@ class NewStudy(_NewStudyRequired, total=False):
     parallel_trials: int
     # Priority, -10 to 10. Higher values run first.
     priority: int
-    # Reference gait for Gait RMSE. By default the one nearest to the subject in height and body mass, or the built-in
-    # one if no reference gait states height and mass.
+    # Reference gait for Gait RMSE. By default `falisse-2019`, whichever others are imported.
     reference_gait_id: Optional[ReferenceGaitId]
-    # Whether a trial may have an action whose gait is known from another trial, as in the paper. By default, only if
-    # the learner may repeat actions. Has no effect if scripts evaluate the trials.
+    # Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
+    # Defaults to the `repeats` setting of the learner. Has no effect if scripts evaluate the trials.
     repeat_results: Optional[bool]
     # Whether only members and administrators can access the study. The creator becomes a member.
     restricted: bool
@@ -1794,7 +1820,7 @@ class _OpenSolveRequired(TypedDict):
     attempts: int
     # Time of queueing.
     created_at: Instant
-    # Attempts that ended with a panic or an error.
+    # Attempts that crashed or ended with an error.
     failures: int
     # Attempts whose worker stopped responding.
     losses: int
@@ -1814,7 +1840,7 @@ class Optimality(TypedDict):
 
     # Last barrier parameter.
     barrier: float
-    # Largest product of a distance to a bound and its multiplier.
+    # Largest product of the distance to a limit and its multiplier.
     complementarity: float
     # Largest entry of the Lagrangian's gradient.
     dual_infeasibility: float
@@ -1883,7 +1909,7 @@ class _ProblemRequired(TypedDict):
     status: int
     # Name of this kind of problem.
     title: str
-    # Address that identifies the kind of problem. It does not change between versions, and its page explains the kind.
+    # Address that identifies the kind of problem, and of a page that explains it. It does not change between versions.
     type: str
 
 
@@ -2063,7 +2089,7 @@ _RelaxationRequired = TypedDict(
         "solves": "int",
         # Number of starting points of the search at the `not_with` values. 0 if unknown.
         "starts": "int",
-        # Whether a solve with that value gave up, so that infeasibility is not certain.
+        # Whether the solve at the `not_with` value gave up, so that infeasibility is not certain.
         "undecided": "bool",
     },
 )
@@ -2150,10 +2176,11 @@ class _SafetyReportRequired(TypedDict):
     author: str
     # Time of the report.
     created_at: Instant
-    # Identifier of the report. A report from a blinded pair, an assessment or a lab session has the identifier of that
+    # Identifier of the report. A report from a blind pair, an assessment or a lab session has the identifier of that
     # object, so reports about both of its gaits share one identifier.
     id: SafetyReportId
-    # Whether the report is open, so that the gait must not be walked.
+    # Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. The gait must
+    # not be walked.
     open: bool
     # Trial of the gait.
     trial_id: TrialId
@@ -2199,10 +2226,10 @@ class _SensitivityToBoundRequired(TypedDict):
     bound: str
     # Derivatives of the figures of the gait.
     derivatives: FigureDerivatives
-    # Values of the bound between which the active constraints stay the same, to first order. Null: for every value in
-    # that direction.
+    # Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
+    # is null if there is no limit in that direction.
     interval: list[Optional[float]]
-    # Whether a constraint is about to become active or inactive, so that the derivatives to both sides differ.
+    # Whether a constraint is about to become active or inactive, so that the derivatives on the two sides differ.
     is_weakly_active: bool
     # Its value.
     value: float
@@ -2220,7 +2247,7 @@ class _SessionRequired(TypedDict):
     by_link: bool
     # Time of sign-in.
     created_at: Instant
-    # Identifier, which is not the secret.
+    # Identifier. It is not the value of the session cookie.
     id: SessionId
     # Time of the last activity.
     seen_at: Instant
@@ -2259,9 +2286,9 @@ class _SolveAttemptRequired(TypedDict):
 
 
 class SolveAttempt(_SolveAttemptRequired, total=False):
-    """One attempt of a solve."""
+    """One attempt within a solve, from one starting point."""
 
-    # Which local optimum it ended in, from 1; null if it did not converge.
+    # Number of the local optimum in which it ended, counted from 1; null if it did not converge.
     basin: Optional[int]
 
 
@@ -2303,7 +2330,7 @@ class _SolveReportRequired(TypedDict):
     inequalities: int
     # Interior-point iterations over all phases.
     iterations: int
-    # Largest violation of a constraint row or bound, scaled.
+    # Largest violation of a constraint or of a limit on a variable, scaled.
     max_violation: float
     # Objective: cost of transport plus regularisation.
     objective: float
@@ -2321,7 +2348,7 @@ class _SolveReportRequired(TypedDict):
     status: SolveStatus
     # Stride length, m.
     stride_length_m: float
-    # Number of bounds that were tightened at nodes, so that the gait satisfies them between the nodes as well.
+    # Number of limits that were tightened at nodes, so that the gait satisfies them between the nodes as well.
     tightened_bounds: int
     # For each tuned bound, the range of values for which the gait remains a solution, even if several bounds change at
     # once. Empty if the solve did not converge, or if unknown.
@@ -2342,11 +2369,11 @@ class SolveReport(_SolveReportRequired, total=False):
 
 
 class StridesOnYield(TypedDict):
-    """Undisturbed simulated walk on ground of some stiffness."""
+    """Undisturbed simulated walk on ground of a given stiffness."""
 
     # Completed strides.
     strides: int
-    # Depth of the ground under body weight, m.
+    # How far the ground yields under body weight, m.
     yield_m: float
 
 
@@ -2363,7 +2390,8 @@ class _StudyPlanRequired(TypedDict):
     gait_settings: GaitSettings
     # Settings of the learner.
     learner: LearnerSettings
-    # Whether to solve with muscles (C1-C12) or without (C1-C4).
+    # Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
+    # C4).
     muscles: bool
     # Name shown to users.
     name: str
@@ -2373,8 +2401,8 @@ class _StudyPlanRequired(TypedDict):
     priority: int
     # Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
-    # Whether a trial may have an action whose gait is known from another trial, as in the paper. Always true for
-    # studies created by versions without this setting.
+    # Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
+    # Always true for studies created by versions without this setting.
     repeat_results: bool
     # Tuned bounds and their values, with each dimension named after its bound.
     search_space: SearchSpace
@@ -2405,12 +2433,16 @@ class _StudyRequired(StudyPlan):
     created_at: Instant
     # Identifier.
     id: StudyId
+    # Notes of people.
+    notes: str
     # Revision, which increases with each change.
     revision: int
     # State.
     state: StudyState
     # Reason for the state; may be empty.
     state_reason: str
+    # Tags, by which people find the study.
+    tags: list[str]
     # Time of the last change.
     updated_at: Instant
 
@@ -2418,6 +2450,8 @@ class _StudyRequired(StudyPlan):
 class Study(_StudyRequired, total=False):
     """Study."""
 
+    # Time at which it was archived. Lists do not show archived studies unless asked.
+    archived_at: Optional[Instant]
     # Parent, if the study is a fork.
     forked_from: Optional[StudyId]
 
@@ -2489,8 +2523,8 @@ class Subject(TypedDict):
 
 
 class _SuggestionRequired(TypedDict):
-    # Suggested values of tuned bounds, such as `{"a5": 0.026}`, each a level of the search space. Other bounds keep the
-    # values of the trial.
+    # Suggested values of tuned bounds, such as `{"a5": 0.026}`, each one of the values in the search space. Other
+    # bounds keep the values of the trial.
     bounds: dict[str, float]
     # Trial whose gait could be better.
     over: TrialId
@@ -2508,13 +2542,13 @@ class Suggestion(_SuggestionRequired, total=False):
 
 
 class SurvivedPushes(TypedDict):
-    """Largest pushes of a fixed ladder that the walker survives, without other disturbances."""
+    """Largest pushes, of a fixed series of increasing ones, that the walker survives without other disturbances."""
 
     # Backwards, N s.
     backwards_n_s: float
     # Forwards, N s; 0 if it survives none.
     forwards_n_s: float
-    # Largest push of the ladder, N s.
+    # Largest push of the series, N s.
     largest_tried_n_s: float
 
 
@@ -2647,7 +2681,7 @@ class TrialExplanation(TypedDict):
 class TrialSensitivities(TypedDict):
     """Sensitivities of a gait with respect to the tuned bounds."""
 
-    # Each tuned bound, in the order of an action.
+    # One entry for each tuned bound, a1 to a8.
     bounds: list[SensitivityToBound]
     # Mechanical cost of transport of the gait.
     cost_of_transport: float
@@ -2769,11 +2803,11 @@ class WalkView(_WalkViewRequired, total=False):
 
 
 class WalksOnGround(TypedDict):
-    """Simulated walks on one ground."""
+    """Simulated walks on one kind of ground."""
 
-    # The same for the ankle.
+    # Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can make.
     ankle_rate_limited_share: float
-    # The same for its ankle.
+    # Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
     ankle_saturated_share: float
     # Walks that completed all strides.
     completed: int
@@ -2785,11 +2819,11 @@ class WalksOnGround(TypedDict):
     fell: int
     # Largest height and depth of the plateaus of the ground, m.
     ground_height_m: float
-    # Walks that ended without a further step.
+    # Walks that ended with a halt: the walker took no further step.
     halted: int
-    # Share of the time in which the knee wanted to change its torque faster than it can.
+    # Share of the time in which the controller demanded a faster change of the knee torque than the actuator can make.
     knee_rate_limited_share: float
-    # Share of the time in which the knee of the prosthesis wanted more than its largest torque.
+    # Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
     knee_saturated_share: float
     # Mean number of completed strides.
     mean_strides: float

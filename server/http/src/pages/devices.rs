@@ -4,6 +4,7 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Form;
+use crate::form_errors;
 use crate::format;
 use crate::page_error::{Page, PageError, page};
 use askama::Template;
@@ -71,7 +72,13 @@ impl DevicePage {
         }
         self.name = typed.get("name").cloned().unwrap_or_default();
         self.carried_limb = typed.contains_key("carried_limb");
-        self.refused = Some(refused);
+        let name = refused.field.trim_start_matches("device.");
+        let label = Definition::FIELDS.iter().find(|field| field.name == name).map(|field| field.meaning);
+        let message = match label {
+            Some(label) => form_errors::of_field(label, &refused),
+            None => form_errors::in_words(&refused.clone().into()),
+        };
+        self.refused = Some(FieldError { message, ..refused });
         self
     }
 

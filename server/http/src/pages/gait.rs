@@ -132,7 +132,8 @@ pub(super) async fn get(
     let solution =
         if converged && shown.sensitivities { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
     let last_event = events::last(&mut reader, study.id).await?;
-    let explained = explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await?;
+    let effort = app.scheduler.explaining(id);
+    let explained = explanation::state(&mut reader, &trial, effort.clone()).await?;
     let may_run = authorized.caller.may(Run::NEEDED);
     let reviews = authorized.caller.may(Answer::NEEDED);
     // Without sign-in the name is unknown.
@@ -160,7 +161,7 @@ pub(super) async fn get(
         violation: format::optional_number(trial.max_violation),
         figures: figures(&trial),
         bounds: drawn.bounds,
-        no_gait: NoGait::new(&trial, explained, last_event),
+        no_gait: NoGait::new(&trial, explained, &effort, last_event),
         from,
         reference: reference_name,
         has_gait,

@@ -10,12 +10,12 @@ use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_charts::sparkline;
-use gaitwright_service::access::{Permission, Rate, Read, sign_in};
+use gaitwright_service::access::{Permission, Rate, Read, Run, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_reports;
-use gaitwright_store::studies::{Chosen, Study, StudyState};
+use gaitwright_store::studies::{Listed, Study, StudyState};
 use gaitwright_store::trials::TrialCounts;
-use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
+use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
 use serde::Deserialize;
 
 /// How many studies the page shows.
@@ -31,19 +31,80 @@ struct Home {
     studies: Vec<Row>,
     /// Whether there are newer studies than these.
     later: bool,
-    /// The last study of this page, if older ones follow.
-    next: Option<StudyId>,
+    /// The address of the next page, if older studies follow.
+    next: Option<String>,
+    /// The filter as typed.
+    filter: StudyFilter,
+    /// Every tag of the accessible studies.
+    tags: Vec<String>,
+    states: [StudyState; 6],
+    /// Whether studies can be created.
+    may_run: bool,
 }
 
 /// Which studies to show.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub(super) struct StudyFilter {
+    /// Text in name, pseudonym, tags or notes.
+    text: String,
+    tag: String,
+    /// The name of a state; empty for every state.
+    state: String,
+    /// Present for archived studies.
+    archived: Option<String>,
     before: Option<StudyId>,
 }
+
+impl StudyFilter {
+    /// Whether studies are left out.
+    fn is_set(&self) -> bool {
+        !self.text.is_empty() || !self.tag.is_empty() || !self.state.is_empty() || self.archived.is_some()
+    }
+
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn is_state(&self, state: &StudyState) -> bool {
+        self.state == state.as_str()
+    }
+
+    fn listed(&self, limit: u32) -> Result<Listed, Error> {
+        let state = match self.state.as_str() {
+            "" => None,
+            text => {
+                let known = STATES.into_iter().find(|state| state.as_str() == text);
+                Some(known.ok_or_else(|| Error::invalid("state", text, "a state from the list"))?)
+            }
+        };
+        let (text, tag) = (self.text.trim().to_owned(), self.tag.clone());
+        Ok(Listed { text, tag, state, archived: self.archived.is_some(), before: self.before, limit })
+    }
+
+    /// The address of the studies after this one, with the same filter.
+    fn after(&self, study: StudyId) -> String {
+        let before = study.to_string();
+        let mut pairs = vec![("text", self.text.as_str()), ("tag", &self.tag), ("state", &self.state)];
+        pairs.extend(self.archived.as_deref().map(|archived| ("archived", archived)));
+        pairs.retain(|(_, value)| !value.is_empty());
+        pairs.push(("before", &before));
+        serde_urlencoded::to_string(pairs).map_or_else(|_| "/".to_owned(), |query| format!("/?{query}"))
+    }
+}
+
+/// Every state, in the order of a study.
+const STATES: [StudyState; 6] = [
+    StudyState::Draft,
+    StudyState::Running,
+    StudyState::Waiting,
+    StudyState::Paused,
+    StudyState::Finished,
+    StudyState::Stopped,
+];
 
 struct Row {
     study: Study,
     subject: String,
+    /// Name of the reference gait.
+    reference: String,
     variant: &'static str,
     counts: TrialCounts,
     state: String,
@@ -51,6 +112,22 @@ struct Row {
     /// The lowest Gait RMSE so far by trial.
     course: Option<String>,
     withdrawn: bool,
+}
+
+impl Row {
+    /// The class of the state: a study that finished without a gait does not look like a success.
+    fn state_class(&self) -> &'static str {
+        if is_without_gait(self.study.state, self.counts) { "without_gait" } else { self.study.state.as_str() }
+    }
+}
+
+/// Whether a study finished, and no trial has a gait.
+fn is_without_gait(state: StudyState, counts: TrialCounts) -> bool {
+    state == StudyState::Finished && counts.converged == 0
+}
+
+fn state_in_words(state: StudyState, counts: TrialCounts) -> String {
+    if is_without_gait(state, counts) { "finished, no gait".to_owned() } else { words(state.as_str()) }
 }
 
 struct Waiting {
@@ -65,22 +142,22 @@ pub(super) async fn get(
     SignedIn(caller): SignedIn,
     authorized: Result<Authorized<Read>, Refused>,
     State(app): State<AppState>,
-    Params(StudyFilter { before }): Params<StudyFilter>,
+    Params(filter): Params<StudyFilter>,
 ) -> Result<Response, Refused> {
     match authorized {
-        Ok(authorized) => Ok(show(&app, &authorized, before).await.into_response()),
+        Ok(authorized) => Ok(show(&app, &authorized, filter).await.into_response()),
         Err(_) if caller.is_some_and(|caller| caller.may(Rate::NEEDED)) => Ok(Redirect::to("/rate").into_response()),
         Err(refused) => Err(refused),
     }
 }
 
-async fn show(app: &AppState, authorized: &Authorized<Read>, before: Option<StudyId>) -> Page {
+async fn show(app: &AppState, authorized: &Authorized<Read>, filter: StudyFilter) -> Page {
     let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
-    let mut found = studies::page(&mut reader, reach, Chosen { before, ..Chosen::newest(PAGE + 1) }).await?;
+    let mut found = studies::listed(&mut reader, reach, &filter.listed(PAGE + 1)?).await?;
     let more = found.len() > PAGE as usize;
     found.truncate(PAGE as usize);
-    let next = found.last().filter(|_| more).map(|study| study.id);
+    let next = found.last().filter(|_| more).map(|study| filter.after(study.id));
     let mut rows = Vec::new();
     for study in found {
         rows.push(row(&mut reader, study).await?);
@@ -89,7 +166,9 @@ async fn show(app: &AppState, authorized: &Authorized<Read>, before: Option<Stud
     let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
     let waiting = unsafe_gaits.chain(held).collect();
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
-    page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
+    let tags = studies::tags(&mut reader, reach).await?;
+    let (later, may_run) = (filter.before.is_some(), authorized.caller.may(Run::NEEDED));
+    page(&Home { no_password, waiting, studies: rows, later, next, filter, tags, states: STATES, may_run })
 }
 
 /// Safety reports that staff have to review.
@@ -115,16 +194,18 @@ fn waiting(study: Study) -> Waiting {
 async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
     let counts = trials::counts(db, study.id).await?;
     let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
+    let reference = reference_gaits::get(db, study.plan.reference_gait_id).await?.name;
     let withdrawn = consents::is_withdrawn(db, study.id).await?;
     let improvements = if withdrawn { Vec::new() } else { trials::improvements(db, study.id).await? };
     let course: Vec<(f64, f64)> = improvements.iter().map(|(number, rmse)| (f64::from(*number), *rmse)).collect();
     Ok(Row {
-        state: words(study.state.as_str()),
+        state: state_in_words(study.state, counts),
         variant: variant(study.plan.muscles),
         best_rmse: improvements.last().map(|(_, rmse)| format!("{rmse:.4}")),
         course: sparkline("Lowest Gait RMSE by trial", &course, f64::from(counts.total)),
         study,
         subject,
+        reference,
         counts,
         withdrawn,
     })

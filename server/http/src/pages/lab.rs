@@ -248,7 +248,7 @@ struct Drawings {
     portraits: Vec<Drawn>,
 }
 
-async fn show(
+pub(super) async fn show(
     app: &mut AppState,
     id: LabSessionId,
     caller: &Caller,

@@ -11,7 +11,7 @@ use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::Rate;
+use gaitwright_service::access::{Permission, Rate, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, LabSessionProgress, NewAnswer, RecordedWalk};
 use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members, now};
@@ -29,6 +29,8 @@ struct LabPage {
     sessions: Vec<(LabSessionId, Instant, String)>,
     /// Whether the caller can see any study.
     assigned: bool,
+    /// Whether the caller may see studies, so that the page has the navigation.
+    staff: bool,
 }
 
 #[derive(Template)]
@@ -78,7 +80,8 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
         sessions.push((session.id, session.created_at, next));
     }
     let assigned = members::reaches_any(&mut reader, authorized.caller.reach()).await?;
-    page(&LabPage { sessions, assigned })
+    let staff = authorized.caller.may(Read::NEEDED);
+    page(&LabPage { sessions, assigned, staff })
 }
 
 /// `GET /lab/{id}`.

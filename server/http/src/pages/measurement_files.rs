@@ -1,17 +1,22 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
 use super::lab;
-use super::measurement_forms::{EmgFields, Forms, MotionFields, Settings};
+use super::measurement_forms::{EmgFields, Forms, MotionFields, Preview, Settings};
+use super::page_chart::Drawn;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Form;
+use crate::figures::lab_charts;
+use crate::form_errors;
 use crate::page_error::PageError;
 use axum::extract::State;
-use axum::response::Response;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use gaitwright_compute::OnPool;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self as session, Checked};
+use gaitwright_service::studies::lab::{self as session, Checked, EmgPreview};
 use gaitwright_store::{LabSessionId, commit};
 
 /// `POST /lab-sessions/{id}/measurement-files/emg`.
@@ -21,6 +26,16 @@ pub(super) async fn emg(
     Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<EmgFields>,
 ) -> Result<Response, PageError> {
+    if fields.previews() {
+        let (preview, refused) = match previewed(&mut app, &fields).await {
+            Ok(preview) => (Some(preview), None),
+            Err(error @ Error::Invalid(_)) => (None, Some(form_errors::in_words(&error))),
+            Err(other) => return Err(other.into()),
+        };
+        let status = if refused.is_some() { StatusCode::UNPROCESSABLE_ENTITY } else { StatusCode::OK };
+        let forms = Forms { emg: fields, open: "emg", preview, ..Forms::default() };
+        return Ok((status, lab::show(&mut app, id, &authorized.caller, forms, refused).await?).into_response());
+    }
     let kept = async {
         let checked = fields.read()?.checked(app.store_mut()).await?;
         keep(&app, &authorized, id, checked).await
@@ -43,6 +58,19 @@ pub(super) async fn motion(
     let kept = kept.await;
     lab::answer(&mut app, id, &authorized.caller, kept, Forms { motion: fields, open: "motion", ..Forms::default() })
         .await
+}
+
+/// Reads and draws the file of the form on the thread pool. Nothing is stored.
+async fn previewed(app: &mut AppState, fields: &EmgFields) -> Result<Preview, Error> {
+    let new = fields.read()?;
+    let draw = move |_: &OnPool| {
+        let preview = new.preview()?;
+        let charts = lab_charts::preview(&preview).iter().map(Drawn::new).collect();
+        let EmgPreview { columns, strides, refused, .. } = preview;
+        let refused = refused.as_ref().map(form_errors::in_words);
+        Ok::<_, Error>(Preview { columns, channels: lab_charts::muscles(), charts, strides, refused })
+    };
+    app.compute(draw).await?
 }
 
 async fn keep(app: &AppState, authorized: &Authorized<Run>, id: LabSessionId, checked: Checked) -> Result<(), Error> {

@@ -1,10 +1,12 @@
 //! The forms of a lab session for measurement files and filter settings, as typed, and their parsed values.
 
-use gait_optimizer::emg::EmgSettings;
+use super::page_chart::Drawn;
+use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion};
+use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, Stride};
 use gaitwright_service::studies::reference_import::Unit;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 /// The form for an EMG recording, as typed.
@@ -16,9 +18,27 @@ pub(super) struct EmgFields {
     pub(super) recording: String,
     pub(super) rate_hz: String,
     pub(super) channels: String,
+    /// The column of each channel, chosen in the preview.
+    #[serde(rename = "column_RF_L")]
+    pub(super) column_rf_l: String,
+    #[serde(rename = "column_TA_L")]
+    pub(super) column_ta_l: String,
+    #[serde(rename = "column_BF_L")]
+    pub(super) column_bf_l: String,
+    #[serde(rename = "column_GAS_L")]
+    pub(super) column_gas_l: String,
+    #[serde(rename = "column_RF_R")]
+    pub(super) column_rf_r: String,
+    #[serde(rename = "column_BF_R")]
+    pub(super) column_bf_r: String,
     pub(super) heel_strikes_s: String,
     pub(super) heel_strike_column: String,
     pub(super) heel_strike_threshold: String,
+    /// Numbers of strides, separated by commas.
+    pub(super) rejected_strides: String,
+    pub(super) file_name: String,
+    /// `preview`, or else an upload.
+    pub(super) act: String,
 }
 
 impl Default for EmgFields {
@@ -30,6 +50,15 @@ impl Default for EmgFields {
             recording: String::new(),
             rate_hz: String::new(),
             channels: String::new(),
+            column_rf_l: String::new(),
+            column_ta_l: String::new(),
+            column_bf_l: String::new(),
+            column_gas_l: String::new(),
+            column_rf_r: String::new(),
+            column_bf_r: String::new(),
+            rejected_strides: String::new(),
+            file_name: String::new(),
+            act: String::new(),
             heel_strikes_s: String::new(),
             heel_strike_column: String::new(),
             heel_strike_threshold: reading.heel_strike_threshold.to_string(),
@@ -42,7 +71,9 @@ impl EmgFields {
         let reading = EmgReading {
             format: self.format,
             rate_hz: optional("rate_hz", &self.rate_hz)?,
-            channels: pairs(&self.channels)?,
+            channels: self.columns()?,
+            rejected_strides: list("rejected_strides", &self.rejected_strides)?,
+            file_name: file_name(&self.file_name),
             heel_strikes_s: list("heel_strikes_s", &self.heel_strikes_s)?,
             heel_strike_column: Some(self.heel_strike_column.trim().to_owned()).filter(|name| !name.is_empty()),
             ..EmgReading::default()
@@ -57,8 +88,48 @@ impl EmgFields {
     }
 }
 
+impl EmgFields {
+    /// The column chosen for each channel.
+    fn chosen(&self) -> [(&'static str, &str); 6] {
+        let columns = [
+            &self.column_rf_l,
+            &self.column_ta_l,
+            &self.column_bf_l,
+            &self.column_gas_l,
+            &self.column_rf_r,
+            &self.column_bf_r,
+        ];
+        std::array::from_fn(|place| (CHANNELS[place], columns[place].as_str()))
+    }
+
+    /// Whether this column is chosen for this channel, or has its name.
+    pub(super) fn is_column(&self, channel: &str, column: &str) -> bool {
+        let chosen = self.columns().unwrap_or_default();
+        if chosen.is_empty() { channel == column } else { chosen.get(channel).is_some_and(|known| known == column) }
+    }
+
+    /// The columns chosen in lists, or else those that are typed.
+    fn columns(&self) -> Result<BTreeMap<String, String>, Error> {
+        let chosen = self.chosen().into_iter().filter(|(_, column)| !column.is_empty());
+        let chosen: BTreeMap<String, String> =
+            chosen.map(|(channel, column)| (channel.into(), column.into())).collect();
+        if chosen.is_empty() { pairs(&self.channels) } else { Ok(chosen) }
+    }
+
+    /// Whether the form asks for a preview only.
+    pub(super) fn previews(&self) -> bool {
+        self.act == "preview"
+    }
+}
+
+/// The name of a file, without the folders that some browsers add.
+fn file_name(text: &str) -> Option<String> {
+    let name = text.rsplit(['/', '\\']).next().unwrap_or_default().trim();
+    (!name.is_empty()).then(|| name.to_owned())
+}
+
 /// `TA_L=EMG 3, BF_L=EMG 5`.
-fn pairs(text: &str) -> Result<std::collections::BTreeMap<String, String>, Error> {
+fn pairs(text: &str) -> Result<BTreeMap<String, String>, Error> {
     let pair = |part: &str| {
         let refused = || Error::invalid("channels", part, "a list of CHANNEL=COLUMN pairs, separated by commas");
         let (channel, column) = part.split_once('=').ok_or_else(refused)?;
@@ -67,7 +138,7 @@ fn pairs(text: &str) -> Result<std::collections::BTreeMap<String, String>, Error
     text.split(',').filter(|part| !part.trim().is_empty()).map(pair).collect()
 }
 
-fn list(field: &str, text: &str) -> Result<Vec<f64>, Error> {
+fn list<T: FromStr>(field: &str, text: &str) -> Result<Vec<T>, Error> {
     text.split(',').filter(|part| !part.trim().is_empty()).map(|part| number(field, part)).collect()
 }
 
@@ -88,13 +159,14 @@ pub(super) struct MotionFields {
     pub(super) recording: String,
     pub(super) unit: String,
     pub(super) cutoff_hz: String,
+    pub(super) file_name: String,
 }
 
 impl Default for MotionFields {
     fn default() -> Self {
         let MotionReading { format, cutoff_hz, .. } = MotionReading::default();
         let (recording, unit) = (String::new(), String::new());
-        Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string() }
+        Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string(), file_name: String::new() }
     }
 }
 
@@ -107,7 +179,7 @@ impl MotionFields {
             other => return Err(Error::invalid("unit", other, "degrees, radians or empty")),
         };
         let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(MotionReading::default().cutoff_hz);
-        let reading = MotionReading { format: self.format, unit, cutoff_hz };
+        let reading = MotionReading { format: self.format, unit, cutoff_hz, file_name: file_name(&self.file_name) };
         Ok(NewMotion { walk: self.walk, recording: self.recording.clone(), reading })
     }
 }
@@ -153,4 +225,18 @@ pub(super) struct Forms {
     pub(super) filters: Option<Settings>,
     /// The refused form: `emg`, `motion` or `filters`.
     pub(super) open: &'static str,
+    /// The preview of the EMG recording in the form.
+    pub(super) preview: Option<Preview>,
+}
+
+/// A preview of an EMG recording, as the page shows it.
+#[derive(Debug)]
+pub(super) struct Preview {
+    pub(super) columns: Vec<String>,
+    /// Each channel and its muscle.
+    pub(super) channels: [(&'static str, &'static str); 6],
+    pub(super) charts: Vec<Drawn>,
+    pub(super) strides: Vec<Stride>,
+    /// Why the file would be refused.
+    pub(super) refused: Option<String>,
 }

@@ -34,6 +34,7 @@ mod side_by_side;
 mod sign_in;
 mod simulated_walks;
 mod study;
+mod study_details;
 mod subject;
 mod system;
 mod undo;
@@ -52,11 +53,13 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/", get(home::get))
         .route("/studies/new", get(new_study::get).post(new_study::post))
         .route("/studies/new/check", post(new_study::check))
+        .route("/studies/sample", post(new_study::sample))
         .route("/studies/compare", get(side_by_side::get))
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
         .route("/studies/{id}/belief", get(belief::get))
         .route("/studies/{id}/figures", get(figures::get))
+        .route("/studies/{id}/details", get(study_details::get).post(study_details::post))
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))

@@ -93,7 +93,7 @@ impl ReferenceGaitsPage {
             let all = reference_gaits::all(db).await?.into_iter();
             all.map(|reference_gait| ReferenceGaitMatch { reference_gait, distance: None }).collect()
         };
-        let subjects = subjects::all(db).await?;
+        let subjects = subjects::consenting(db).await?;
         Ok(Self { matches, subjects, nearest_to, may_run, fields: Fields::default(), refused: None })
     }
 

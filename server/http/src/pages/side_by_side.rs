@@ -18,8 +18,9 @@ use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_store::studies::{Chosen, Study};
-use gaitwright_store::{StudyId, TrialId, gaits, studies, trials};
+use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
 use serde::Deserialize;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// How many of the newest studies are offered.
@@ -69,7 +70,10 @@ pub(super) async fn get(
 ) -> Page {
     let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
-    let offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;
+    let shown: BTreeSet<SubjectId> =
+        subjects::consenting(&mut reader).await?.into_iter().map(|subject| subject.id).collect();
+    let mut offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;
+    offered.retain(|study| shown.contains(&study.plan.subject_id));
     let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
     let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {

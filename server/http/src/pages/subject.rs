@@ -3,6 +3,7 @@
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
+use crate::body_measures::{self, feet_and_inches, pounds};
 use crate::extractors::{Form, Params};
 use crate::form_errors;
 use crate::format::{variant, words};
@@ -34,12 +35,18 @@ struct SubjectsPage {
     next: Option<SubjectId>,
     may_run: bool,
     fields: Described,
-    refused: Option<FieldError>,
+    /// Every refused field.
+    refused: Vec<FieldError>,
 }
 
 impl SubjectsPage {
-    fn refuses(&self, field: &str) -> bool {
-        self.refused.as_ref().is_some_and(|refused| refused.field == field)
+    /// The attributes that mark a refused field and point to the reason. The first one gets the focus.
+    fn invalid(&self, field: &str) -> &'static str {
+        match self.refused.iter().position(|refused| refused.field == field) {
+            Some(0) => " aria-invalid=\"true\" aria-describedby=\"refused\" autofocus",
+            Some(_) => " aria-invalid=\"true\" aria-describedby=\"refused\"",
+            None => "",
+        }
     }
 }
 
@@ -62,14 +69,35 @@ impl Described {
 
 /// Height and mass as typed.
 fn body_of(height: &str, mass: &str) -> Result<(f64, f64), Error> {
-    let number = |field, text: &str, allowed| text.trim().parse().map_err(|_| Error::invalid(field, text, allowed));
-    let height = number("height_m", height, "a number in metres, such as 1.75")?;
-    Ok((height, number("body_mass_kg", mass, "a number in kilograms, such as 65.7")?))
+    Ok((body_measures::height_m("height_m", height)?, body_measures::mass_kg("body_mass_kg", mass)?))
+}
+
+/// Every field of a new subject that would be refused, in the order of the form.
+fn faults(fields: &Described) -> Vec<FieldError> {
+    let mut repaired = fields.clone();
+    let mut found: Vec<FieldError> = Vec::new();
+    // Each field is refused once, and an acceptable value takes its place.
+    while let Err(Error::Invalid(fault)) = repaired.read().and_then(|new| subject::check_new(&new)) {
+        if found.iter().any(|known| known.field == fault.field) {
+            break;
+        }
+        match fault.field.as_str() {
+            "pseudonym" => "S01".clone_into(&mut repaired.pseudonym),
+            "height_m" => "1.75".clone_into(&mut repaired.height_m),
+            "body_mass_kg" => "70".clone_into(&mut repaired.body_mass_kg),
+            _ => repaired.notes.clear(),
+        }
+        found.push(form_errors::with_label(*fault));
+    }
+    let place = |fault: &FieldError| ["pseudonym", "height_m", "body_mass_kg"].iter().position(|f| *f == fault.field);
+    found.sort_by_key(|fault| place(fault).unwrap_or(usize::MAX));
+    found
 }
 
 struct Row {
     subject: Subject,
     consent: &'static str,
+    withdrawn: bool,
 }
 
 #[derive(Template)]
@@ -90,6 +118,45 @@ struct SubjectPage {
     corrected: i64,
     may_administer: bool,
     refused: Option<String>,
+    /// The correction as typed, or the present values.
+    correction: Correcting,
+    /// The reason in a refused withdrawal.
+    withdrawal_reason: String,
+}
+
+impl SubjectPage {
+    fn feet(&self) -> String {
+        feet_and_inches(self.subject.height_m)
+    }
+
+    fn pounds(&self) -> String {
+        pounds(self.subject.body_mass_kg)
+    }
+}
+
+/// The fields of the form that corrects height and mass.
+struct Correcting {
+    height_m: String,
+    body_mass_kg: String,
+    reason: String,
+    /// Whether the form was refused.
+    refused: bool,
+}
+
+impl Correcting {
+    fn of(subject: &Subject) -> Self {
+        let (height_m, body_mass_kg) = (subject.height_m.to_string(), subject.body_mass_kg.to_string());
+        Self { height_m, body_mass_kg, reason: String::new(), refused: false }
+    }
+}
+
+/// The entries of a refused form of the page.
+#[derive(Default)]
+enum Typed {
+    #[default]
+    Nothing,
+    Correction(Correcting),
+    Withdrawal(String),
 }
 
 /// A study of the subject.
@@ -119,7 +186,7 @@ pub(super) async fn list(
     State(app): State<AppState>,
     Params(Before { before }): Params<Before>,
 ) -> Page {
-    show_list(&app, before, authorized.caller.may(Run::NEEDED), Described::default(), None).await
+    show_list(&app, before, authorized.caller.may(Run::NEEDED), Described::default(), Vec::new()).await
 }
 
 /// `POST /subjects`: adds one, before it has a study.
@@ -142,13 +209,11 @@ pub(super) async fn add(
     };
     let status = Problem::from(&error).status();
     let refused = match error {
-        Error::Invalid(refused) => form_errors::with_label(*refused),
+        Error::Invalid(_) => faults(&fields),
         // The only possible conflict is a pseudonym that is taken.
-        other => {
-            FieldError { message: other.to_string(), ..FieldError::new("pseudonym", fields.pseudonym.clone(), "") }
-        }
+        other => vec![FieldError::in_words("pseudonym", &other.to_string())],
     };
-    Ok((status, show_list(&app, None, true, fields, Some(refused)).await?).into_response())
+    Ok((status, show_list(&app, None, true, fields, refused).await?).into_response())
 }
 
 async fn show_list(
@@ -156,7 +221,7 @@ async fn show_list(
     before: Option<SubjectId>,
     may_run: bool,
     fields: Described,
-    refused: Option<FieldError>,
+    refused: Vec<FieldError>,
 ) -> Page {
     let mut reader = app.read().await?;
     let mut found = subjects::page(&mut reader, before, PAGE + 1).await?;
@@ -166,7 +231,9 @@ async fn show_list(
     let mut rows = Vec::with_capacity(found.len());
     for subject in found {
         let consents = consents::of_subject(&mut reader, subject.id).await?;
-        rows.push(Row { subject, consent: consents.last().map_or("not on record", |last| last.kind.as_str()) });
+        let last = consents.last();
+        let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
+        rows.push(Row { subject, consent: last.map_or("not on record", |last| last.kind.as_str()), withdrawn });
     }
     page(&SubjectsPage { subjects: rows, next, may_run, fields, refused })
 }
@@ -177,10 +244,10 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
 ) -> Page {
-    show(&app, id, &authorized.caller, None).await
+    show(&app, id, &authorized.caller, None, Typed::Nothing).await
 }
 
-async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>) -> Page {
+async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>, typed: Typed) -> Page {
     let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
@@ -196,6 +263,12 @@ async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<St
     drop(reader);
     let after = last.map_or(0, |last| last.seq);
     let corrected = corrections.last().map_or(0, |last| last.seq);
+    let (mut correction, mut withdrawal_reason) = (Correcting::of(&subject), String::new());
+    match typed {
+        Typed::Nothing => {}
+        Typed::Correction(typed) => correction = typed,
+        Typed::Withdrawal(reason) => withdrawal_reason = reason,
+    }
     page(&SubjectPage {
         subject,
         consents,
@@ -208,6 +281,8 @@ async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<St
         corrected,
         may_administer,
         refused,
+        correction,
+        withdrawal_reason,
     })
 }
 
@@ -246,7 +321,7 @@ pub(super) async fn consent(
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let done = give(&app, &authorized, id, form).await;
-    answer(&app, id, &authorized.caller, done).await
+    answer(&app, id, &authorized.caller, done, Typed::Nothing).await
 }
 
 async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
@@ -264,10 +339,26 @@ pub(super) async fn withdraw(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
-    Form(why): Form<Withdrawal>,
+    Form(form): Form<Withdrawing>,
 ) -> Result<Response, PageError> {
-    let done = end(&app, &authorized, id, &why).await;
-    answer(&app, id, &authorized.caller, done).await
+    let why = Withdrawal { reason: form.reason };
+    let done = if form.confirmed.as_deref() == Some("yes") {
+        end(&app, &authorized, id, &why).await
+    } else {
+        Err(Error::conflict(
+            "Nothing was changed. First tick the box to confirm that all studies of this subject stop.",
+        ))
+    };
+    answer(&app, id, &authorized.caller, done, Typed::Withdrawal(why.reason)).await
+}
+
+/// The form of a withdrawal.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Withdrawing {
+    reason: String,
+    /// `yes` if the box is ticked.
+    confirmed: Option<String>,
 }
 
 async fn end(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, why: &Withdrawal) -> Result<(), Error> {
@@ -297,8 +388,14 @@ pub(super) async fn correct(
     Id(id, _): Id<SubjectId, Run>,
     Form(form): Form<Corrected>,
 ) -> Result<Response, PageError> {
+    let typed = Correcting {
+        height_m: form.height_m.clone(),
+        body_mass_kg: form.body_mass_kg.clone(),
+        reason: form.reason.clone(),
+        refused: true,
+    };
     let done = set_right(&app, &authorized, id, form).await;
-    answer(&app, id, &authorized.caller, done).await
+    answer(&app, id, &authorized.caller, done, Typed::Correction(typed)).await
 }
 
 async fn set_right(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
@@ -319,11 +416,12 @@ async fn answer(
     id: SubjectId,
     caller: &Caller,
     done: Result<(), Error>,
+    typed: Typed,
 ) -> Result<Response, PageError> {
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, Some(form_errors::in_words(&error))).await?;
+            let shown = show(app, id, caller, Some(form_errors::in_words(&error)), typed).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

@@ -8,6 +8,7 @@ use crate::form_errors;
 use crate::format;
 use crate::page_error::{Page, PageError, page};
 use crate::problem_details::Problem;
+use crate::qr_code;
 use askama::Template;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};

@@ -4,18 +4,22 @@
 //! The next trial derives from the record, so the task continues after a crash. It explains one trial at a time, at
 //! lower priority than solves.
 
-use super::explanation::{self, Effort};
+use super::explanation::{self, Effort, Elapsed};
 use crate::error::Error;
 use crate::workers::Explain;
 use gait_optimizer::CancelToken;
 use gaitwright_compute::priority::behind_solves;
 use gaitwright_store::{Store, StoreResult, StudyId, TrialId, commit, consents, events, explanations, trials};
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 use tokio::sync::{Notify, watch};
 use tokio_util::sync::CancellationToken;
+
+/// How many durations the expected duration is the median of.
+const TIMED: usize = 9;
 
 /// Explains trials one at a time, at lower priority than solves.
 pub(super) struct Explainer {
@@ -29,12 +33,31 @@ pub(super) struct Explainer {
 struct State {
     /// Ended studies whose best gaits are certified.
     ended: BTreeSet<StudyId>,
-    /// What is being explained, and what gives it up.
-    running: Option<(TrialId, CancellationToken)>,
+    /// What is being explained, what gives it up, and when it started.
+    running: Option<(TrialId, CancellationToken, Instant)>,
+    /// Durations of the newest explanations, oldest first, s.
+    seconds: VecDeque<u64>,
     /// What somebody cancelled, until somebody asks for it again.
     cancelled: BTreeSet<TrialId>,
     /// Trials that cannot be explained, with the reason.
     refused: BTreeMap<TrialId, String>,
+}
+
+impl State {
+    /// Records the duration of an explanation, s.
+    fn took(&mut self, seconds: u64) {
+        if self.seconds.len() == TIMED {
+            self.seconds.pop_front();
+        }
+        self.seconds.push_back(seconds);
+    }
+
+    /// The median of the recorded durations, s.
+    fn usual_seconds(&self) -> Option<u64> {
+        let mut sorted: Vec<u64> = self.seconds.iter().copied().collect();
+        sorted.sort_unstable();
+        sorted.get(sorted.len() / 2).copied()
+    }
 }
 
 /// Cancels the solves when the caller stops waiting.
@@ -64,8 +87,13 @@ impl Explainer {
         match state.refused.get(&trial) {
             Some(reason) => Effort::Refused(reason.clone()),
             None if state.cancelled.contains(&trial) => Effort::Cancelled,
-            None if state.running.as_ref().is_some_and(|(running, _)| *running == trial) => Effort::Running,
-            None => Effort::Ready,
+            None => match &state.running {
+                Some((running, _, since)) if *running == trial => Effort::Running(Elapsed {
+                    seconds: since.elapsed().as_secs(),
+                    usual_seconds: state.usual_seconds(),
+                }),
+                _ => Effort::Ready,
+            },
         }
     }
 
@@ -73,7 +101,7 @@ impl Explainer {
     pub(super) fn cancel(&self, trial: TrialId) {
         let mut state = self.state();
         state.cancelled.insert(trial);
-        if let Some((running, cancelled)) = &state.running
+        if let Some((running, cancelled, _)) = &state.running
             && *running == trial
         {
             cancelled.cancel();
@@ -110,9 +138,16 @@ impl Explainer {
     async fn explain_next(&self, pulse: &mut watch::Receiver<u64>) -> Result<bool, Error> {
         let Some(trial) = self.next().await? else { return Ok(false) };
         let cancelled = CancellationToken::new();
-        self.state().running = Some((trial, cancelled.clone()));
+        let since = Instant::now();
+        self.state().running = Some((trial, cancelled.clone(), since));
         let explained = cancelled.run_until_cancelled(self.explain(trial, pulse)).await;
-        self.state().running = None;
+        {
+            let mut state = self.state();
+            state.running = None;
+            if explained.is_some() {
+                state.took(since.elapsed().as_secs());
+            }
+        }
         match explained.unwrap_or(Ok(())) {
             Ok(()) => {}
             Err(error) if error.is_of_machine() => return Err(error),
@@ -188,5 +223,20 @@ impl Explainer {
 impl fmt::Debug for Explainer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Explainer").field("state", &self.state).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_duration_is_median_of_newest_explanations() {
+        let mut state = State::default();
+        assert_eq!(state.usual_seconds(), None);
+        for seconds in [1000, 1000, 1000, 10, 11, 12, 13, 14, 90, 95, 5, 6] {
+            state.took(seconds);
+        }
+        assert_eq!((state.seconds.len(), state.usual_seconds()), (TIMED, Some(12)));
     }
 }

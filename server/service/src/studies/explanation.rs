@@ -35,11 +35,20 @@ pub enum Effort {
     /// This process explains trials, but is not explaining this one.
     Ready,
     /// The trial is being explained.
-    Running,
+    Running(Elapsed),
     /// Somebody cancelled it.
     Cancelled,
     /// The explanation failed, for this reason.
     Refused(String),
+}
+
+/// How long the explanation of a trial has been running.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Elapsed {
+    /// Seconds since its start.
+    pub seconds: u64,
+    /// The median duration, s, of the newest explanations of this process; `None` before the first one.
+    pub usual_seconds: Option<u64>,
 }
 
 /// The state of the explanation of a trial.
@@ -52,7 +61,7 @@ pub async fn state(db: &mut Connection, trial: &Trial, effort: Effort) -> Result
     }
     let ready = match effort {
         Effort::Refused(reason) => return Ok(ExplanationState::Refused(reason)),
-        Effort::Running => return Ok(ExplanationState::BeingMade),
+        Effort::Running(_) => return Ok(ExplanationState::BeingMade),
         Effort::Cancelled => return Ok(ExplanationState::NotAsked),
         Effort::Ready => true,
         Effort::None => false,

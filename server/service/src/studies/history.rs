@@ -5,6 +5,7 @@
 
 use super::snapshot::StudySnapshot;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
+use gaitwright_store::studies::FeedbackMode;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Instant, TrialId};
 use serde::Serialize;
@@ -51,7 +52,7 @@ fn results_before(labelled: &[(Instant, &Trial)], proposed: &Trial) -> usize {
     count
 }
 
-/// The best trial after each iteration at which the learner was asked. Each proposal names the best trial after the
+/// The best trial after each iteration. Each proposal names the best trial after the
 /// results at that time; `best` is the current one. Before the first proposal with a best trial, the first gait counts
 /// as the best.
 pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
@@ -82,7 +83,35 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
     milestones.reverse();
     milestones.dedup_by_key(|milestone| milestone.iteration);
     milestones.reverse();
-    milestones
+    let rmse_decides = snapshot.study.plan.feedback_mode == FeedbackMode::Automatic;
+    at_every_iteration(&milestones, &labelled, rmse_decides)
+}
+
+/// Adds the iterations after which the learner was not asked, because the next trial was proposed before. There the best
+/// trial stays, unless Gait RMSE decides and the result is better.
+fn at_every_iteration(asked: &[Milestone], labelled: &[(Instant, &Trial)], rmse_decides: bool) -> Vec<Milestone> {
+    let Some(first) = asked.first() else { return Vec::new() };
+    let mut all: Vec<Milestone> = Vec::with_capacity(labelled.len());
+    let mut best = *first;
+    for (iteration, (_, trial)) in (1_u32..).zip(labelled).filter(|(iteration, _)| *iteration >= first.iteration) {
+        if let Ok(place) = asked.binary_search_by_key(&iteration, |milestone| milestone.iteration) {
+            best = asked[place];
+        } else if rmse_decides
+            && trial.state == TrialState::Converged
+            && let (Some(new), Some(old)) = (trial.gait_rmse_rad, best.gait_rmse_rad)
+            && new < old
+        {
+            best = Milestone {
+                trial_id: trial.id,
+                number: trial.number,
+                gait_rmse_rad: trial.gait_rmse_rad,
+                cost_of_transport: trial.cost_of_transport,
+                ..best
+            };
+        }
+        all.push(Milestone { iteration, ..best });
+    }
+    all
 }
 
 /// The history from the stored proposals alone, without the learner. Assumes that trials ran one at a time.

@@ -111,7 +111,7 @@ fn progress(scheduler: &Scheduler, id: JobId) -> Option<f64> {
 
 async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) -> Result<Found, Error> {
     let effort = scheduler.explaining(trial.id);
-    let running = effort == Effort::Running;
+    let running = matches!(effort, Effort::Running(_));
     if effort == Effort::Cancelled {
         return Ok(Some((JobState::Cancelled, None)));
     }
@@ -153,7 +153,7 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
     }
     for (trial, study) in explanations::requested(db, reach).await? {
         let state = match runners.scheduler.explaining(trial) {
-            Effort::Running => JobState::Running,
+            Effort::Running(_) => JobState::Running,
             Effort::Ready | Effort::None => JobState::Queued,
             Effort::Cancelled | Effort::Refused(_) => continue,
         };

@@ -42,6 +42,7 @@ pub mod safety_report;
 pub mod safety_reports;
 pub mod safety_review;
 pub mod same_motion;
+pub mod sample_study;
 pub mod scheduler;
 pub mod search_space;
 pub mod seed;

@@ -1,4 +1,4 @@
-//! Finds the reference gait nearest to a subject in height and body mass.
+//! Sorts reference gaits by their distance from a subject in height and body mass.
 
 use crate::error::Error;
 use gait_optimizer::Subject;
@@ -36,13 +36,4 @@ pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Refer
         far(a).total_cmp(&far(b))
     });
     Ok(found)
-}
-
-/// The reference gait nearest to a subject. `None` if no reference gait states height and mass.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn nearest(db: &mut Connection, subject: &Subject) -> Result<Option<ReferenceGait>, Error> {
-    let matches = matches(db, subject).await?;
-    Ok(matches.into_iter().find(|found| found.distance.is_some()).map(|found| found.reference_gait))
 }

@@ -1,12 +1,12 @@
-//! Changes a study: its name and limits, its trial budget, or a fork of it. For pages and REST.
+//! Changes a study: its name, tags, notes and limits, its trial budget, or a fork of it. For pages and REST.
 
 use super::lifecycle::{self, Act};
 use super::study_plan;
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::{FeedbackMode, Study, StudyLimits, StudyState};
-use gaitwright_store::{StudyId, Writer, events, members, studies};
+use gaitwright_store::{StudyId, Writer, events, members, now, studies};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -27,6 +27,56 @@ pub struct Change {
     #[serde(default)]
     #[schema(minimum = 1, maximum = 64)]
     pub parallel_trials: Option<u32>,
+    /// Tags, at most 10 of at most 40 characters. They replace the present ones.
+    #[serde(default)]
+    #[schema(max_items = 10)]
+    pub tags: Option<Vec<String>>,
+    /// Notes of people.
+    #[serde(default)]
+    #[schema(max_length = 4000)]
+    pub notes: Option<String>,
+    /// Whether the study is archived, so that lists do not show it. Possible before its start and after its end.
+    #[serde(default)]
+    pub archived: Option<bool>,
+}
+
+/// Largest number of tags of a study, and of characters of a tag.
+const MOST_TAGS: usize = 10;
+const LONGEST_TAG: usize = 40;
+/// Maximum length of notes, characters.
+const LONGEST_NOTES: usize = 4000;
+
+/// Checks tags: trimmed, without repetitions, in alphabetical order.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
+    let mut checked = Vec::new();
+    for tag in tags {
+        let tag = printable::name("tags", tag, LONGEST_TAG)?;
+        if tag.contains(',') {
+            return Err(Error::invalid("tags", tag, "without commas, which separate tags"));
+        }
+        checked.push(tag.to_owned());
+    }
+    checked.sort();
+    checked.dedup();
+    if checked.len() > MOST_TAGS {
+        return Err(
+            FieldError::described("tags", &format!("a list of {}", checked.len()), "a list of at most 10").into()
+        );
+    }
+    Ok(checked)
+}
+
+/// Checks tags and notes of an imported study.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn check_filing(study: &Study) -> Result<(), Error> {
+    checked_tags(&study.tags)?;
+    printable::note("notes", &study.notes, LONGEST_NOTES)?;
+    Ok(())
 }
 
 /// Applies changes to a study.
@@ -47,10 +97,36 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
     };
     study_plan::check_range("priority", i64::from(limits.priority), -10, 10)?;
     study_plan::check_range("parallel_trials", i64::from(limits.parallel_trials), 1, 64)?;
+    let tags = match &change.tags {
+        None => study.tags.clone(),
+        Some(tags) => checked_tags(tags)?,
+    };
+    let notes = match change.notes.as_deref().map(str::trim) {
+        None => study.notes.as_str(),
+        Some(notes) => {
+            printable::note("notes", notes, LONGEST_NOTES)?;
+            notes
+        }
+    };
+    let archived_at = match change.archived {
+        Some(true) if study.archived_at.is_none() => {
+            if !study.state.has_ended() && study.state != StudyState::Draft {
+                return Err(Error::conflict("A study that has not ended cannot be archived. Stop it first."));
+            }
+            Some(now())
+        }
+        Some(false) => None,
+        _ => study.archived_at,
+    };
     studies::set_limits(writer, id, &limits).await?;
+    studies::set_filing(writer, id, &tags, notes, archived_at).await?;
     let detail = json!({
         "name": limits.name, "priority": limits.priority, "parallel_trials": limits.parallel_trials,
-        "before": { "name": study.plan.name, "priority": study.plan.priority, "parallel_trials": study.plan.parallel_trials },
+        "tags": tags, "notes": notes, "archived": archived_at.is_some(),
+        "before": {
+            "name": study.plan.name, "priority": study.plan.priority, "parallel_trials": study.plan.parallel_trials,
+            "tags": study.tags, "notes": study.notes, "archived": study.archived_at.is_some(),
+        },
     });
     changed(writer, actor, "study.change", &study, study.state, &detail).await
 }

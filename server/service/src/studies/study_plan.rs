@@ -2,8 +2,8 @@
 
 use super::search_space::{self, GivenSpace};
 use super::subject::{self, NewSubject};
-use super::{built_in_entries, membership, nearest_reference};
-use crate::access::Caller;
+use super::{built_in_entries, membership};
+use crate::access::{Caller, Reach};
 use crate::error::{Error, FieldError};
 use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
@@ -30,8 +30,7 @@ pub struct NewStudy {
     /// Device. The built-in one by default.
     #[serde(default)]
     pub device_id: Option<DeviceId>,
-    /// Reference gait for Gait RMSE. By default the one nearest to the subject in height and body mass, or the built-in
-    /// one if no reference gait states height and mass.
+    /// Reference gait for Gait RMSE. By default `falisse-2019`, whichever others are imported.
     #[serde(default)]
     pub reference_gait_id: Option<ReferenceGaitId>,
     /// Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
@@ -197,6 +196,30 @@ pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> R
     Ok(study)
 }
 
+/// A name that no study in reach has: this one, or with a number after it.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn free_name(db: &mut Connection, reach: Reach, name: &str) -> Result<String, Error> {
+    let mut free = name.to_owned();
+    let mut number = 2_u32;
+    while studies::is_named(db, reach, &free, None).await? {
+        let mark = format!(" ({number})");
+        let kept: String = name.chars().take(LONGEST_NAME - mark.len()).collect();
+        free = format!("{}{mark}", kept.trim_end());
+        number += 1;
+    }
+    Ok(free)
+}
+
+/// The refusal of a name that another study in reach has.
+pub fn name_is_taken(name: &str, free: &str) -> Error {
+    let message = format!(
+        "Another study is named \u{201c}{name}\u{201d}. Choose another name, for example \u{201c}{free}\u{201d}."
+    );
+    FieldError::in_words("name", &message).into()
+}
+
 /// The same, for a fork of a study.
 pub(super) async fn create_from(
     writer: &mut Writer,
@@ -266,10 +289,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     };
     let reference_gait_id = match new.reference_gait_id {
         Some(id) => reference_gaits::get(db, id).await?.id,
-        None => match nearest_reference::nearest(db, &body).await? {
-            Some(nearest) => nearest.id,
-            None => built_in_entries::reference_gait(db).await?.id,
-        },
+        None => built_in_entries::reference_gait(db).await?.id,
     };
     let variant = if new.muscles { "with muscles" } else { "without muscles" };
     let name = match new.name.as_deref().map(str::trim) {

@@ -41,6 +41,14 @@ pub(super) fn check(pseudonym: &str, height_m: f64, body_mass_kg: f64, notes: &s
     Ok(body)
 }
 
+/// Checks the data of a new subject, without the record.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub fn check_new(new: &NewSubject) -> Result<(), Error> {
+    check(new.pseudonym.trim(), new.height_m, new.body_mass_kg, &new.notes).map(drop)
+}
+
 /// Adds a subject.
 ///
 /// # Errors

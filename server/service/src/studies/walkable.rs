@@ -122,7 +122,7 @@ pub enum NotWalkable {
     /// The gait has no certificate yet.
     #[error(
         "The gait of trial {number} has no certificate yet. If it is not being certified, press Certify on its \
-         page, or send POST /api/v1/trials/{id}/certificate."
+         page or request its certificate."
     )]
     NotCertified {
         /// The trial.

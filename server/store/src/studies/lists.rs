@@ -42,6 +42,70 @@ pub async fn page(db: &mut Connection, reach: Reach, chosen: Chosen) -> StoreRes
     query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 
+/// Which studies a list shows.
+#[derive(Debug, Clone, Default)]
+pub struct Listed {
+    /// Whose name, tags, notes or pseudonym contain this text, whatever its case. Empty for all.
+    pub text: String,
+    /// With this tag. Empty for all.
+    pub tag: String,
+    /// In this state.
+    pub state: Option<StudyState>,
+    /// Archived ones instead of the others.
+    pub archived: bool,
+    /// Older than this one.
+    pub before: Option<StudyId>,
+    /// At most so many.
+    pub limit: u32,
+}
+
+/// Studies that a caller reaches, filtered as people ask for them, newest first.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn listed(db: &mut Connection, reach: Reach, listed: &Listed) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select s.* from studies s join subjects p on p.id = s.subject_id where ",
+        reached!("s.id"),
+        " and (?4 is null or s.id < ?4) and (?5 is null or s.state = ?5) and (s.archived_at is not null) = ?6 \
+         and (?7 = '' or instr(lower(s.name || char(10) || p.pseudonym || char(10) || coalesce(s.tags, '') || char(10) || coalesce(s.notes, '')), lower(?7))) \
+         and (?8 = '' or exists (select 1 from json_each(s.tags) where value = ?8)) \
+         order by s.id desc limit ?9"
+    );
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(listed.before);
+    let query = query.bind(listed.state.map(StudyState::as_str)).bind(listed.archived);
+    let query = query.bind(&listed.text).bind(&listed.tag).bind(listed.limit);
+    query.fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// The tags of the studies that a caller reaches, in alphabetical order.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn tags(db: &mut Connection, reach: Reach) -> StoreResult<Vec<String>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select distinct t.value from studies s, json_each(s.tags) t where ",
+        reached!("s.id"),
+        " order by t.value"
+    );
+    Ok(sqlx::query_scalar(sql).bind(every).bind(open).bind(principal).fetch_all(db).await?)
+}
+
+/// Whether another study that the caller reaches has this name. Studies out of reach do not count, because the answer
+/// would reveal their names.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn is_named(db: &mut Connection, reach: Reach, name: &str, except: Option<StudyId>) -> StoreResult<bool> {
+    let (every, open, principal) = binds(reach);
+    let sql =
+        concat!("select 1 from studies where ", reached!("id"), " and name = ?4 and (?5 is null or id <> ?5) limit 1");
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(name).bind(except);
+    Ok(query.fetch_optional(db).await?.is_some())
+}
+
 /// The accessible studies with comparisons for raters, oldest first.
 ///
 /// # Errors
@@ -74,7 +138,7 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
 pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!(
-        "select * from studies where state in ('waiting', 'paused', 'draft') and ",
+        "select * from studies where state in ('waiting', 'paused', 'draft') and archived_at is null and ",
         reached!("id"),
         " order by id desc limit ?4"
     );

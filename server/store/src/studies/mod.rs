@@ -5,8 +5,8 @@ mod plan;
 mod state;
 
 pub use lists::{
-    Chosen, active, asking_raters, ended_before, of_subject, of_subject_with_safety_reports, open_of, page,
-    waiting_for_people, with_safety_reports,
+    Chosen, Listed, active, asking_raters, ended_before, is_named, listed, of_subject, of_subject_with_safety_reports,
+    open_of, page, tags, waiting_for_people, with_safety_reports,
 };
 pub use plan::{Evaluation, FeedbackMode, StudyPlan};
 pub use state::StudyState;
@@ -35,6 +35,12 @@ pub struct Study {
     pub state_reason: String,
     /// Revision, which increases with each change.
     pub revision: i64,
+    /// Tags, by which people find the study.
+    pub tags: Vec<String>,
+    /// Notes of people.
+    pub notes: String,
+    /// Time at which it was archived. Lists do not show archived studies unless asked.
+    pub archived_at: Option<Instant>,
     /// Time of creation.
     pub created_at: Instant,
     /// Time of the last change.
@@ -140,6 +146,9 @@ pub async fn insert(
         state,
         state_reason: String::new(),
         revision: 1,
+        tags: Vec::new(),
+        notes: String::new(),
+        archived_at: None,
         created_at: at,
         updated_at: at,
     })
@@ -184,6 +193,28 @@ pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &StudyLimits) 
     .bind(id)
     .execute(db)
     .await?;
+    Ok(())
+}
+
+/// Sets tags and notes of a study, and whether it is archived. The caller writes an audit row, and [`set_limits`] counts
+/// the revision.
+///
+/// # Errors
+/// A violated constraint; errors of the database.
+pub async fn set_filing(
+    db: &mut Connection,
+    id: StudyId,
+    tags: &[String],
+    notes: &str,
+    archived_at: Option<Instant>,
+) -> StoreResult<()> {
+    sqlx::query("update studies set tags = ?, notes = ?, archived_at = ? where id = ?")
+        .bind(if tags.is_empty() { None } else { Some(json_columns::to_text("tags", tags)?) })
+        .bind(Some(notes).filter(|notes| !notes.is_empty()))
+        .bind(archived_at)
+        .bind(id)
+        .execute(db)
+        .await?;
     Ok(())
 }
 
@@ -240,6 +271,9 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
         state: row.try_get::<&str, _>("state")?.parse()?,
         state_reason: row.try_get("state_reason")?,
         revision: row.try_get("revision")?,
+        tags: json_columns::optional_column(row, "tags")?.unwrap_or_default(),
+        notes: row.try_get::<Option<String>, _>("notes")?.unwrap_or_default(),
+        archived_at: row.try_get("archived_at")?,
         created_at: row.try_get("created_at")?,
         updated_at: row.try_get("updated_at")?,
     })

@@ -219,7 +219,7 @@ class AccessMethods(Transport):
     def disable_user(self, user_id: UserId, *, idempotency_key: Optional[str] = None) -> User:
         """Disable a user.
 
-        Ends the sessions, links and tokens of the user.
+        Ends the user's sessions, and revokes the user's links and tokens.
         """
         return cast(User, self.request_json("POST", "/api/v1/users/{id}/disable", {"id": user_id}, key=idempotency_key))
 

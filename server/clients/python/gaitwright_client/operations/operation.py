@@ -51,7 +51,7 @@ class OperationMethods(Transport):
 
         Every change by a user or a program, newest first.
 
-        contains: Text to find in the actor, action or object.
+        contains: Text to find in the actor, the kind of change or the object.
         """
         return Pages(self, "/api/v1/audit", query={"contains": contains, "limit": page_size})
 

@@ -161,9 +161,9 @@ class PreferencesMethods(Transport):
     def list_safety_reports(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[SafetyReport]:
         """List safety reports of a study.
 
-        Includes safety reports from raters, assessments and lab sessions, and reports about a single gait, even if the
-        gait was cleared for walking. Omits retracted reports. A report from a blinded lab session is listed for both of
-        its gaits.
+        Includes safety reports from raters, assessments and lab sessions, and reports about a single gait. A report
+        stays in the list after its gait is cleared for walking; a retracted report does not. A report from a blinded
+        lab session is listed for both of its gaits.
         """
         return Pages(self, "/api/v1/studies/{id}/safety-reports", {"id": study_id}, query={"limit": page_size})
 

@@ -81,7 +81,7 @@ class StudiesMethods(Transport):
 
         Changes the name, priority or number of parallel trials.
 
-        Fields: optionally name, parallel_trials, priority.
+        Fields: optionally archived, name, notes, parallel_trials, priority, tags.
         """
         return cast(
             StudyView,
@@ -105,9 +105,9 @@ class StudiesMethods(Transport):
     def follow_study_events(self, study_id: StudyId, *, after: Optional[int] = None) -> Iterator[Event]:
         """Follow the events of a study.
 
-        Sends `study_state` with the current state, then recorded events with an id, which are replayed after `Last-
-        Event-ID`, and `progress` of running solves. The stream stays open after the end of the study, because the study
-        can be extended.
+        Sends `study_state` with the current state first, then the recorded events, each with an id, and `progress`
+        events of running solves. A client that sends `Last-Event-ID` receives the recorded events that followed it. The
+        stream stays open after the end of the study, because the study can be extended.
 
         after: Start after this event.
         """
@@ -123,7 +123,7 @@ class StudiesMethods(Transport):
     ) -> StudyView:
         """Raise the trial budget of a study.
 
-        A study that has ended resumes.
+        If the study has ended, it resumes.
 
         Fields: trial_budget.
         """
@@ -166,14 +166,14 @@ class StudiesMethods(Transport):
     def get_study_history(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Milestone]:
         """Get the history of the recommendation.
 
-        The best trial after each iteration.
+        The best trial after each iteration of the study, that is, after each result.
         """
         return Pages(self, "/api/v1/studies/{id}/history", {"id": study_id}, query={"limit": page_size})
 
     def get_study_history_csv(self, study_id: StudyId) -> str:
         """Download the history as CSV.
 
-        The best trial after each iteration.
+        The best trial after each iteration of the study, that is, after each result.
         """
         return self.request_text("GET", "/api/v1/studies/{id}/history.csv", {"id": study_id})
 

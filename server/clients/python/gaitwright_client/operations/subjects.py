@@ -110,7 +110,7 @@ class SubjectsMethods(Transport):
     def get_subject_muscles(self, subject_id: SubjectId) -> MuscleParameters:
         """Get measured muscle values of a subject.
 
-        Values that override the published table.
+        Values that override the default muscle values.
         """
         return cast(MuscleParameters, self.request_json("GET", "/api/v1/subjects/{id}/muscles", {"id": subject_id}))
 

@@ -51,7 +51,7 @@ class TrialsMethods(Transport):
     ) -> Pages[Trial]:
         """List trials of a study.
 
-        By number, unless `sort` names another column.
+        In order of number, unless `sort` names another column.
 
         state: Trials in this state.
 
@@ -120,7 +120,7 @@ class TrialsMethods(Transport):
     def get_controller_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> ControllerFile:
         """Download the controller file of a trial.
 
-        The gait must be walkable: converged, with a certificate, and without an open safety report.
+        The gait must be walkable: converged, with a certificate, and without a safety report in force.
 
         rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
         """
@@ -137,7 +137,7 @@ class TrialsMethods(Transport):
     def get_execution_report(self, trial_id: TrialId) -> TrialExecutionReport:
         """Get the execution report of a trial.
 
-        The newest report: how simulated walks with the gait end outside the optimiser's model.
+        The newest report of walks that were simulated with the gait outside the optimiser's model.
         """
         return cast(
             TrialExecutionReport,
@@ -157,8 +157,8 @@ class TrialsMethods(Transport):
     ) -> Job:
         """Request the execution report of a trial.
 
-        The gait of the trial must have converged. Walks on level ground, on ground of ±5 mm and of ±10 mm are
-        simulated. The same number of walks and seed give the same report.
+        The gait of the trial must have converged. Walks on level ground, and on ground uneven by ±5 mm and by ±10 mm,
+        are simulated. The same number of walks and seed give the same report.
 
         Fields: optionally seed, walks.
         """
@@ -252,6 +252,7 @@ class TrialsMethods(Transport):
     def get_sensitivities(self, trial_id: TrialId) -> TrialSensitivities:
         """Get the sensitivities of a trial.
 
-        What changes, to first order, if a tuned bound moves. They are computed on request from the stored solution.
+        How the figures of a gait change, to first order, with each tuned bound. Computed on request from the stored
+        solution.
         """
         return cast(TrialSensitivities, self.request_json("GET", "/api/v1/trials/{id}/sensitivities", {"id": trial_id}))

@@ -396,7 +396,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let best = live.best.as_ref().map(|best| (best.id, best.number, best.has_gait));
     live.walker = Walker::read(app, &live.study, best, &shown).await?;
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
-        live.queued = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
+        live.queued = waits_for_a_worker(jobs::depth_of_others(&mut *app.read().await?, id).await?);
     }
     Ok(live)
 }
@@ -520,11 +520,11 @@ fn view(
     }
 }
 
-/// Why the next solve of the study has not started, from the numbers of queued and running solves of all studies.
+/// Why the next solve of the study has not started, from the numbers of queued and running solves of other studies.
 fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
     let solves = |count: u32| if count == 1 { "1 solve".to_owned() } else { format!("{count} solves") };
-    match (running, queued.saturating_sub(1)) {
-        (0, _) => "The next solve is queued. No worker is running.".to_owned(),
+    match (running, queued) {
+        (0, _) => "The next solve is queued.".to_owned(),
         (_, 0) => format!("The next solve is queued. Running: {} of other studies.", solves(running)),
         (_, others) => {
             format!("The next solve is queued. Running: {} of other studies; queued: {} more.", solves(running), others)

@@ -76,7 +76,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
         let mut normal: Vec<CycleActivity> = Vec::new();
         for (walk, measurement_file_id, reading, file) in &files {
             let (recording, strikes) = reading.read(WHAT, &file.text(pool)?)?;
-            let measured = recording.cycles(&strikes, &settings)?;
+            let measured = recording.cycles_of(&reading.kept_strides(&strikes)?, &settings)?;
             let activity = if walks.is_empty() {
                 normal = measured;
                 Activity::of_normal_walking(&normal)?

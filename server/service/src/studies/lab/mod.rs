@@ -6,6 +6,7 @@
 //! numbers, and the answer reaches the learner at unblinding.
 
 mod answer;
+mod emg_preview;
 mod measurement_results;
 mod question;
 mod session;
@@ -13,6 +14,7 @@ mod unblinding;
 mod upload;
 
 pub use answer::{NewAnswer, give as answer, retract};
+pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
     with_model,

@@ -1,10 +1,11 @@
 //! Measurement files of lab walks (EMG recordings and joint angles): parses, checks and stores uploads.
 
 use super::session::{checked_walk, still_open};
-use crate::error::Error;
+use crate::error::{Error, FieldError};
+use crate::printable;
 use crate::studies::reference_import::Unit;
 use gait_optimizer::ModelError;
-use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
+use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope, strides_between};
 use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::audit::{self, Actor};
@@ -50,6 +51,11 @@ pub struct EmgReading {
     pub heel_strike_column: Option<String>,
     /// Value of that column above which the foot is on the ground.
     pub heel_strike_threshold: f64,
+    /// Numbers of strides to leave out, from 1, in the order of the heel strikes.
+    pub rejected_strides: Vec<u32>,
+    /// Name of the file, for people.
+    #[schema(max_length = 200)]
+    pub file_name: Option<String>,
 }
 
 impl Default for EmgReading {
@@ -61,6 +67,8 @@ impl Default for EmgReading {
             heel_strikes_s: Vec::new(),
             heel_strike_column: None,
             heel_strike_threshold: 0.5,
+            rejected_strides: Vec::new(),
+            file_name: None,
         }
     }
 }
@@ -78,7 +86,17 @@ impl EmgReading {
                 &format!("one of {}", CHANNELS.join(", ")),
             ));
         }
-        let whole = match (self.format, self.rate_hz) {
+        let whole = self.whole(what, text)?;
+        let same = CHANNELS.map(|name| (name, name));
+        let named = self.channels.iter().map(|(channel, column)| (channel.as_str(), column.as_str()));
+        let recording = if self.channels.is_empty() { whole.select(what, same)? } else { whole.select(what, named)? };
+        let strikes = self.strikes(what, &whole)?;
+        Ok((recording, strikes))
+    }
+
+    /// Every column of the file.
+    pub(super) fn whole(&self, what: &str, text: &str) -> Result<EmgRecording, Error> {
+        Ok(match (self.format, self.rate_hz) {
             (MeasurementFormat::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
             (MeasurementFormat::Opensim, None) => EmgRecording::from_opensim(what, text)?,
             (MeasurementFormat::Opensim, Some(rate_hz)) => {
@@ -88,11 +106,12 @@ impl EmgReading {
                     "omitted, because an OpenSim file has its own time axis",
                 ));
             }
-        };
-        let same = CHANNELS.map(|name| (name, name));
-        let named = self.channels.iter().map(|(channel, column)| (channel.as_str(), column.as_str()));
-        let recording = if self.channels.is_empty() { whole.select(what, same)? } else { whole.select(what, named)? };
-        let strikes = match (&self.heel_strike_column, &self.heel_strikes_s[..]) {
+        })
+    }
+
+    /// The right heel strikes, s.
+    pub(super) fn strikes(&self, what: &str, whole: &EmgRecording) -> Result<Vec<f64>, Error> {
+        Ok(match (&self.heel_strike_column, &self.heel_strikes_s[..]) {
             (Some(column), []) => whole.strikes_of_column(what, column, self.heel_strike_threshold)?,
             (None, given @ [_, _, ..]) => {
                 whole.check_strikes(what, given)?;
@@ -102,17 +121,44 @@ impl EmgReading {
                 let allowed = "at least two heel-strike times, or none if a heel strike column is given";
                 return Err(Error::invalid("reading.heel_strikes_s", json!(given), allowed));
             }
-        };
-        Ok((recording, strikes))
+        })
+    }
+
+    /// The strides, s, without the rejected ones.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a number that no stride has, or if every stride is rejected.
+    pub fn kept_strides(&self, heel_strikes_s: &[f64]) -> Result<Vec<(f64, f64)>, Error> {
+        let strides = strides_between(heel_strikes_s);
+        let numbered = |number: u32| usize::try_from(number).is_ok_and(|number| (1..=strides.len()).contains(&number));
+        if let Some(unknown) = self.rejected_strides.iter().find(|number| !numbered(**number)) {
+            return Err(Error::invalid("reading.rejected_strides", *unknown, &format!("1 to {}", strides.len())));
+        }
+        let kept: Vec<(f64, f64)> = strides
+            .into_iter()
+            .zip(1_u32..)
+            .filter(|(_, number)| !self.rejected_strides.contains(number))
+            .map(|(stride, _)| stride)
+            .collect();
+        if kept.is_empty() {
+            return Err(FieldError::in_words(
+                "reading.rejected_strides",
+                "Every stride is rejected. Keep at least one.",
+            )
+            .into());
+        }
+        Ok(kept)
     }
 
     /// Checks that a file has EMG signals and can be cut into strides, for any filter settings.
-    fn check(&self, text: &str) -> Result<(), Error> {
+    pub(super) fn check(&self, text: &str) -> Result<(), Error> {
+        check_file_name(self.file_name.as_deref())?;
         let (recording, strikes) = self.read(WHAT, text)?;
+        let strides = self.kept_strides(&strikes)?;
         recording.check_channels()?;
         for (channel, values) in recording.channels {
             let raw = Envelope { channel, start_s: recording.start_s, rate_hz: recording.rate_hz, values };
-            CycleActivity::cut(&raw, &strikes)?;
+            CycleActivity::of_strides(&raw, &strides)?;
         }
         Ok(())
     }
@@ -145,11 +191,14 @@ pub struct MotionReading {
     pub unit: Option<Unit>,
     /// Cut-off frequency of the low-pass filter before differentiation, Hz.
     pub cutoff_hz: f64,
+    /// Name of the file, for people.
+    #[schema(max_length = 200)]
+    pub file_name: Option<String>,
 }
 
 impl Default for MotionReading {
     fn default() -> Self {
-        Self { format: MeasurementFormat::default(), unit: None, cutoff_hz: 6.0 }
+        Self { format: MeasurementFormat::default(), unit: None, cutoff_hz: 6.0, file_name: None }
     }
 }
 
@@ -176,6 +225,7 @@ impl MotionReading {
 
     /// Checks that a file gives a limit cycle and phase portraits with these settings.
     fn check(&self, text: &str) -> Result<(), Error> {
+        check_file_name(self.file_name.as_deref())?;
         self.joints(text)?.check_walking(WHAT)?;
         self.portraits(text).map(|_| ())
     }
@@ -193,6 +243,13 @@ pub struct NewMotion {
     /// How to read the file.
     #[serde(default)]
     pub reading: MotionReading,
+}
+
+/// Longest name of a file, characters.
+const LONGEST_FILE_NAME: usize = 200;
+
+fn check_file_name(name: Option<&str>) -> Result<(), Error> {
+    name.map_or(Ok(()), |name| printable::name("reading.file_name", name, LONGEST_FILE_NAME).map(|_| ()))
 }
 
 /// A checked measurement file, ready to be stored.

@@ -9,7 +9,7 @@ use crate::access::Reach;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::lab::EmgResult;
-use crate::studies::{device, lab, reference_import, solve_input, study_plan, subject};
+use crate::studies::{device, lab, reference_import, solve_input, study_change, study_plan, subject};
 use gait_optimizer::ReferenceGait;
 use gaitwright_compute::Pool;
 use gaitwright_store::archive::Definition;
@@ -107,6 +107,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     let [study] = &found[..] else { return Err(refuse(format!("it has {} studies instead of one", found.len()))) };
     let study = study.clone();
     at(format!("study {}", study.id), study_plan::check_plan(&study.plan))?;
+    at(format!("study {}", study.id), study_change::check_filing(&study))?;
 
     let subject = at("subject", subjects::get(db, study.plan.subject_id).await)?;
     if at("subjects", subjects::all(db).await)?.len() != 1 {

@@ -1,0 +1,330 @@
+//! The fields of the form for a new study: their defaults, those of a clone, and their labels.
+
+use crate::form_errors;
+use gait_learner::{LearnerSettings, Method};
+use gait_optimizer::{BasinChoice, TunedBounds};
+use gaitwright_service::error::{Error, FieldError};
+use gaitwright_store::StudyId;
+use gaitwright_store::studies::{Study, StudyPlan};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// The fields as typed, to show a refused form again.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct Fields {
+    /// The study whose set-up applies to everything that the form does not show.
+    #[serde(default)]
+    pub(super) like: String,
+    #[serde(default)]
+    pub(super) name: String,
+    pub(super) subject: String,
+    /// Present when ticked.
+    #[serde(default)]
+    pub(super) restricted: Option<String>,
+    #[serde(default)]
+    pub(super) pseudonym: String,
+    #[serde(default)]
+    pub(super) height_m: String,
+    #[serde(default)]
+    pub(super) body_mass_kg: String,
+    #[serde(default)]
+    pub(super) device: String,
+    #[serde(default)]
+    pub(super) reference_gait: String,
+    pub(super) muscles: String,
+    pub(super) feedback_mode: String,
+    #[serde(default = "linecospar")]
+    pub(super) learner: String,
+    pub(super) trial_budget: String,
+    #[serde(default)]
+    pub(super) unchanged_limit: String,
+    pub(super) parallel_trials: String,
+    pub(super) seed: String,
+    /// Present when ticked.
+    #[serde(default)]
+    pub(super) repeat_results: Option<String>,
+    #[serde(default)]
+    pub(super) basin_within_percent: String,
+    /// Whether bounds were relaxed in a clone, so that the table of bounds has to be shown.
+    #[serde(skip)]
+    pub(super) relaxed: bool,
+    /// The entries of the search space, which the editor reads.
+    #[serde(flatten)]
+    pub(super) space: BTreeMap<String, String>,
+}
+
+fn linecospar() -> String {
+    LEARNERS[0].0.to_owned()
+}
+
+impl Default for Fields {
+    fn default() -> Self {
+        let text = str::to_owned;
+        Self {
+            like: String::new(),
+            name: String::new(),
+            subject: String::new(),
+            restricted: None,
+            pseudonym: String::new(),
+            height_m: String::new(),
+            body_mass_kg: String::new(),
+            device: String::new(),
+            reference_gait: String::new(),
+            muscles: text("on"),
+            feedback_mode: text("automatic"),
+            learner: linecospar(),
+            trial_budget: text("15"),
+            unchanged_limit: String::new(),
+            parallel_trials: text("1"),
+            seed: text("1"),
+            repeat_results: None,
+            basin_within_percent: String::new(),
+            relaxed: false,
+            space: BTreeMap::new(),
+        }
+    }
+}
+
+/// The option of the learner that keeps the settings of the cloned study, which the form cannot show.
+pub(super) const KEPT: &str = "kept";
+
+impl Fields {
+    /// The set-up of a study, for a clone that can be changed. A restricted study has restricted clones by default.
+    pub(super) fn of_clone(study: &Study, restricted: bool) -> Self {
+        let plan = &study.plan;
+        let ticked = |yes: bool| yes.then(|| "on".to_owned());
+        let known = LEARNERS.iter().find(|(name, ..)| learner(name).is_some_and(|known| known == plan.learner));
+        Self {
+            like: study.id.to_string(),
+            name: String::new(),
+            subject: plan.subject_id.to_string(),
+            restricted: ticked(restricted),
+            device: plan.device_id.to_string(),
+            reference_gait: plan.reference_gait_id.to_string(),
+            muscles: if plan.muscles { "on" } else { "off" }.to_owned(),
+            feedback_mode: plan.feedback_mode.as_str().to_owned(),
+            learner: known.map_or(KEPT, |(name, ..)| name).to_owned(),
+            trial_budget: plan.trial_budget.to_string(),
+            unchanged_limit: plan.unchanged_limit.map_or_else(String::new, |limit| limit.to_string()),
+            parallel_trials: plan.parallel_trials.to_string(),
+            seed: plan.seed.to_string(),
+            repeat_results: ticked(plan.repeat_results),
+            basin_within_percent: match plan.solve_options.basin_choice {
+                BasinChoice::NearestToReference { within_percent } => within_percent.to_string(),
+                BasinChoice::LowestObjective => String::new(),
+            },
+            space: space_of(plan),
+            ..Self::default()
+        }
+    }
+
+    /// Relaxes bounds, written as `a5=0.03,a7=20`: a tuned bound keeps those of its values that are as loose.
+    pub(super) fn relax(&mut self, relaxed: &str) -> Result<(), Error> {
+        let all = TunedBounds::parse(relaxed)?.to_array();
+        let named = |name: &str| relaxed.split(',').any(|item| item.split('=').next().map(str::trim) == Some(name));
+        for (place, name) in TunedBounds::NAMES.into_iter().enumerate().filter(|(_, name)| named(name)) {
+            let to = all[place];
+            let as_loose = |value: &f64| if TunedBounds::IS_LOWER[place] { *value < to } else { *value > to };
+            let values = self.space.get(&format!("values_{name}")).map_or("", String::as_str);
+            let mut kept: Vec<f64> = values.split(", ").filter_map(|v| v.parse().ok()).filter(as_loose).collect();
+            kept.push(to);
+            kept.sort_by(f64::total_cmp);
+            self.space.insert(format!("fixed_{name}"), to.to_string());
+            if kept.len() < 2 {
+                self.space.remove(&format!("tuned_{name}"));
+            } else {
+                self.space.insert(format!("values_{name}"), list(&kept));
+            }
+        }
+        self.relaxed = true;
+        Ok(())
+    }
+
+    /// The study whose set-up applies, if any.
+    pub(super) fn cloned(&self) -> Result<Option<StudyId>, Error> {
+        let unknown = || Error::NotFound { what: "study".to_owned(), id: self.like.clone() };
+        if self.like.is_empty() { Ok(None) } else { self.like.parse().map(Some).map_err(|_| unknown()) }
+    }
+
+    /// Puts an acceptable value in place of a refused one, to find the other fields that would be refused. Returns
+    /// whether there is one.
+    pub(super) fn repair(&mut self, field: &str) -> bool {
+        let default = Self::default();
+        let is_new = self.subject == NEW_SUBJECT;
+        let text = |new: &str| if is_new { new.to_owned() } else { String::new() };
+        match field {
+            "name" => self.name.clear(),
+            // A pseudonym that no subject can have.
+            "pseudonym" => self.pseudonym = text(&unused_pseudonym()),
+            "height_m" => self.height_m = text("1.75"),
+            "body_mass_kg" => self.body_mass_kg = text("70"),
+            "muscles" => self.muscles = default.muscles,
+            "feedback_mode" => self.feedback_mode = default.feedback_mode,
+            "learner" => self.learner = default.learner,
+            "trial_budget" => self.trial_budget = default.trial_budget,
+            "unchanged_limit" => self.unchanged_limit.clear(),
+            "parallel_trials" => self.parallel_trials = default.parallel_trials,
+            "seed" => self.seed = default.seed,
+            "basin_within_percent" => self.basin_within_percent.clear(),
+            _ => {
+                let bound = field.rsplit('_').next().unwrap_or_default();
+                if !TunedBounds::NAMES.contains(&bound) {
+                    return false;
+                }
+                for part in ["values", "lengthscale", "fixed"] {
+                    if field == bound || field == format!("tuned_{bound}") || field == format!("{part}_{bound}") {
+                        self.space.remove(&format!("{part}_{bound}"));
+                    }
+                }
+                if field == format!("tuned_{bound}") {
+                    self.space.insert(field.to_owned(), "on".to_owned());
+                }
+            }
+        }
+        true
+    }
+}
+
+/// A pseudonym that nobody uses: the letters of a fresh identifier.
+fn unused_pseudonym() -> String {
+    let hex = StudyId::fresh().to_string();
+    let letter = |c: char| char::from_digit(c.to_digit(16)? + 10, 36);
+    hex.chars().filter_map(letter).collect()
+}
+
+fn list(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// The entries of the editor for the search space of a study.
+fn space_of(plan: &StudyPlan) -> BTreeMap<String, String> {
+    let fixed = plan.base_bounds.to_array();
+    let mut space = BTreeMap::new();
+    for (place, name) in TunedBounds::NAMES.into_iter().enumerate() {
+        space.insert(format!("fixed_{name}"), fixed[place].to_string());
+        if let Some(dimension) = plan.search_space.dimensions().iter().find(|dimension| dimension.name == name) {
+            space.insert(format!("tuned_{name}"), "on".to_owned());
+            space.insert(format!("values_{name}"), list(&dimension.values));
+            space.insert(format!("lengthscale_{name}"), dimension.lengthscale.to_string());
+        }
+    }
+    space
+}
+
+/// The learners to choose from: value, label, and when to choose it. The benchmarks of the learner support this advice.
+pub(super) const LEARNERS: [(&str, &str, &str); 3] = [
+    ("linecospar", "LineCoSpar", "the method of the paper; for answers by people, some of which may be wrong"),
+    ("eubo", "EUBO", "for answers by Gait RMSE; after 10 comparisons, closer to the best gait than LineCoSpar"),
+    (
+        "eubo_uncertain",
+        "EUBO for uncertain answers",
+        "for answers by people who are often unsure, with 50 answers or more",
+    ),
+];
+
+pub(super) fn learner(name: &str) -> Option<LearnerSettings> {
+    match name {
+        "linecospar" => Some(LearnerSettings::of(Method::LineCoSpar)),
+        "eubo" => Some(LearnerSettings::of(Method::Eubo)),
+        "eubo_uncertain" => Some(LearnerSettings::for_uncertain_answers()),
+        _ => None,
+    }
+}
+
+/// The option of the subject field that stands for a new subject.
+pub(super) const NEW_SUBJECT: &str = "new";
+
+/// The fields that describe a new subject.
+pub(super) const DESCRIPTION: [&str; 3] = ["pseudonym", "height_m", "body_mass_kg"];
+
+/// The place of a field in the form.
+pub(super) fn place_in_form(field: &str) -> usize {
+    const BEFORE_BOUNDS: [&str; 7] =
+        ["subject", "pseudonym", "height_m", "body_mass_kg", "device", "reference_gait", "muscles"];
+    const AFTER_BOUNDS: [&str; 7] =
+        ["feedback_mode", "trial_budget", "name", "learner", "unchanged_limit", "parallel_trials", "seed"];
+    let before = BEFORE_BOUNDS.iter().position(|known| *known == field);
+    let after = || AFTER_BOUNDS.iter().position(|known| *known == field).map(|place| place + BEFORE_BOUNDS.len() + 1);
+    before.or_else(after).unwrap_or(if field.len() < 4 || field.contains("_a") { 7 } else { usize::MAX })
+}
+
+/// The label of a field.
+fn label(field: &str) -> String {
+    let named = match field {
+        "name" => "Name",
+        "subject" => "Subject",
+        "pseudonym" => "Pseudonym",
+        "height_m" => "Height, m",
+        "body_mass_kg" => "Body mass, kg",
+        "device" | "device_id" => "Device",
+        "reference_gait" | "reference_gait_id" => "Reference gait",
+        "muscles" => "Variant",
+        "feedback_mode" => "Comparisons are answered by",
+        "trial_budget" => "Trials",
+        "learner" => "Learner",
+        "unchanged_limit" => "Stop early after",
+        "parallel_trials" => "Parallel trials",
+        "seed" => "Seed",
+        "basin_within_percent" => "Objective tolerance, %",
+        other => other,
+    };
+    match field.split_once('_') {
+        Some(("tuned", bound)) => format!("{bound} is tuned"),
+        Some(("values", bound)) => format!("Values of {bound}"),
+        Some(("lengthscale", bound)) => format!("Lengthscale of {bound}"),
+        Some(("fixed", bound)) => format!("Fixed value of {bound}"),
+        _ => named.to_owned(),
+    }
+}
+
+/// Converts an error about a field into a refusal; other errors pass.
+pub(super) fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
+    match error {
+        Error::Invalid(refused) => {
+            // A bound has one row in the table, whatever part of the study refuses it.
+            let last = refused.field.rsplit('.').next().filter(|last| TunedBounds::NAMES.contains(last));
+            let field = last.unwrap_or(&refused.field).to_owned();
+            let message = form_errors::of_field(&label(&field), &refused);
+            Ok(FieldError { field, message, ..*refused })
+        }
+        Error::Conflict(message) => {
+            let field = if fields.subject == NEW_SUBJECT { "pseudonym" } else { "subject" };
+            Ok(FieldError::in_words(field, &message))
+        }
+        other => Err(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn relaxed_bound_keeps_its_looser_values() {
+        let text = |text: &str| text.to_owned();
+        let entries = [
+            ("tuned_a5", "on"),
+            ("values_a5", "0, 0.02, 0.04"),
+            ("tuned_a7", "on"),
+            ("values_a7", "10, 20, 30"),
+            ("fixed_a6", "0.1"),
+        ];
+        let space = entries.iter().map(|(name, value)| (text(name), text(value))).collect();
+        let mut fields = Fields { space, ..Fields::default() };
+        fields.relax("a5=0.03,a7=30,a6=0.2").unwrap();
+        assert_eq!(fields.space["values_a5"], "0, 0.02, 0.03", "a lower bound is looser where it is smaller");
+        assert!(!fields.space.contains_key("tuned_a7"), "one value is not tuned");
+        assert_eq!((fields.space["fixed_a7"].as_str(), fields.space["fixed_a6"].as_str()), ("30", "0.2"));
+        assert!(fields.relax("a9=1").is_err() && fields.relax("a7=500").is_err());
+    }
+
+    #[test]
+    fn every_field_of_the_form_can_be_repaired() {
+        let mut fields = Fields { subject: NEW_SUBJECT.to_owned(), ..Fields::default() };
+        for field in ["name", "pseudonym", "height_m", "seed", "values_a5", "tuned_a1", "a3"] {
+            assert!(fields.repair(field), "{field}");
+        }
+        assert!(!fields.repair("subject") && !fields.repair("device"), "a list offers nothing else");
+        assert!(fields.pseudonym.chars().all(char::is_alphabetic) && fields.pseudonym.len() <= 40);
+    }
+}

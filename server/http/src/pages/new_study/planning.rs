@@ -1,0 +1,190 @@
+//! The study that the form describes: checked, planned and created.
+
+use super::fields::{DESCRIPTION, Fields, KEPT, LEARNERS, NEW_SUBJECT, as_refusal, learner, place_in_form};
+use super::space_editor::SpaceEditor;
+use crate::accessible::Named;
+use crate::body_measures;
+use gait_optimizer::{BasinChoice, SolveOptions};
+use gaitwright_service::access::{Caller, Reach};
+use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::studies::study_plan::{self, NewStudy};
+use gaitwright_service::studies::subject::{self, NewSubject};
+use gaitwright_store::studies::{self, FeedbackMode, Study, StudyPlan};
+use gaitwright_store::{Connection, SubjectId, Writer, consents};
+use std::str::FromStr;
+
+/// The study to clone, if the caller can access it and its subject has not withdrawn consent.
+pub(super) async fn cloned(db: &mut Connection, reach: Reach, fields: &Fields) -> Result<Option<Study>, Error> {
+    let Some(named) = fields.cloned()? else { return Ok(None) };
+    let id = Named::from(named).accessible(db, reach).await?;
+    consents::may_be_shown(db, id).await?;
+    Ok(Some(studies::get(db, id).await?))
+}
+
+/// Creates the study, and the subject if a new one is entered.
+pub(super) async fn make(
+    writer: &mut Writer,
+    caller: &Caller,
+    fields: &Fields,
+    editor: &SpaceEditor,
+) -> Result<Study, Error> {
+    let like = cloned(writer, caller.reach(), fields).await?;
+    let subject = match subject_of(fields)? {
+        Chosen::New(new) => subject::add(writer, &caller.actor, &new).await?.id,
+        Chosen::Known(id) => id,
+    };
+    let mut new = study_of(fields, editor, subject, like.as_ref())?;
+    let plan = study_plan::checked(writer, new.clone()).await?;
+    new.name = Some(name_of(writer, caller.reach(), fields, &plan).await?);
+    study_plan::create_by(writer, caller, new).await
+}
+
+/// The study that [`make`] would create.
+async fn planned(db: &mut Connection, reach: Reach, fields: &Fields, editor: &SpaceEditor) -> Result<StudyPlan, Error> {
+    let like = cloned(db, reach, fields).await?;
+    let plan = match subject_of(fields)? {
+        Chosen::New(new) => {
+            let study = study_of(fields, editor, SubjectId::fresh(), like.as_ref())?;
+            study_plan::checked_for_new(db, &new, study).await?
+        }
+        Chosen::Known(id) => {
+            consents::has_not_withdrawn(db, id).await?;
+            study_plan::checked(db, study_of(fields, editor, id, like.as_ref())?).await?
+        }
+    };
+    let name = name_of(db, reach, fields, &plan).await?;
+    Ok(StudyPlan { name, ..plan })
+}
+
+/// Every field that would be refused, and the plan with acceptable values in their place, if there is one.
+pub(super) async fn faults(
+    db: &mut Connection,
+    reach: Reach,
+    fields: &Fields,
+) -> Result<(Vec<FieldError>, Option<StudyPlan>), Error> {
+    let mut repaired = fields.clone();
+    let mut found: Vec<FieldError> = Vec::new();
+    let plan = loop {
+        let editor = SpaceEditor::typed(&repaired.space)?;
+        let fault = match planned(db, reach, &repaired, &editor).await {
+            Ok(plan) => break Some(plan),
+            Err(error) => as_refusal(error, &repaired)?,
+        };
+        if found.iter().any(|known| known.field == fault.field) {
+            break None;
+        }
+        let goes_on = repaired.repair(&fault.field);
+        found.push(fault);
+        if !goes_on {
+            break None;
+        }
+    };
+    found.sort_by_key(|fault| place_in_form(&fault.field));
+    Ok((found, plan))
+}
+
+/// The name of the study. A typed name must differ from those of the studies that the caller can see; the default name
+/// gets a number if it is taken.
+async fn name_of(db: &mut Connection, reach: Reach, fields: &Fields, plan: &StudyPlan) -> Result<String, Error> {
+    let free = study_plan::free_name(db, reach, &plan.name).await?;
+    if fields.name.trim().is_empty() || free == plan.name {
+        return Ok(free);
+    }
+    Err(study_plan::name_is_taken(&plan.name, &free))
+}
+
+/// The subject of the study.
+enum Chosen {
+    New(NewSubject),
+    Known(SubjectId),
+}
+
+fn subject_of(fields: &Fields) -> Result<Chosen, Error> {
+    if fields.subject != NEW_SUBJECT {
+        nothing_described(fields)?;
+        return Ok(Chosen::Known(number("subject", &fields.subject, "a subject from the list")?));
+    }
+    Ok(Chosen::New(NewSubject {
+        pseudonym: fields.pseudonym.clone(),
+        height_m: body_measures::height_m("height_m", &fields.height_m)?,
+        body_mass_kg: body_measures::mass_kg("body_mass_kg", &fields.body_mass_kg)?,
+        notes: String::new(),
+    }))
+}
+
+/// What the form does not show comes from the cloned study.
+fn study_of(
+    fields: &Fields,
+    editor: &SpaceEditor,
+    subject: SubjectId,
+    like: Option<&Study>,
+) -> Result<NewStudy, Error> {
+    let mut base = like.map_or_else(|| NewStudy::of(subject), |study| NewStudy::like(&study.plan));
+    if base.subject_id != subject {
+        // The muscle values of another person do not apply.
+        base.gait_settings.muscles = Box::<gait_optimizer::GaitSettings>::default().muscles;
+    }
+    let (search_space, base_bounds) = editor.read()?;
+    let learners = format!("one of {}", LEARNERS.map(|(name, ..)| name).join(", "));
+    Ok(NewStudy {
+        name: Some(fields.name.trim().to_owned()).filter(|name| !name.is_empty()),
+        device_id: optional("device", &fields.device, "a device from the list")?,
+        reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait from the list")?,
+        muscles: match fields.muscles.as_str() {
+            "on" => true,
+            "off" => false,
+            other => return Err(Error::invalid("muscles", other, "on or off")),
+        },
+        search_space: Some(search_space.into()),
+        base_bounds,
+        feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
+            .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human or mixed"))?,
+        solve_options: SolveOptions { basin_choice: basin_choice(fields)?, ..base.solve_options },
+        learner: match learner(&fields.learner) {
+            Some(chosen) => chosen,
+            None if like.is_some() && fields.learner == KEPT => base.learner,
+            None => return Err(Error::invalid("learner", fields.learner.as_str(), &learners)),
+        },
+        trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
+        unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or empty")?,
+        parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
+        seed: number("seed", &fields.seed, &format!("0 to {}", study_plan::LARGEST_SEED))?,
+        repeat_results: Some(fields.repeat_results.is_some()),
+        restricted: fields.restricted.is_some(),
+        subject_id: subject,
+        start: true,
+        ..base
+    })
+}
+
+/// `None` if only the lowest objective counts.
+fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
+    let field = "basin_within_percent";
+    let allowed = "0 to 100, or empty";
+    let Some(within_percent) = optional(field, &fields.basin_within_percent, allowed)? else {
+        return Ok(BasinChoice::LowestObjective);
+    };
+    let chosen = BasinChoice::NearestToReference { within_percent };
+    chosen.validate().map_err(|_| Error::invalid(field, fields.basin_within_percent.as_str(), allowed))?;
+    Ok(chosen)
+}
+
+/// Refuses a new subject that is entered but not chosen, instead of ignoring it.
+fn nothing_described(fields: &Fields) -> Result<(), Error> {
+    for (field, text) in DESCRIPTION.into_iter().zip([&fields.pseudonym, &fields.height_m, &fields.body_mass_kg]) {
+        if !text.trim().is_empty() {
+            let allowed = "empty, because a subject from the list is chosen. To add this subject, choose \u{201c}A new subject, entered below\u{201d}";
+            return Err(Error::invalid(field, text.as_str(), allowed));
+        }
+    }
+    Ok(())
+}
+
+fn number<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<T, Error> {
+    text.trim().parse().map_err(|_| Error::invalid(field, text, allowed))
+}
+
+/// The same for optional fields.
+fn optional<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<Option<T>, Error> {
+    if text.trim().is_empty() { Ok(None) } else { number(field, text, allowed).map(Some) }
+}

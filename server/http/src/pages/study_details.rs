@@ -1,0 +1,133 @@
+//! The page for the name, tags and notes of a study, which also archives and clones it.
+
+use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::extractors::Form;
+use crate::form_errors;
+use crate::page_error::{Page, PageError, page};
+use crate::problem_details::Problem;
+use crate::visible::Visible;
+use askama::Template;
+use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_service::access::{Caller, Permission, Read, Run};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::study_change::{self, Change};
+use gaitwright_service::studies::study_plan;
+use gaitwright_store::studies::{Study, StudyState};
+use gaitwright_store::{StudyId, Writer, commit, studies};
+use serde::Deserialize;
+
+/// Labels of the fields.
+const LABELS: &[(&str, &str)] = &[("name", "Name"), ("tags", "Tags"), ("notes", "Notes")];
+
+#[derive(Template)]
+#[template(path = "study_details.html")]
+struct DetailsPage {
+    study: Study,
+    fields: Fields,
+    may_run: bool,
+    refused: Option<String>,
+}
+
+impl DetailsPage {
+    /// Whether the study can be archived now.
+    fn may_be_archived(&self) -> bool {
+        self.study.archived_at.is_none() && (self.study.state.has_ended() || self.study.state == StudyState::Draft)
+    }
+}
+
+/// The fields as typed, to show a refused form again.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Fields {
+    act: String,
+    #[serde(default)]
+    name: String,
+    /// Separated by commas.
+    #[serde(default)]
+    tags: String,
+    #[serde(default)]
+    notes: String,
+}
+
+impl Fields {
+    fn of(study: &Study) -> Self {
+        Self {
+            act: String::new(),
+            name: study.plan.name.clone(),
+            tags: study.tags.join(", "),
+            notes: study.notes.clone(),
+        }
+    }
+
+    fn change(&self) -> Result<Change, Error> {
+        let tags = self.tags.split(',').map(str::trim).filter(|tag| !tag.is_empty()).map(str::to_owned);
+        Ok(match self.act.as_str() {
+            "save" => Change {
+                name: Some(self.name.clone()),
+                tags: Some(tags.collect()),
+                // A browser sends line ends as CR LF.
+                notes: Some(self.notes.replace("\r\n", "\n")),
+                ..Change::default()
+            },
+            "archive" => Change { archived: Some(true), ..Change::default() },
+            "restore" => Change { archived: Some(false), ..Change::default() },
+            other => return Err(Error::invalid("act", other, "save, archive or restore")),
+        })
+    }
+}
+
+/// `GET /studies/{id}/details`.
+pub(super) async fn get(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    Visible(id, _): Visible<StudyId, Read>,
+) -> Page {
+    show(&app, &authorized.caller, id, None, None).await
+}
+
+async fn show(app: &AppState, caller: &Caller, id: StudyId, typed: Option<Fields>, refused: Option<String>) -> Page {
+    let study = studies::get(&mut *app.read().await?, id).await?;
+    let fields = typed.unwrap_or_else(|| Fields::of(&study));
+    page(&DetailsPage { study, fields, may_run: caller.may(Run::NEEDED), refused })
+}
+
+/// `POST /studies/{id}/details`.
+pub(super) async fn post(
+    authorized: Authorized<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Run>,
+    Form(fields): Form<Fields>,
+) -> Result<Response, PageError> {
+    let mut writer = app.write().await?;
+    match change(&mut writer, &authorized.caller, id, &fields).await {
+        Ok(()) => {
+            commit(writer).await?;
+            app.scheduler.changed();
+            let to = if fields.act == "archive" { "/".to_owned() } else { format!("/studies/{id}") };
+            Ok(Redirect::to(&to).into_response())
+        }
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            drop(writer);
+            let status = Problem::from(&error).status();
+            let refused = Some(form_errors::of_form(&error, LABELS));
+            let typed = Some(fields).filter(|fields| fields.act == "save");
+            Ok((status, show(&app, &authorized.caller, id, typed, refused).await?).into_response())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+async fn change(writer: &mut Writer, caller: &Caller, id: StudyId, fields: &Fields) -> Result<(), Error> {
+    let change = fields.change()?;
+    if let Some(name) = change.name.as_deref().map(str::trim)
+        && studies::is_named(writer, caller.reach(), name, Some(id)).await?
+    {
+        let free = study_plan::free_name(writer, caller.reach(), name).await?;
+        return Err(study_plan::name_is_taken(name, &free));
+    }
+    study_change::change(writer, &caller.actor, id, &change).await?;
+    Ok(())
+}
