@@ -217,13 +217,21 @@ async fn subject_page_records_and_withdraws_consent() {
     assert_eq!(twice.status, StatusCode::CONFLICT);
     assert!(twice.text.contains("after this form was loaded") && twice.text.matches("version 3</td>").count() == 1);
 
-    assert_eq!(send("withdraw", "reason=+").await.status, StatusCode::UNPROCESSABLE_ENTITY);
-    assert_eq!(send("withdraw", "reason=moved+away").await.status, StatusCode::SEE_OTHER);
+    // Without the tick that confirms it, nothing changes.
+    let unconfirmed = send("withdraw", "reason=moved+away").await;
+    assert!(
+        unconfirmed.status == StatusCode::CONFLICT && unconfirmed.text.contains("moved away"),
+        "{}",
+        unconfirmed.text
+    );
+    assert_ne!(service.get(running).await.state, StudyState::Stopped);
+    assert_eq!(send("withdraw", "reason=+&confirmed=yes").await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert_eq!(send("withdraw", "reason=moved+away&confirmed=yes").await.status, StatusCode::SEE_OTHER);
     assert_eq!(service.get(running).await.state, StudyState::Stopped);
     let shown = service.fetch(&page).await.text;
     assert!(shown.contains("This subject withdrew") && shown.contains("moved away"), "{shown}");
     assert!(!shown.contains("/withdraw\""), "it cannot be done twice");
-    assert_eq!(send("withdraw", "reason=again").await.status, StatusCode::CONFLICT);
+    assert_eq!(send("withdraw", "reason=again&confirmed=yes").await.status, StatusCode::CONFLICT);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 10).await.unwrap();
     let acts: Vec<_> = trail.iter().map(|row| row.action.as_str()).take(2).collect();
     assert_eq!(acts, ["subject.withdraw", "subject.consent"]);

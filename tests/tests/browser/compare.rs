@@ -53,7 +53,8 @@ async fn browser_staff_answer_with_one_click_and_undo_within_five_seconds() {
 #[tokio::test(flavor = "multi_thread")]
 async fn browser_page_waits_with_the_next_comparison_until_undo_is_over() {
     let Some(browser) = Chromium::launch().await else { return };
-    let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
+    // Slow enough that the page is there before the next comparison is.
+    let site = Site::start(Analytic::slow(Duration::from_millis(800))).await;
     let study = waiting(&site, 5).await;
     let page = asked(&browser, &site, study).await;
     page.click("button[value=a]").await;

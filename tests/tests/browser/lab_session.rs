@@ -29,7 +29,7 @@ async fn browser_completes_a_lab_session_from_plan_to_unblinding() {
 
     // Planned from the page of the study. The allocation is concealed.
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
-    page.click("a[href$='/lab']").await;
+    page.click("main a[href$='/lab']").await;
     page.wait_for("#gait_one").await;
     is_for_everybody(axe, &page, "no session yet").await;
     page.fill("#notes", "treadmill, 1.1 m/s").await;
