@@ -56,6 +56,11 @@ pub(super) fn state(document: &mut Value) {
             add(schemas, component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
         }
         add(schemas, "NewConsent", "form", &json!({ "pattern": needed }));
+        add(schemas, "Change", "notes", &json!({ "pattern": optional }));
+        // A comma separates tags in the form.
+        let tag = format!(r"^[^,\t\r\n{UNPRINTABLE}]*[^,\s{UNPRINTABLE}][^,\t\r\n{UNPRINTABLE}]*$");
+        let tag = json!({ "type": "string", "minLength": 1, "maxLength": 40, "pattern": tag });
+        add(schemas, "Change", "tags", &json!({ "items": tag }));
         for component in [
             "NewPreference",
             "NewAssessment",

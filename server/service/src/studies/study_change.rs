@@ -51,6 +51,9 @@ const LONGEST_NOTES: usize = 4000;
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
+    if tags.len() > MOST_TAGS {
+        return Err(FieldError::described("tags", &format!("a list of {}", tags.len()), "a list of at most 10").into());
+    }
     let mut checked = Vec::new();
     for tag in tags {
         let tag = printable::name("tags", tag, LONGEST_TAG)?;
@@ -61,11 +64,6 @@ pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
     }
     checked.sort();
     checked.dedup();
-    if checked.len() > MOST_TAGS {
-        return Err(
-            FieldError::described("tags", &format!("a list of {}", checked.len()), "a list of at most 10").into()
-        );
-    }
     Ok(checked)
 }
 
