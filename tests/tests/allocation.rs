@@ -519,7 +519,7 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
 fn is_about_the_request(line: &str) -> bool {
     // Each form has a key of its own. Sessions have the time of their last use, which these requests change.
     let of_session =
-        line.contains("with a password") || line.contains("with a link") || line.contains("<tr><th scope=\"row\">20");
+        line.contains("with a password") || line.contains("with a link") || line.contains("</time></th><td><time");
     line.contains("name=\"key\"") || line.contains("request_id") || of_session
 }
 
