@@ -89,9 +89,9 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert_eq!(reviews.len(), 2);
     assert!(reviews.iter().any(|row| row.detail.to_string().contains("the video was cut")));
     let heard = service.feedback(study).await;
-    let taken_back: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
+    let retracted: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
     assert_eq!(
-        taken_back.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
+        retracted.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
         [("K2", "the video was cut")]
     );
     // The pair can be compared again.
