@@ -34,7 +34,7 @@ pub(super) struct SafetyReport {
     created_at: Instant,
     /// Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. The gait must
     /// not be walked.
-    open: bool,
+    in_force: bool,
     /// Newest review. Null while the report awaits review.
     review: Option<SafetyReview>,
 }
@@ -43,8 +43,8 @@ impl From<ReportedGait> for SafetyReport {
     fn from(report: ReportedGait) -> Self {
         let id = report.id();
         let ReportedGait { trial, by, at, review, .. } = report;
-        let open = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
-        Self { id, trial_id: trial, author: by, created_at: at, open, review }
+        let in_force = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
+        Self { id, trial_id: trial, author: by, created_at: at, in_force, review }
     }
 }
 
