@@ -3,13 +3,11 @@
 use super::feedback::{Attribution, Retraction, Source};
 use super::presentations::Judgement;
 use super::{AssessmentId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// A recorded assessment.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
     /// Identifier.
     pub id: AssessmentId,
