@@ -76,9 +76,10 @@ fn deriving_types(text: &str) -> Vec<DerivingType<'_>> {
         let (head, body) = item.split_at(item.find(['{', ';']).unwrap());
         let variants = body.lines().take_while(|line| line.trim() != "}").skip(1);
         let mut variants = variants.filter(|line| !line.trim_start().starts_with(['/', '#']));
-        let has_fields = match head.starts_with("struct ") {
-            true => body.starts_with('{') || head.contains(','),
-            false => variants.any(|line| line.contains(['{', '('])),
+        let has_fields = if head.starts_with("struct ") {
+            body.starts_with('{') || head.contains(',')
+        } else {
+            variants.any(|line| line.contains(['{', '(']))
         };
         let name = head.split(|c: char| c.is_whitespace() || c == '<' || c == '(').nth(1).unwrap();
         types.push(DerivingType { traits: traits.split(',').map(str::trim).collect(), name, has_fields });

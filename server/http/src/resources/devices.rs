@@ -1,6 +1,7 @@
 //! Devices.
 
 use super::documents;
+use gait_optimizer::Device as Definition;
 use gaitwright_store::{DeviceId, Instant, devices};
 use serde::Serialize;
 use utoipa::ToSchema;

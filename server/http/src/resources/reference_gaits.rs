@@ -1,6 +1,7 @@
 //! Reference gaits.
 
 use super::documents;
+use gait_optimizer::ReferenceGait as Definition;
 use gaitwright_service::studies::nearest_reference;
 use gaitwright_store::{Instant, ReferenceGaitId, reference_gaits};
 use serde::Serialize;
