@@ -1,9 +1,9 @@
 //! Assessments.
 
 use super::feedback::Retraction;
+use gaitwright_store::assessments::{self, AssessmentAnswer};
 use gaitwright_store::feedback::Source;
-use gaitwright_store::presentations::Judgement;
-use gaitwright_store::{AssessmentId, FeedbackId, Instant, StudyId, TrialId, assessments};
+use gaitwright_store::{AssessmentId, FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -14,12 +14,12 @@ pub(crate) struct Assessment {
     id: AssessmentId,
     /// The study.
     study_id: StudyId,
-    /// The trial with the first of the two gaits.
-    first: TrialId,
-    /// The trial with the second of the two gaits.
-    second: TrialId,
-    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
-    answer: Judgement,
+    /// The trial with gait A.
+    trial_a: TrialId,
+    /// The trial with gait B.
+    trial_b: TrialId,
+    /// The answer.
+    answer: AssessmentAnswer,
     /// Who answered.
     source: Source,
     /// Author.
@@ -39,8 +39,8 @@ impl From<assessments::Assessment> for Assessment {
         let assessments::Assessment {
             id,
             study_id,
-            first,
-            second,
+            trial_a,
+            trial_b,
             answer,
             source,
             author,
@@ -52,8 +52,8 @@ impl From<assessments::Assessment> for Assessment {
         Self {
             id,
             study_id,
-            first,
-            second,
+            trial_a,
+            trial_b,
             answer,
             source,
             author,

@@ -26,7 +26,7 @@ pub(crate) struct FeedbackRow {
     /// Whether it comes from a rater's blind comparison.
     by_rater: bool,
     /// Whether the rater could have known the allocation, so that the entry does not count as blind.
-    unblinded: bool,
+    could_have_known: bool,
     /// Time of recording.
     created_at: Instant,
     /// Retraction, if it was retracted.
@@ -44,7 +44,7 @@ impl From<feedback::FeedbackRow> for FeedbackRow {
             author,
             note,
             by_rater,
-            unblinded,
+            could_have_known,
             created_at,
             retraction,
         } = row;
@@ -57,7 +57,7 @@ impl From<feedback::FeedbackRow> for FeedbackRow {
             author,
             note,
             by_rater,
-            unblinded,
+            could_have_known,
             created_at,
             retraction: retraction.map(Into::into),
         }

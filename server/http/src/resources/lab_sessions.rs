@@ -75,9 +75,9 @@ pub(crate) struct LabSessionView {
     /// State of the session.
     state: LabSessionState,
     /// The trial with the first of the two gaits. Does not imply the order of the walks.
-    gait_one: TrialId,
+    trial_a: TrialId,
     /// The trial with the second of the two gaits.
-    gait_two: TrialId,
+    trial_b: TrialId,
     /// Free text.
     notes: String,
     /// The three walks.
@@ -106,8 +106,8 @@ impl From<lab::LabSessionView> for LabSessionView {
             study_id,
             number,
             state,
-            gait_one,
-            gait_two,
+            trial_a,
+            trial_b,
             notes,
             walks,
             answer,
@@ -123,8 +123,8 @@ impl From<lab::LabSessionView> for LabSessionView {
             study_id,
             number,
             state,
-            gait_one,
-            gait_two,
+            trial_a,
+            trial_b,
             notes,
             walks: walks.into_iter().map(Into::into).collect(),
             answer,

@@ -1,6 +1,6 @@
 //! Stick figures of gaits.
 
-use gait_optimizer::walking::stick_figure;
+use gait_optimizer::gait::stick_figure;
 use serde::Serialize;
 use utoipa::ToSchema;
 
