@@ -10,10 +10,10 @@ use gaitwright_http::openapi;
 use gaitwright_service::access::Role;
 use gaitwright_service::studies::search_space;
 use gaitwright_store::audit::{self, ChainCheck};
-use gaitwright_store::feedback::FeedbackRow;
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::Trial;
-use gaitwright_store::{StudyId, feedback};
+use gaitwright_store::{StudyId, TrialId, feedback};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::signed_in;
 use gaitwright_tests::explained::without_gaits;
@@ -257,21 +257,14 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
 
 /// The feedback of a study, without identifiers, times and authors.
 fn essence(trials: &[Trial], heard: &[FeedbackRow]) -> Vec<String> {
-    let number = |id: &str| trials.iter().find(|trial| trial.id.to_string() == id).map(|trial| trial.number);
+    let number = |id: TrialId| trials.iter().find(|trial| trial.id == id).unwrap().number;
     heard
         .iter()
-        .map(|row| {
-            let said = serde_json::to_value(row.content).unwrap();
-            let named: Vec<String> = said
-                .as_object()
-                .unwrap()
-                .iter()
-                .map(|(name, value)| match value.as_str().and_then(number) {
-                    Some(number) => format!("{name} trial {number}"),
-                    None => format!("{name} {value}"),
-                })
-                .collect();
-            named.join(", ")
+        .map(|row| match row.content {
+            FeedbackContent::Label { trial, category } => format!("label {category} of {}", number(trial)),
+            FeedbackContent::Preference { winner, loser } => format!("{} over {}", number(winner), number(loser)),
+            FeedbackContent::Tie { a, b } => format!("{} as good as {}", number(a), number(b)),
+            FeedbackContent::Suggestion { suggested, over } => format!("{suggested:?} over {}", number(over)),
         })
         .collect()
 }

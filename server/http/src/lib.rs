@@ -40,6 +40,7 @@ mod query_string;
 mod readiness;
 mod request_body;
 pub mod request_counts;
+mod resources;
 mod responded_to;
 mod responses;
 mod router;

@@ -78,7 +78,7 @@ pub struct Tally {
 }
 
 /// Row of the access log.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AccessRow {
     /// Sequence number.
     pub seq: i64,

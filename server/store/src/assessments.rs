@@ -59,7 +59,7 @@ impl TryFrom<Judgement> for AssessmentAnswer {
 }
 
 /// A recorded assessment.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
     /// Identifier.
     pub id: AssessmentId,

@@ -1,11 +1,9 @@
 //! The audit trail: who did what, when and why, as a chain of hashes that detects later changes.
 
-use super::{Connection, Instant, StoreResult, UserId, json_columns, now, openapi_schemas};
-use serde::Serialize;
+use super::{Connection, Instant, StoreResult, UserId, json_columns, now};
 use serde_json::{Value, json};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Hash before the first row.
 pub(super) const ORIGIN: &str = "0000000000000000000000000000000000000000000000000000000000000000";
@@ -65,7 +63,7 @@ impl Actor {
 }
 
 /// Row of the audit trail.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AuditRow {
     /// Sequence number.
     pub seq: i64,
@@ -78,7 +76,6 @@ pub struct AuditRow {
     /// What was changed, such as `study 0190...`.
     pub object: String,
     /// Details of the change, with the reason if there is one.
-    #[schema(value_type = openapi_schemas::AuditDetail)]
     pub detail: Value,
     /// Hash of the previous row.
     pub previous: String,

@@ -29,7 +29,7 @@ impl ConsentKind {
 }
 
 /// A subject's consent, or withdrawal of consent. The newest entry applies.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Consent {
     /// Sequence number.
     pub seq: i64,

@@ -1,21 +1,18 @@
 //! Stored devices: models of powered prostheses.
 
-use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json_columns, now, openapi_schemas};
+use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json_columns, now};
 use gait_optimizer::Device as Definition;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Device. Changing a definition creates a new device, so that studies keep the one they use.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Device {
     /// Identifier.
     pub id: DeviceId,
     /// Name shown to users.
     pub name: String,
     /// Definition of the device.
-    #[schema(value_type = openapi_schemas::DeviceDefinition)]
     pub definition: Definition,
     /// Time of creation.
     pub created_at: Instant,

@@ -3,10 +3,9 @@
 use super::{Connection, Instant, StoreResult, StudyId, json_columns, now};
 use serde::Serialize;
 use sqlx::Row;
-use utoipa::ToSchema;
 
 /// Event of a study.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     /// Sequence number over all studies.
     pub seq: i64,

@@ -2,13 +2,11 @@
 
 use super::{Connection, Instant, StoreResult, StudyId, now};
 use crate::audit::Actor;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Import of a study.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Import {
     /// SHA-256 of the archive.
     pub file_sha256: String,

@@ -6,11 +6,9 @@
 use super::members::{binds, reached};
 use super::{Connection, Instant, JobId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::collections::BTreeMap;
-use utoipa::ToSchema;
 
 /// The exclusive right to run a job until the lease expires.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,13 +33,11 @@ pub struct Troubles {
 }
 
 /// A solve that has not ended.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OpenSolve {
     /// Its trial.
-    #[serde(skip)]
     pub trial_id: TrialId,
     /// Its study.
-    #[serde(skip)]
     pub study_id: StudyId,
     /// Number of times that it was given to a worker.
     pub attempts: u32,

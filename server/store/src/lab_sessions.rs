@@ -6,11 +6,9 @@ use super::lab_answers::{self, LabAnswer};
 use super::members::{binds, reached};
 use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
-use utoipa::ToSchema;
 
 /// A step of a session, which happens at most once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +46,7 @@ impl FromStr for Act {
 }
 
 /// Completed step of a session.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LabSessionStep {
     /// Reason or note.
     pub note: String,

@@ -47,7 +47,6 @@ mod many_rows;
 pub mod measurement_files;
 pub mod members;
 mod migrations;
-pub mod openapi_schemas;
 mod opening_checks;
 mod ownership;
 pub mod presentations;

@@ -44,7 +44,7 @@ impl FromStr for MeasurementKind {
 }
 
 /// Measurement file, without its content.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MeasurementFile {
     /// Identifier.
     pub id: MeasurementFileId,

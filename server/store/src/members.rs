@@ -43,7 +43,7 @@ pub enum MemberKind {
 }
 
 /// Member of a study.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Member {
     /// Identifier of the membership.
     pub id: MemberId,

@@ -1,21 +1,18 @@
 //! Stored reference gaits, which Gait RMSE is measured against.
 
-use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json_columns, now, openapi_schemas};
+use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json_columns, now};
 use gait_optimizer::ReferenceGait as Definition;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Reference gait. Changing a definition creates a new reference gait, so that studies keep the one they use.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ReferenceGait {
     /// Identifier.
     pub id: ReferenceGaitId,
     /// Name shown to users.
     pub name: String,
     /// Definition of the reference gait.
-    #[schema(value_type = openapi_schemas::ReferenceGaitDocument)]
     pub definition: Definition,
     /// Time of creation.
     pub created_at: Instant,

@@ -1,13 +1,11 @@
 //! Stored results of attempts, including results that arrived too late.
 
-use super::{Connection, Instant, StoreResult, TrialId, json_columns, now, openapi_schemas};
+use super::{Connection, Instant, StoreResult, TrialId, json_columns, now};
 use gait_optimizer::{SolveReport, SolveStatus};
-use serde::Serialize;
 use sqlx::Row;
-use utoipa::ToSchema;
 
 /// Result of an attempt.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AttemptResult {
     /// Number of the attempt, from 1.
     pub attempt: u32,
@@ -16,10 +14,8 @@ pub struct AttemptResult {
     /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
     pub taken: bool,
     /// How the solve ended.
-    #[schema(value_type = openapi_schemas::SolveStatus)]
     pub status: SolveStatus,
     /// Figures of the solve. Figures that are not finite are omitted.
-    #[schema(value_type = Option<openapi_schemas::SolveReport>)]
     pub report: Option<SolveReport>,
     /// Time of arrival.
     pub received_at: Instant,

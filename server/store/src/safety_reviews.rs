@@ -38,7 +38,7 @@ impl FromStr for SafetyDecision {
 }
 
 /// Safety review.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SafetyReview {
     /// Identifier.
     pub id: SafetyReviewId,

@@ -1,13 +1,11 @@
 //! Stored sessions of users and one-time sign-in links. Only hashes of their secrets are stored.
 
 use super::{Connection, Instant, SessionId, StoreResult, UserId};
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Session of a user.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Session {
     /// Identifier. It is not the value of the session cookie.
     pub id: SessionId,

@@ -4,13 +4,11 @@ use super::audit::Actor;
 use super::{Connection, Instant, StoreError, StoreResult, SubjectId, json_columns, now};
 use gait_optimizer::Subject as Body;
 use gait_optimizer::muscle::MuscleParameters;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Subject, known by a pseudonym only.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Subject {
     /// Identifier.
     pub id: SubjectId,
@@ -46,7 +44,7 @@ macro_rules! select {
 }
 
 /// Correction of height and mass.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// Sequence number.
     pub seq: i64,

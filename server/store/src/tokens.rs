@@ -3,13 +3,11 @@
 use super::audit::Actor;
 use super::{Connection, Instant, StoreError, StoreResult, TokenId, UserId, json_columns, now};
 use crate::rights::Right;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Token of a program, without its secret.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Token {
     /// Identifier.
     pub id: TokenId,

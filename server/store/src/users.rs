@@ -2,13 +2,11 @@
 
 use super::{Connection, Instant, StoreError, StoreResult, UserId, now};
 use crate::rights::Role;
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// User.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct User {
     /// Identifier.
     pub id: UserId,
@@ -23,7 +21,6 @@ pub struct User {
     /// Time of creation.
     pub created_at: Instant,
     /// The argon2id hash in PHC format.
-    #[serde(skip)]
     pub password: Option<String>,
 }
 

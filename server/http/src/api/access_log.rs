@@ -4,11 +4,11 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::paging::{Page, Paging, SearchText};
 use crate::problem_details::Refusal;
+use crate::resources::access_log::AccessRow;
 use axum::Json;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
-use gaitwright_store::SubjectId;
-use gaitwright_store::access_log::{self, AccessRow};
+use gaitwright_store::{SubjectId, access_log};
 use serde::Deserialize;
 
 /// Filter of rows.
@@ -44,5 +44,5 @@ pub(super) async fn list(
     let Filter { contains, subject_id } = &paging.filter;
     let mut reader = app.read().await?;
     let rows = access_log::page(&mut reader, contains.as_str(), *subject_id, paging.after, paging.to_read()).await?;
-    Ok(Json(paging.page(rows, |row| row.seq)?))
+    Ok(Json(paging.page(rows, |row| row.seq)?.map(AccessRow::from)))
 }

@@ -6,6 +6,7 @@ use crate::authorization::Authorized;
 use crate::openapi_binary::Binary;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::imports::Import;
 use crate::visible::Visible;
 use axum::Json;
 use axum::body::{Body, Bytes};
@@ -16,8 +17,7 @@ use futures_util::{StreamExt, stream};
 use gaitwright_service::access::{Administer, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::archive;
-use gaitwright_store::imports::{self, Import};
-use gaitwright_store::{StudyId, audit, commit, consents, studies};
+use gaitwright_store::{StudyId, audit, commit, consents, imports, studies};
 use serde_json::json;
 use std::io::Write;
 use tokio::sync::mpsc::{self, Sender};
@@ -120,5 +120,5 @@ pub(super) async fn imports_of_study(
 ) -> Result<Json<Page<Import>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(imports::of_study(&mut reader, id).await?)?))
+    Ok(Json(paging.cut_by_place(imports::of_study(&mut reader, id).await?)?.map(Import::from)))
 }

@@ -4,12 +4,12 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::idempotent::{IdempotentWith, KeptBody};
 use crate::problem_details::Refusal;
+use crate::resources::trials::Trial;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab_script::{self, Ask, Tell};
-use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, TrialId};
 use serde::Deserialize;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ pub(super) async fn ask(
             Err(before) => return repeat_ask(&app, before).await,
         };
         if let Some(trial) = lab_script::give_out(&mut writer, &request.caller, script, &suggestion?).await? {
-            return request.done(&app, writer, &trial).await;
+            return request.done(&app, writer, &Trial::from(trial)).await;
         }
     }
     Err(Error::conflict("The study is changing too fast. Try again.").into())
@@ -87,7 +87,7 @@ pub(super) async fn tell(
             Err(before) => return Ok(before),
         };
         if let Some(trial) = lab_script::record(&mut writer, &request.caller, id, &checked?).await? {
-            return request.done(&app, writer, &trial).await;
+            return request.done(&app, writer, &Trial::from(trial)).await;
         }
     }
     Err(Error::conflict("The study is changing too fast. Try again.").into())

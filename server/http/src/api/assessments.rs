@@ -7,14 +7,14 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::assessments::Assessment;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::studies::assessment::{self, NewAssessment};
-use gaitwright_store::assessments::{self, Assessment};
-use gaitwright_store::{AssessmentId, StudyId, studies};
+use gaitwright_store::{AssessmentId, StudyId, assessments, studies};
 
 /// List assessments of a study
 ///
@@ -36,7 +36,8 @@ pub(super) async fn of_study(
 ) -> Result<Json<Page<Assessment>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    Ok(Json(paging.cut(assessments::of_study(&mut reader, id).await?, |assessment| assessment.id)?))
+    let all = assessments::of_study(&mut reader, id).await?;
+    Ok(Json(paging.cut(all, |assessment| assessment.id)?.map(Assessment::from)))
 }
 
 /// Record an assessment of two gaits
@@ -64,7 +65,7 @@ pub(super) async fn create(
     };
     let made = assessment::give(&mut writer, &request.caller, id, &new).await?;
     let row = assessments::get(&mut writer, made).await?;
-    request.created(&app, writer, format!("/api/v1/assessments/{made}"), &row).await
+    request.created(&app, writer, format!("/api/v1/assessments/{made}"), &Assessment::from(row)).await
 }
 
 /// Get an assessment
@@ -82,7 +83,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<AssessmentId, Read>,
 ) -> Result<Json<Assessment>, Refusal> {
-    Ok(Json(assessments::get(&mut *app.read().await?, id).await?))
+    Ok(Json(assessments::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Retract an assessment
@@ -108,5 +109,5 @@ pub(super) async fn retract(
         Err(before) => return Ok(before),
     };
     let row = assessment::retract(&mut writer, &request.caller, None, id, (why.author.as_deref(), &why.reason)).await?;
-    request.done(&app, writer, &row).await
+    request.done(&app, writer, &Assessment::from(row)).await
 }

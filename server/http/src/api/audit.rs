@@ -4,10 +4,11 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::paging::{Page, Paging, SearchText};
 use crate::problem_details::Refusal;
+use crate::resources::audit::AuditRow;
 use axum::Json;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
-use gaitwright_store::audit::{self, AuditRow};
+use gaitwright_store::audit;
 use serde::Deserialize;
 
 /// Filter of rows.
@@ -37,5 +38,5 @@ pub(super) async fn list(
 ) -> Result<Json<Page<AuditRow>>, Refusal> {
     let contains = paging.filter.contains.as_str();
     let rows = audit::page(&mut *app.read().await?, contains, paging.after, paging.to_read()).await?;
-    Ok(Json(paging.page(rows, |row| row.seq)?))
+    Ok(Json(paging.page(rows, |row| row.seq)?.map(AuditRow::from)))
 }

@@ -6,16 +6,16 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::Idempotent;
 use crate::problem_details::Refusal;
+use crate::resources::certificates::Certificate;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gait_optimizer::certificate::Certificate;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certification;
 use gaitwright_service::studies::job::JobId;
-use gaitwright_store::{TrialId, certificates, openapi_schemas};
+use gaitwright_store::{TrialId, certificates};
 
 /// Get the certificate of a trial
 ///
@@ -26,7 +26,7 @@ use gaitwright_store::{TrialId, certificates, openapi_schemas};
     operation_id = "get_certificate",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Certificate", body = openapi_schemas::Certificate), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Certificate", body = Certificate), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -35,7 +35,8 @@ pub(super) async fn get(
     Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<Certificate>, Refusal> {
     let missing = || Error::NotFound { what: "certificate of trial".to_owned(), id: id.to_string() };
-    certificates::find(&mut *app.read().await?, id).await?.map(Json).ok_or_else(missing).map_err(Refusal)
+    let certificate = certificates::find(&mut *app.read().await?, id).await?.ok_or_else(missing)?;
+    Ok(Json(certificate.into()))
 }
 
 /// Request the certificate of a trial

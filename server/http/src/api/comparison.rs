@@ -5,6 +5,7 @@ use crate::accessible::Named;
 use crate::authorization::Authorized;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::trials::TrialCounts;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
@@ -12,10 +13,10 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::study_plan_schemas;
 use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::studies::{self, StudyState};
-use gaitwright_store::trials::{self, TrialCounts};
-use gaitwright_store::{ReferenceGaitId, StudyId, consents, openapi_schemas};
+use gaitwright_store::{ReferenceGaitId, StudyId, consents, trials};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use utoipa::ToSchema;
@@ -44,7 +45,7 @@ pub(super) struct StudyComparison {
     /// Number of the recommended trial.
     best_trial: Option<u32>,
     /// Action of the recommended trial.
-    #[schema(value_type = Option<openapi_schemas::Bounds>)]
+    #[schema(value_type = Option<study_plan_schemas::Bounds>)]
     best_action: Option<TunedBounds>,
     /// Gait RMSE of the recommended trial, rad. Null in every row if the compared studies have different reference gaits,
     /// because values against different reference gaits cannot be compared.
@@ -114,7 +115,7 @@ async fn row(app: &mut AppState, id: StudyId) -> Result<StudyComparison, Refusal
         seed: snapshot.study.plan.seed,
         reference_gait_id: snapshot.study.plan.reference_gait_id,
         state: snapshot.study.state,
-        trials: counts,
+        trials: counts.into(),
         best_trial: best.map(|trial| trial.number),
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),

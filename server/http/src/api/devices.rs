@@ -6,14 +6,15 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::devices::Device;
+use crate::resources::documents;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::Device as Definition;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::device;
-use gaitwright_store::devices::{self, Device};
-use gaitwright_store::{DeviceId, openapi_schemas};
+use gaitwright_store::{DeviceId, devices};
 use std::cmp::Reverse;
 
 /// List devices
@@ -33,7 +34,7 @@ pub(super) async fn list(
     paging: Paging<Reverse<DeviceId>>,
 ) -> Result<Json<Page<Device>>, Refusal> {
     let all = devices::all(&mut *app.read().await?).await?;
-    Ok(Json(paging.cut(all, |one| Reverse(one.id))?))
+    Ok(Json(paging.cut(all, |one| Reverse(one.id))?.map(Device::from)))
 }
 
 /// Add a device from a data file
@@ -44,7 +45,7 @@ pub(super) async fn list(
     path = "/devices",
     operation_id = "create_device",
     tag = "devices",
-    request_body(content = openapi_schemas::DeviceDefinition, description = "A device file, as `/help/data-files` describes it"),
+    request_body(content = documents::DeviceDefinition, description = "A device file, as `/help/data-files` describes it"),
     responses(
         (status = 200, description = "Existing device with the same definition", body = Device),
         (status = 201, description = "Device", body = Device)
@@ -60,10 +61,11 @@ pub(super) async fn create(
         Err(before) => return Ok(before),
     };
     let (device, added) = device::add(&mut writer, &request.actor, &definition).await?;
+    let location = format!("/api/v1/devices/{}", device.id);
+    let device = Device::from(device);
     if !added {
         return request.done(&app, writer, &device).await;
     }
-    let location = format!("/api/v1/devices/{}", device.id);
     request.created(&app, writer, location, &device).await
 }
 
@@ -82,5 +84,5 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<DeviceId, Read>,
 ) -> Result<Json<Device>, Refusal> {
-    Ok(Json(devices::get(&mut *app.read().await?, id).await?))
+    Ok(Json(devices::get(&mut *app.read().await?, id).await?.into()))
 }

@@ -8,6 +8,7 @@ use crate::AppState;
 use crate::event_stream::{Gone, Listening, Sender};
 use crate::extractors::Params;
 use crate::problem_details::Refusal;
+use crate::resources;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
@@ -111,7 +112,7 @@ async fn replay(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sen
         after = last.seq;
         for event in batch {
             let sent = Event::default().event(&event.kind).id(event.seq.to_string());
-            let sent = sent.json_data(&event).map_err(|_| Gone)?;
+            let sent = sent.json_data(resources::events::Event::from(event)).map_err(|_| Gone)?;
             sender.send(sent).await?;
         }
     }

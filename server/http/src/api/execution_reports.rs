@@ -6,18 +6,18 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::problem_details::Refusal;
+use crate::resources::execution_reports::ExecutionReport;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gait_optimizer::execution::ExecutionReport;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, WalksAsked};
 use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::job::JobId;
 use gaitwright_store::execution_reports::{GaitSimulated, KeptReport};
-use gaitwright_store::{Instant, TrialId, openapi_schemas};
+use gaitwright_store::{Instant, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -28,7 +28,6 @@ pub(super) struct TrialExecutionReport {
     /// How many walks were complete, as a sentence.
     sentence: String,
     /// The report, as `gaitwright simulate --json` prints it.
-    #[schema(value_type = openapi_schemas::ExecutionReport)]
     report: ExecutionReport,
     /// Version of the program that made it.
     program: String,
@@ -38,7 +37,7 @@ pub(super) struct TrialExecutionReport {
 impl From<KeptReport> for TrialExecutionReport {
     fn from(kept: KeptReport) -> Self {
         let KeptReport { simulated: GaitSimulated { trial_id, program, report, .. }, created_at } = kept;
-        Self { trial_id, sentence: report.sentence(), report, program, created_at }
+        Self { trial_id, sentence: report.sentence(), report: report.into(), program, created_at }
     }
 }
 

@@ -6,18 +6,18 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::Idempotent;
 use crate::problem_details::Refusal;
+use crate::resources::explanations::{BoundAtLimit, Conflict, JointRelaxation, Relaxation};
+use crate::resources::solve_reports::{SolveStatus, Violation};
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gait_optimizer::explanation::{BoundAtLimit, Conflict, JointRelaxation, Relaxation};
-use gait_optimizer::{SolveStatus, Violation};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::job::JobId;
 use gaitwright_store::explanations::Explained;
-use gaitwright_store::{Instant, TrialId, openapi_schemas, trials};
+use gaitwright_store::{Instant, TrialId, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -28,25 +28,19 @@ pub(super) struct TrialExplanation {
     /// The explanation in sentences.
     sentences: Vec<String>,
     /// Status of the solve.
-    #[schema(value_type = openapi_schemas::SolveStatus)]
     status: SolveStatus,
     /// Violations of the last iterate, worst first.
-    #[schema(value_type = Vec<openapi_schemas::Violation>)]
     violations: Vec<Violation>,
     /// Conflicts between tuned bounds: the first one, and others if relaxing a single bound does not resolve it. Empty in
     /// older explanations.
-    #[schema(value_type = Vec<openapi_schemas::Conflict>)]
     conflicts: Vec<Conflict>,
     /// Whether the search for a conflict found a gait with the given bounds, which the solve had missed.
     gait_found: bool,
     /// Tuned bounds that are active at the last iterate.
-    #[schema(value_type = Vec<openapi_schemas::BoundAtLimit>)]
     at_limit: Vec<BoundAtLimit>,
     /// Effect of relaxing each bound of the first conflict alone: the smallest relaxation first, ineffective ones last.
-    #[schema(value_type = Vec<openapi_schemas::Relaxation>)]
     relaxations: Vec<Relaxation>,
     /// Effect of relaxing several bounds together, if no single one helps.
-    #[schema(value_type = Vec<openapi_schemas::JointRelaxation>)]
     together: Vec<JointRelaxation>,
     /// Version of the program that made it.
     program: String,
@@ -61,13 +55,13 @@ impl TrialExplanation {
         Self {
             trial_id,
             sentences: explanation.sentences(),
-            status: explanation.status,
-            violations: explanation.violations,
-            conflicts: explanation.conflicts,
+            status: explanation.status.into(),
+            violations: explanation.violations.into_iter().map(Into::into).collect(),
+            conflicts: explanation.conflicts.into_iter().map(Into::into).collect(),
             gait_found: explanation.gait_found,
-            at_limit: explanation.at_limit,
-            relaxations: explanation.relaxations,
-            together: explanation.together,
+            at_limit: explanation.at_limit.into_iter().map(Into::into).collect(),
+            relaxations: explanation.relaxations.into_iter().map(Into::into).collect(),
+            together: explanation.together.into_iter().map(Into::into).collect(),
             program,
             problem_sha256,
             created_at,

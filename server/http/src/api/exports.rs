@@ -6,6 +6,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::problem_details::Refusal;
+use crate::resources::documents;
 use crate::visible::Visible;
 use axum::extract::State;
 use axum::http::header;
@@ -16,7 +17,7 @@ use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::solve_input::PackedInput;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
-use gaitwright_store::{TrialId, consents, gaits, openapi_schemas, trials};
+use gaitwright_store::{TrialId, consents, gaits, trials};
 use serde::Deserialize;
 
 /// Sampling of a gait.
@@ -41,7 +42,7 @@ pub(super) fn two_hundred() -> f64 {
     operation_id = "get_solve_problem",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Input for `gaitwright solve --problem`", body = openapi_schemas::SolveProblem), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Input for `gaitwright solve --problem`", body = documents::SolveProblem), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn problem(
@@ -92,7 +93,7 @@ pub(super) async fn motion_file(
     operation_id = "get_controller_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
-    responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = openapi_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = documents::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn controller(

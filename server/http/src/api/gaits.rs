@@ -4,6 +4,7 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::csv_response::csv_file;
 use crate::problem_details::Refusal;
+use crate::resources::documents;
 use crate::visible::Visible;
 use axum::extract::State;
 use axum::http::header;
@@ -11,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_charts::gait_table::gait_csv;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
-use gaitwright_store::{StoreError, TrialId, gaits, openapi_schemas, trials};
+use gaitwright_store::{StoreError, TrialId, gaits, trials};
 
 /// Get the gait of a trial
 ///
@@ -22,7 +23,7 @@ use gaitwright_store::{StoreError, TrialId, gaits, openapi_schemas, trials};
     operation_id = "get_gait",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Gait", body = openapi_schemas::GaitDocument), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Gait", body = documents::GaitDocument), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(

@@ -5,6 +5,7 @@ use crate::authorization::Authorized;
 use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::jobs::OpenSolve;
 use crate::visible::Visible;
 use crate::workers::Workers;
 use axum::Json;
@@ -13,7 +14,6 @@ use axum::response::Response;
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::studies::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
-use gaitwright_store::jobs::OpenSolve;
 use gaitwright_store::{LentWriter, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -53,7 +53,17 @@ impl From<JobStatus> for Job {
             JobId::Solve(trial) => format!("/api/v1/trials/{trial}"),
         };
         let result = (state == JobState::Done).then_some(result);
-        Self { id, kind: id.kind(), state, trial_id: id.trial(), study_id: study, result, reason, progress, solve }
+        Self {
+            id,
+            kind: id.kind(),
+            state,
+            trial_id: id.trial(),
+            study_id: study,
+            result,
+            reason,
+            progress,
+            solve: solve.map(Into::into),
+        }
     }
 }
 

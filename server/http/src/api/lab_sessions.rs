@@ -8,6 +8,8 @@ use crate::extractors::Params;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::documents;
+use crate::resources::lab_sessions::LabSessionView;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -15,12 +17,16 @@ use axum::response::Response;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Device, Rate, Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{
-    self, GaitOfWalk, LabSessionProgress, LabSessionView, NewAnswer, NewLabSession, RecordedWalk,
-};
-use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, openapi_schemas, studies};
+use gaitwright_service::studies::lab::{self, GaitOfWalk, LabSessionProgress, NewAnswer, NewLabSession, RecordedWalk};
+use gaitwright_store::lab_sessions::LabSession;
+use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, studies};
 use serde::Deserialize;
 use utoipa::ToSchema;
+
+/// What clients see of a session.
+fn view(session: &LabSession) -> LabSessionView {
+    lab::LabSessionView::from(session).into()
+}
 
 /// List lab sessions of a study
 ///
@@ -43,7 +49,7 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let all = lab_sessions::of_study(&mut reader, id).await?;
-    Ok(Json(paging.cut(all, |session| session.number)?.map(|session| LabSessionView::from(&session))))
+    Ok(Json(paging.cut(all, |session| session.number)?.map(|session| view(&session))))
 }
 
 /// Plan a lab session
@@ -71,7 +77,7 @@ pub(super) async fn create(
     };
     let session = lab::plan(&mut writer, &request.actor, id, &new).await?;
     let location = format!("/api/v1/lab-sessions/{}", session.id);
-    request.created(&app, writer, location, &LabSessionView::from(&session)).await
+    request.created(&app, writer, location, &view(&session)).await
 }
 
 /// Get a lab session
@@ -91,7 +97,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
 ) -> Result<Json<LabSessionView>, Refusal> {
-    Ok(Json(LabSessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
+    Ok(Json(view(&lab_sessions::get(&mut *app.read().await?, id).await?)))
 }
 
 /// Walk and sampling.
@@ -117,7 +123,7 @@ pub(super) struct OfWalk {
         ("walk" = u8, Query, description = "2 or 3. Walk 1 is without the device"),
         ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")
     ),
-    responses((status = 200, description = "Controller file", body = openapi_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Controller file", body = documents::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["device"]), ("session" = ["device"])),
 )]
 pub(super) async fn controller(
@@ -183,7 +189,7 @@ pub(super) async fn close(
         Err(before) => return Ok(before),
     };
     let session = lab::close(&mut writer, &request.actor, id, &closing.note).await?;
-    request.done(&app, writer, &LabSessionView::from(&session)).await
+    request.done(&app, writer, &view(&session)).await
 }
 
 /// Session to unblind, with the reason.
@@ -219,7 +225,7 @@ pub(super) async fn unblind(
         Err(before) => return Ok(before),
     };
     let session = lab::unblind(&mut writer, &request.actor, id, &asked.reason).await?;
-    request.done(&app, writer, &LabSessionView::from(&session)).await
+    request.done(&app, writer, &view(&session)).await
 }
 
 /// Get the next walk of a lab session

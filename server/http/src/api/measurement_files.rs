@@ -7,6 +7,10 @@ use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::documents;
+use crate::resources::emg::EmgView;
+use crate::resources::limit_cycles::LimitCycles;
+use crate::resources::measurement_files::MeasurementFile;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -15,11 +19,8 @@ use axum::response::Response;
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{
-    self, Checked, EmgView, LimitCycles, MeasurementFormat, NewEmg, NewMotion, UploadedFile,
-};
-use gaitwright_store::measurement_files::{self, MeasurementFile};
-use gaitwright_store::{LabSessionId, MeasurementFileId, openapi_schemas};
+use gaitwright_service::studies::lab::{self, Checked, MeasurementFormat, NewEmg, NewMotion, UploadedFile};
+use gaitwright_store::{LabSessionId, MeasurementFileId, measurement_files};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -42,7 +43,7 @@ pub(super) async fn list(
     paging: Paging<MeasurementFileId>,
 ) -> Result<Json<Page<MeasurementFile>>, Refusal> {
     let all = measurement_files::of_session(&mut *app.read().await?, id).await?;
-    Ok(Json(paging.cut(all, |recording| recording.id)?))
+    Ok(Json(paging.cut(all, |recording| recording.id)?.map(MeasurementFile::from)))
 }
 
 /// Get a measurement file
@@ -60,7 +61,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<MeasurementFileId, Read>,
 ) -> Result<Json<MeasurementFile>, Refusal> {
-    Ok(Json(measurement_files::get(&mut *app.read().await?, id).await?))
+    Ok(Json(measurement_files::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Download a measurement file
@@ -154,7 +155,8 @@ async fn keep(
         Err(before) => return Ok(before),
     };
     let kept = lab::keep(&mut writer, &request.actor, id, checked).await?;
-    request.created(app, writer, format!("/api/v1/measurement-files/{}", kept.id), &kept).await
+    let location = format!("/api/v1/measurement-files/{}", kept.id);
+    request.created(app, writer, location, &MeasurementFile::from(kept)).await
 }
 
 /// Settings of EMG processing.
@@ -162,7 +164,7 @@ async fn keep(
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Processing {
     /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
-    #[schema(value_type = openapi_schemas::EmgSettings)]
+    #[schema(value_type = documents::EmgSettings)]
     settings: EmgSettings,
 }
 
@@ -202,7 +204,7 @@ pub(super) async fn process(
         Err(before) => return Ok(before),
     };
     lab::keep_result(&mut writer, &request.actor, id, &view.result).await?;
-    request.done(&app, writer, &view).await
+    request.done(&app, writer, &EmgView::from(view)).await
 }
 
 /// Get the processed EMG
@@ -222,7 +224,7 @@ pub(super) async fn result(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
 ) -> Result<Json<Option<EmgView>>, Refusal> {
-    Ok(Json(lab::emg(app.store_mut(), id).await?))
+    Ok(Json(lab::emg(app.store_mut(), id).await?.map(EmgView::from)))
 }
 
 /// Get limit cycles
@@ -243,5 +245,5 @@ pub(super) async fn limit_cycles(
     Visible(id, _): Visible<LabSessionId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<LimitCycles>>, Refusal> {
-    Ok(Json(paging.cut_by_place(lab::limit_cycles(app.store_mut(), id).await?)?))
+    Ok(Json(paging.cut_by_place(lab::limit_cycles(app.store_mut(), id).await?)?.map(LimitCycles::from)))
 }

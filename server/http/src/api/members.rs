@@ -6,13 +6,13 @@ use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::members::Member;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Administer, Read, Run};
 use gaitwright_service::studies::membership::{self, NewMember};
-use gaitwright_store::members::{self, Member};
-use gaitwright_store::{MemberId, StudyId};
+use gaitwright_store::{MemberId, StudyId, members};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -37,7 +37,7 @@ pub(super) async fn of_study(
     paging: Paging<MemberId>,
 ) -> Result<Json<Page<Member>>, Refusal> {
     let all = members::of_study(&mut *app.read().await?, id).await?;
-    Ok(Json(paging.cut(all, |member| member.id)?))
+    Ok(Json(paging.cut(all, |member| member.id)?.map(Member::from)))
 }
 
 /// Get the access restriction of a study
@@ -82,7 +82,7 @@ pub(super) async fn add(
         Err(before) => return Ok(before),
     };
     let member = membership::add(&mut writer, &request.actor, id, &new).await?;
-    request.created(&app, writer, address(member.id), &member).await
+    request.created(&app, writer, address(member.id), &Member::from(member)).await
 }
 
 /// The address of a membership.
@@ -107,7 +107,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<MemberId, Read>,
 ) -> Result<Json<Member>, Refusal> {
-    Ok(Json(members::get(&mut *app.read().await?, id).await?))
+    Ok(Json(members::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Remove a study member
@@ -130,7 +130,7 @@ pub(super) async fn end(
         Err(before) => return Ok(before),
     };
     let member = membership::end(&mut writer, &request.actor, id).await?;
-    request.done(&app, writer, &member).await
+    request.done(&app, writer, &Member::from(member)).await
 }
 
 /// Access to a study.
@@ -207,6 +207,7 @@ pub(super) async fn invite(
 ) -> Result<Response, Refusal> {
     let mut writer = request.begin_secret(&app).await?;
     let (_, member, secret) = membership::invite(&mut writer, &request.actor, id, &whom.name).await?;
-    let invited = CreatedInvitation { member, path: format!("/sign-in/{secret}") };
-    request.created(&app, writer, address(invited.member.id), &invited).await
+    let location = address(member.id);
+    let invited = CreatedInvitation { member: member.into(), path: format!("/sign-in/{secret}") };
+    request.created(&app, writer, location, &invited).await
 }

@@ -3,15 +3,16 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::problem_details::Refusal;
+use crate::resources::stick_figures::StickFigure;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::Gait;
-use gait_optimizer::gait::stick_figure::{StickFigure, stick_figures};
+use gait_optimizer::gait::stick_figure::stick_figures;
 use gaitwright_charts::gait_series::points;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_store::{TrialId, gaits, openapi_schemas};
+use gaitwright_store::{TrialId, gaits};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -30,7 +31,6 @@ pub(crate) struct Motion {
 #[derive(Debug, Serialize, ToSchema)]
 struct Frame {
     #[serde(flatten)]
-    #[schema(value_type = openapi_schemas::StickFigure)]
     figure: StickFigure,
     /// Name of the domain.
     domain: String,
@@ -72,7 +72,12 @@ pub(crate) fn motion(gait: &Gait) -> Result<Motion, Error> {
         .map(|(figure, point)| {
             let f = point.forces;
             let forces_n = [[f[0], f[1]], [f[2], f[3]], [f[4], f[5]], [f[6], f[7]]];
-            Frame { figure, domain: point.domain.to_owned(), forces_n, activations: point.activation.copied() }
+            Frame {
+                figure: figure.into(),
+                domain: point.domain.to_owned(),
+                forces_n,
+                activations: point.activation.copied(),
+            }
         })
         .collect();
     Ok(Motion { stride_time_s: gait.stride_time_s, stride_length_m: gait.stride_length_m, frames })

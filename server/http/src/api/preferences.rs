@@ -7,6 +7,7 @@ use crate::csv_response::csv_response;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::feedback::FeedbackRow;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -14,7 +15,7 @@ use axum::response::Response;
 use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::studies::answer::{self, Answer};
-use gaitwright_store::feedback::{self, FeedbackContent, FeedbackRow};
+use gaitwright_store::feedback::{self, FeedbackContent};
 use gaitwright_store::{FeedbackId, StudyId, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -40,7 +41,7 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let rows = feedback::comparisons(&mut reader, id, paging.after.unwrap_or(0), paging.to_read()).await?;
-    Ok(Json(paging.page(rows, |row| row.seq)?))
+    Ok(Json(paging.page(rows, |row| row.seq)?.map(FeedbackRow::from)))
 }
 
 /// Download preferences as CSV
@@ -67,7 +68,7 @@ pub(super) async fn of_study_csv(
     csv_response(&mut app, &format!("preferences-{}.csv", id.short()), move || table(&rows)).await
 }
 
-fn table(rows: &[FeedbackRow]) -> CsvTable {
+fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
     let mut table = CsvTable::new([
         "seq",
         "id",
@@ -120,7 +121,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<FeedbackId, Read>,
 ) -> Result<Json<FeedbackRow>, Refusal> {
-    Ok(Json(feedback::get(&mut *app.read().await?, id).await?))
+    Ok(Json(feedback::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Recorded preference.
@@ -156,7 +157,7 @@ pub(super) async fn create(
     let row = feedback::get(&mut writer, given).await?;
     let other_answers = answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
-    request.created(&app, writer, location, &CreatedPreference { row, other_answers }).await
+    request.created(&app, writer, location, &CreatedPreference { row: row.into(), other_answers }).await
 }
 
 /// Retraction of a preference or an assessment.
@@ -193,5 +194,5 @@ pub(super) async fn retract(
         Err(before) => return Ok(before),
     };
     let row = answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
-    request.done(&app, writer, &row).await
+    request.done(&app, writer, &FeedbackRow::from(row)).await
 }

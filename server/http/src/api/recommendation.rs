@@ -4,12 +4,12 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::csv_response::csv_response;
 use crate::problem_details::Refusal;
+use crate::resources::execution_reports::ExecutionReport;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::TunedBounds;
-use gait_optimizer::execution::ExecutionReport;
 use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
@@ -17,11 +17,12 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::certified_best::{self, CertificateState};
 use gaitwright_service::studies::execution;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::study_plan_schemas;
 use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_service::studies::walkable::Grounds;
 use gaitwright_service::studies::walkable::WalkableGait;
 use gaitwright_store::trials::Trial;
-use gaitwright_store::{StudyId, TrialId, openapi_schemas, studies};
+use gaitwright_store::{StudyId, TrialId, studies};
 use serde::Serialize;
 use std::sync::Arc;
 use utoipa::ToSchema;
@@ -40,7 +41,6 @@ pub(super) struct Recommendation {
     /// If the certificate failed, the best action whose gait passed.
     passing: Option<Recommended>,
     /// The newest execution report of its gait. Null if nobody requested one.
-    #[schema(value_type = Option<openapi_schemas::ExecutionReport>)]
     execution_report: Option<ExecutionReport>,
     /// Whether gaits of the study are being certified, so that the recommendation may change.
     certifying: bool,
@@ -54,7 +54,7 @@ struct Recommended {
     /// Number of the trial.
     number: u32,
     /// Action as bounds.
-    #[schema(value_type = openapi_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::Bounds)]
     bounds: TunedBounds,
     /// Gait RMSE of the trial, rad.
     gait_rmse_rad: Option<f64>,
@@ -176,7 +176,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         best: Recommended::of(&gait, trial),
         certificate: judged.certificate,
         failures: judged.failures,
-        execution_report,
+        execution_report: execution_report.map(Into::into),
         certifying,
         passing: judged.passing.and_then(|id| {
             let trial = snapshot.trial(id)?;

@@ -6,14 +6,14 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::reference_gaits::{ReferenceGait, ReferenceGaitMatch};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
-use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
+use gaitwright_service::studies::nearest_reference;
 use gaitwright_service::studies::reference_import::{self, NewReferenceGait};
-use gaitwright_store::reference_gaits::{self, ReferenceGait};
-use gaitwright_store::{ReferenceGaitId, SubjectId, subjects};
+use gaitwright_store::{ReferenceGaitId, SubjectId, reference_gaits, subjects};
 use std::cmp::Reverse;
 
 /// List reference gaits
@@ -33,7 +33,7 @@ pub(super) async fn list(
     paging: Paging<Reverse<ReferenceGaitId>>,
 ) -> Result<Json<Page<ReferenceGait>>, Refusal> {
     let all = reference_gaits::all(&mut *app.read().await?).await?;
-    Ok(Json(paging.cut(all, |one| Reverse(one.id))?))
+    Ok(Json(paging.cut(all, |one| Reverse(one.id))?.map(ReferenceGait::from)))
 }
 
 /// Import a reference gait from a recording
@@ -65,10 +65,11 @@ pub(super) async fn create(
         Err(before) => return Ok(before),
     };
     let (gait, added) = reference_import::add(&mut writer, &request.actor, &definition).await?;
+    let location = format!("/api/v1/reference-gaits/{}", gait.id);
+    let gait = ReferenceGait::from(gait);
     if !added {
         return request.done(&app, writer, &gait).await;
     }
-    let location = format!("/api/v1/reference-gaits/{}", gait.id);
     request.created(&app, writer, location, &gait).await
 }
 
@@ -87,7 +88,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<ReferenceGaitId, Read>,
 ) -> Result<Json<ReferenceGait>, Refusal> {
-    Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?))
+    Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Rank reference gaits for a subject
@@ -110,5 +111,6 @@ pub(super) async fn of_subject(
 ) -> Result<Json<Page<ReferenceGaitMatch>>, Refusal> {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(nearest_reference::matches(&mut reader, &subject.body()).await?)?))
+    let found = nearest_reference::matches(&mut reader, &subject.body()).await?;
+    Ok(Json(paging.cut_by_place(found)?.map(ReferenceGaitMatch::from)))
 }

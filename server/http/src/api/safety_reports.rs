@@ -6,6 +6,7 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::safety_reviews::SafetyReview;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -15,7 +16,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_report::{self, Report};
 use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReports};
 use gaitwright_service::studies::safety_review::{self, Decision};
-use gaitwright_store::safety_reviews::{SafetyDecision, SafetyReview};
+use gaitwright_store::safety_reviews::SafetyDecision;
 use gaitwright_store::{Instant, SafetyReportId, StudyId, TrialId, studies, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -44,7 +45,7 @@ impl From<ReportedGait> for SafetyReport {
         let id = report.id();
         let ReportedGait { trial, by, at, review, .. } = report;
         let in_force = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
-        Self { id, trial_id: trial, author: by, created_at: at, in_force, review }
+        Self { id, trial_id: trial, author: by, created_at: at, in_force, review: review.map(Into::into) }
     }
 }
 
@@ -139,5 +140,5 @@ pub(super) async fn review(
     let row = safety_review::give(&mut writer, &request.caller, id, &decision).await?;
     let study = trials::get(&mut writer, id).await?.study_id;
     let location = format!("/api/v1/studies/{study}/safety-reports");
-    request.created(&app, writer, location, &row).await
+    request.created(&app, writer, location, &SafetyReview::from(row)).await
 }

@@ -3,14 +3,15 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::problem_details::Refusal;
+use crate::resources::sensitivities::{ActiveConstraint, FigureDerivatives};
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
-use gait_optimizer::sensitivity::{ActiveConstraint, BoundSensitivity, FigureDerivatives};
+use gait_optimizer::sensitivity::BoundSensitivity;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::sensitivities::{self, BoundStep, StudySensitivities};
-use gaitwright_store::{TrialId, openapi_schemas, trials};
+use gaitwright_store::{TrialId, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -34,10 +35,8 @@ struct SensitivityToBound {
     /// Its value.
     value: f64,
     /// The active constraints that it sets. Empty if small changes of the bound change nothing.
-    #[schema(value_type = Vec<openapi_schemas::ActiveConstraint>)]
     active: Vec<ActiveConstraint>,
     /// Derivatives of the figures of the gait.
-    #[schema(value_type = openapi_schemas::FigureDerivatives)]
     derivatives: FigureDerivatives,
     /// Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
     /// is null if there is no limit in that direction.
@@ -71,7 +70,8 @@ impl SensitivityToBound {
             gait_rmse_rad,
             keeps_active,
         });
-        Self { bound, value, active, derivatives, interval, is_weakly_active, grid_step }
+        let active = active.into_iter().map(Into::into).collect();
+        Self { bound, value, active, derivatives: derivatives.into(), interval, is_weakly_active, grid_step }
     }
 }
 

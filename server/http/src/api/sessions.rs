@@ -6,13 +6,13 @@ use crate::authorization::Authorized;
 use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::sessions::Session;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Anything, Right, sign_in};
 use gaitwright_service::error::Error;
-use gaitwright_store::sessions::{self, Session};
-use gaitwright_store::{Instant, SessionId};
+use gaitwright_store::{Instant, SessionId, sessions};
 use std::cmp::Reverse;
 
 /// List sessions
@@ -31,16 +31,17 @@ pub(super) async fn list(
     State(app): State<AppState>,
     paging: Paging<(Reverse<Instant>, SessionId)>,
 ) -> Result<Json<Page<Session>>, Refusal> {
-    let at = |session: &Session| (Reverse(session.created_at), session.id);
+    let at = |session: &sessions::Session| (Reverse(session.created_at), session.id);
     let mut reader = app.read().await?;
     let now = app.access.clock.now(&mut reader).await?;
     let of = match authorized.caller.user {
         _ if authorized.caller.may(Right::Administer) => None,
         // A token has no sessions.
-        None => return Ok(Json(paging.page(Vec::new(), at)?)),
+        None => return Ok(Json(paging.page(Vec::new(), at)?.map(Session::from))),
         own => own,
     };
-    Ok(Json(paging.cut(sign_in::live(&mut reader, of, app.access.limits, now).await?, at)?))
+    let live = sign_in::live(&mut reader, of, app.access.limits, now).await?;
+    Ok(Json(paging.cut(live, at)?.map(Session::from)))
 }
 
 /// End a session
@@ -69,5 +70,5 @@ pub(super) async fn end(
         .filter(|session| request.caller.may(Right::Administer) || request.caller.user == Some(session.user_id));
     let session = session.ok_or_else(|| Error::NotFound { what: "session".to_owned(), id: id.to_string() })?;
     sign_in::end(&mut writer, &request.actor, &session).await?;
-    request.done(&app, writer, &session).await
+    request.done(&app, writer, &Session::from(session)).await
 }

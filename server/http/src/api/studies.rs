@@ -7,6 +7,8 @@ use crate::entity_tag::{IfMatch, tagged};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::studies::Study;
+use crate::resources::trials::TrialCounts;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -15,9 +17,8 @@ use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
 use gaitwright_service::studies::study_change::{self, Change, Extend, Fork};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
-use gaitwright_store::studies::{self, Study, StudyFilter, StudyState};
-use gaitwright_store::trials::{self, TrialCounts};
-use gaitwright_store::{Connection, LentWriter, StudyId, SubjectId};
+use gaitwright_store::studies::{self, StudyFilter, StudyState};
+use gaitwright_store::{Connection, LentWriter, StudyId, SubjectId, trials};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -32,10 +33,10 @@ pub(super) struct StudyView {
 }
 
 impl StudyView {
-    async fn of(db: &mut Connection, study: Study) -> Result<Self, Refusal> {
+    async fn of(db: &mut Connection, study: studies::Study) -> Result<Self, Refusal> {
         let trials = trials::counts(db, study.id).await?;
         let possible = acts_of_people(study.state).into_iter().map(Act::as_str).collect();
-        Ok(Self { study, trials, possible })
+        Ok(Self { study: study.into(), trials: trials.into(), possible })
     }
 }
 
@@ -348,7 +349,7 @@ async fn made(
     app: &AppState,
     request: &Idempotent<Run>,
     mut writer: LentWriter<'_>,
-    study: Study,
+    study: studies::Study,
 ) -> Result<Response, Refusal> {
     let (location, revision) = (format!("/api/v1/studies/{}", study.id), study.revision);
     let view = StudyView::of(&mut writer, study).await?;

@@ -6,6 +6,8 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::documents;
+use crate::resources::subjects::{Consent, Correction, Subject};
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -14,9 +16,7 @@ use gait_optimizer::muscle::MuscleParameters;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
 use gaitwright_service::studies::subject::{self, NewCorrection, NewSubject};
-use gaitwright_store::consents::{self, Consent};
-use gaitwright_store::subjects::{self, Correction, Subject};
-use gaitwright_store::{SubjectId, openapi_schemas};
+use gaitwright_store::{SubjectId, consents, subjects};
 
 /// List subjects
 ///
@@ -35,7 +35,7 @@ pub(super) async fn list(
     paging: Paging<SubjectId>,
 ) -> Result<Json<Page<Subject>>, Refusal> {
     let found = subjects::page(&mut *app.read().await?, paging.after, paging.to_read()).await?;
-    Ok(Json(paging.page(found, |subject| subject.id)?))
+    Ok(Json(paging.page(found, |subject| subject.id)?.map(Subject::from)))
 }
 
 /// Get a subject
@@ -53,7 +53,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
 ) -> Result<Json<Subject>, Refusal> {
-    Ok(Json(subjects::get(&mut *app.read().await?, id).await?))
+    Ok(Json(subjects::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Add a subject
@@ -76,7 +76,7 @@ pub(super) async fn create(
     };
     let subject = subject::add(&mut writer, &request.actor, &new).await?;
     let location = format!("/api/v1/subjects/{}", subject.id);
-    request.created(&app, writer, location, &subject).await
+    request.created(&app, writer, location, &Subject::from(subject)).await
 }
 
 /// List consents of a subject
@@ -99,7 +99,8 @@ pub(super) async fn consents(
 ) -> Result<Json<Page<Consent>>, Refusal> {
     let mut reader = app.read().await?;
     subjects::get(&mut reader, id).await?;
-    Ok(Json(paging.cut(consents::of_subject(&mut reader, id).await?, |consent| consent.seq)?))
+    let all = consents::of_subject(&mut reader, id).await?;
+    Ok(Json(paging.cut(all, |consent| consent.seq)?.map(Consent::from)))
 }
 
 /// Record consent
@@ -123,7 +124,7 @@ pub(super) async fn consent(
         Err(before) => return Ok(before),
     };
     let row = consent::give(&mut writer, &request.actor, id, &new).await?;
-    request.done(&app, writer, &row).await
+    request.done(&app, writer, &Consent::from(row)).await
 }
 
 /// Withdraw consent
@@ -149,7 +150,7 @@ pub(super) async fn withdraw(
         Err(before) => return Ok(before),
     };
     let (row, cancelled) = consent::withdraw(&mut writer, &request.actor, id, &why).await?;
-    let answer = request.done(&app, writer, &row).await?;
+    let answer = request.done(&app, writer, &Consent::from(row)).await?;
     for trial in cancelled {
         app.scheduler.cancel_solve(trial).await;
     }
@@ -176,7 +177,8 @@ pub(super) async fn corrections(
 ) -> Result<Json<Page<Correction>>, Refusal> {
     let mut reader = app.read().await?;
     subjects::get(&mut reader, id).await?;
-    Ok(Json(paging.cut(subjects::corrections(&mut reader, id).await?, |correction| correction.seq)?))
+    let all = subjects::corrections(&mut reader, id).await?;
+    Ok(Json(paging.cut(all, |correction| correction.seq)?.map(Correction::from)))
 }
 
 /// Correct the height and mass of a subject
@@ -202,7 +204,7 @@ pub(super) async fn correct(
         Err(before) => return Ok(before),
     };
     let row = subject::correct(&mut writer, &request.actor, id, &new).await?;
-    request.done(&app, writer, &row).await
+    request.done(&app, writer, &Correction::from(row)).await
 }
 
 /// Get measured muscle values of a subject
@@ -214,7 +216,7 @@ pub(super) async fn correct(
     operation_id = "get_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = openapi_schemas::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = documents::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn muscles(
@@ -236,8 +238,8 @@ pub(super) async fn muscles(
     operation_id = "set_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
-    request_body(content = openapi_schemas::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the default values"),
-    responses((status = 200, description = "Muscle values", body = openapi_schemas::MuscleParameters)),
+    request_body(content = documents::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the default values"),
+    responses((status = 200, description = "Muscle values", body = documents::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn set_muscles(

@@ -6,14 +6,14 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::feedback::FeedbackRow;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::studies::suggestion::{self, Suggestion};
-use gaitwright_store::feedback::{self, FeedbackRow};
-use gaitwright_store::{StudyId, studies};
+use gaitwright_store::{StudyId, feedback, studies};
 
 /// List suggestions of a study
 ///
@@ -36,7 +36,7 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let rows = feedback::suggestions(&mut reader, id, paging.after.unwrap_or(0), paging.to_read()).await?;
-    Ok(Json(paging.page(rows, |row| row.seq)?))
+    Ok(Json(paging.page(rows, |row| row.seq)?.map(FeedbackRow::from)))
 }
 
 /// Record a suggestion
@@ -64,5 +64,5 @@ pub(super) async fn create(
     let given = suggestion::give(&mut writer, &request.caller, id, &new).await?;
     let row = feedback::get(&mut writer, given).await?;
     let location = format!("/api/v1/preferences/{given}");
-    request.created(&app, writer, location, &row).await
+    request.created(&app, writer, location, &FeedbackRow::from(row)).await
 }

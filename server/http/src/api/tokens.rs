@@ -6,13 +6,13 @@ use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::tokens::Token;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::Administer;
 use gaitwright_service::access::tokens::{self as making, NewToken};
-use gaitwright_store::TokenId;
-use gaitwright_store::tokens::{self, Token};
+use gaitwright_store::{TokenId, tokens};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -43,7 +43,7 @@ pub(super) async fn list(
     paging: Paging<TokenId>,
 ) -> Result<Json<Page<Token>>, Refusal> {
     let all = tokens::all(&mut *app.read().await?).await?;
-    Ok(Json(paging.cut(all, |one| one.id)?))
+    Ok(Json(paging.cut(all, |one| one.id)?.map(Token::from)))
 }
 
 /// Get a token
@@ -61,7 +61,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<TokenId, Administer>,
 ) -> Result<Json<Token>, Refusal> {
-    Ok(Json(tokens::get(&mut *app.read().await?, id).await?))
+    Ok(Json(tokens::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Create a token
@@ -84,7 +84,7 @@ pub(super) async fn create(
     let mut writer = request.begin_secret(&app).await?;
     let (token, secret) = making::make(&mut writer, &request.actor, &new).await?;
     let location = format!("/api/v1/tokens/{}", token.id);
-    request.created(&app, writer, location, &CreatedToken { token, secret }).await
+    request.created(&app, writer, location, &CreatedToken { token: token.into(), secret }).await
 }
 
 /// Revoke a token
@@ -107,5 +107,5 @@ pub(super) async fn revoke(
         Err(before) => return Ok(before),
     };
     let token = making::revoke(&mut writer, &request.actor, id).await?;
-    request.done(&app, writer, &token).await
+    request.done(&app, writer, &Token::from(token)).await
 }

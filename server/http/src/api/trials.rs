@@ -7,19 +7,20 @@ use crate::csv_response::csv_response;
 use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::solve_reports::Iteration;
+use crate::resources::trials::{AttemptResult, Trial};
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gait_optimizer::{IterationRecord, TunedBounds};
+use gait_optimizer::TunedBounds;
 use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::command;
-use gaitwright_store::results::{self, AttemptResult};
-use gaitwright_store::trials::{self, Trial, TrialState};
+use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::trials_table::{self, Listing, SORTS};
-use gaitwright_store::{StudyId, TrialId, gaits, openapi_schemas, studies};
+use gaitwright_store::{StudyId, TrialId, gaits, results, studies};
 use serde::Deserialize;
 use std::collections::HashMap;
 
@@ -85,7 +86,7 @@ pub(super) async fn of_study(
     let (places, next) = paging.page(places, |(place, _)| *place)?.into_parts();
     let mut found = Vec::with_capacity(places.len());
     for (_, trial) in places {
-        found.push(trials::get(&mut reader, trial).await?);
+        found.push(trials::get(&mut reader, trial).await?.into());
     }
     Ok(Json(Page::of_parts(found, next)))
 }
@@ -123,7 +124,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<Trial>, Refusal> {
-    Ok(Json(trials::get(&mut *app.read().await?, id).await?))
+    Ok(Json(trials::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Cancel a trial
@@ -148,7 +149,7 @@ pub(super) async fn cancel(
         Err(before) => return Ok(before),
     };
     let trial = command::cancel(&mut writer, &request.actor, id, "Cancelled on request.").await?;
-    let answer = request.done(&app, writer, &trial).await?;
+    let answer = request.done(&app, writer, &Trial::from(trial)).await?;
     app.scheduler.cancel_solve(id).await;
     Ok(answer)
 }
@@ -175,7 +176,7 @@ pub(super) async fn retry(
         Err(before) => return Ok(before),
     };
     let trial = command::retry(&mut writer, &request.actor, id).await?;
-    request.done(&app, writer, &trial).await
+    request.done(&app, writer, &Trial::from(trial)).await
 }
 
 /// List iterations of a solve
@@ -187,7 +188,7 @@ pub(super) async fn retry(
     operation_id = "list_iterations",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "Iterations", body = Page<openapi_schemas::Iteration>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Iterations", body = Page<Iteration>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn iterations(
@@ -195,14 +196,14 @@ pub(super) async fn iterations(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
     paging: Paging<usize>,
-) -> Result<Json<Page<IterationRecord>>, Refusal> {
+) -> Result<Json<Page<Iteration>>, Refusal> {
     let records = if let Some(track) = app.scheduler.board().track(id) {
         track.records
     } else {
         let iterations = gaits::iterations(&mut *app.read().await?, id).await?;
         app.compute(move |pool| iterations.unpack(pool)).await??
     };
-    Ok(Json(paging.cut_by_place(records)?))
+    Ok(Json(paging.cut_by_place(records)?.map(Iteration::from)))
 }
 
 /// List attempts at a trial
@@ -224,7 +225,7 @@ pub(super) async fn attempts(
     paging: Paging<u32>,
 ) -> Result<Json<Page<AttemptResult>>, Refusal> {
     let attempts = results::of_trial(&mut *app.read().await?, id).await?;
-    Ok(Json(paging.cut(attempts, |attempt| attempt.attempt)?))
+    Ok(Json(paging.cut(attempts, |attempt| attempt.attempt)?.map(AttemptResult::from)))
 }
 
 async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
@@ -235,7 +236,7 @@ async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
     csv_response(app, &format!("trials-{}.csv", id.short()), move || written(&all)).await
 }
 
-fn written(all: &[Trial]) -> CsvTable {
+fn written(all: &[trials::Trial]) -> CsvTable {
     let mut header = vec!["number", "trial_id"];
     header.extend(TunedBounds::NAMES);
     header.extend([

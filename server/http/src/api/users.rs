@@ -7,14 +7,14 @@ use crate::authorization::SignedIn;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
+use crate::resources::users::User;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Administer, Right, Role};
 use gaitwright_service::error::Error;
-use gaitwright_store::UserId;
-use gaitwright_store::users::{self, User};
+use gaitwright_store::{UserId, users};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -63,7 +63,7 @@ pub(super) async fn list(
     paging: Paging<UserId>,
 ) -> Result<Json<Page<User>>, Refusal> {
     let all = users::all(&mut *app.read().await?).await?;
-    Ok(Json(paging.cut(all, |one| one.id)?))
+    Ok(Json(paging.cut(all, |one| one.id)?.map(User::from)))
 }
 
 /// Get a user
@@ -81,7 +81,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<UserId, Administer>,
 ) -> Result<Json<User>, Refusal> {
-    Ok(Json(users::get(&mut *app.read().await?, id).await?))
+    Ok(Json(users::get(&mut *app.read().await?, id).await?.into()))
 }
 
 /// Add a user
@@ -103,7 +103,8 @@ pub(super) async fn create(
         Err(before) => return Ok(before),
     };
     let user = user_administration::add(&mut writer, &request.actor, &new).await?;
-    request.created(&app, writer, format!("/api/v1/users/{}", user.id), &user).await
+    let location = format!("/api/v1/users/{}", user.id);
+    request.created(&app, writer, location, &User::from(user)).await
 }
 
 /// One-time sign-in link.
@@ -205,7 +206,7 @@ pub(super) async fn set_role(
         Err(before) => return Ok(before),
     };
     let user = user_administration::set_role(&mut writer, &request.actor, id, new.role).await?;
-    request.done(&app, writer, &user).await
+    request.done(&app, writer, &User::from(user)).await
 }
 
 async fn set_disabled(
@@ -219,5 +220,5 @@ async fn set_disabled(
         Err(before) => return Ok(before),
     };
     let user = user_administration::set_disabled(&mut writer, &request.actor, id, disabled).await?;
-    request.done(app, writer, &user).await
+    request.done(app, writer, &User::from(user)).await
 }

@@ -51,6 +51,7 @@ pub mod snapshot;
 pub mod solve_input;
 pub mod study_change;
 pub mod study_plan;
+pub mod study_plan_schemas;
 pub mod subject;
 pub mod suggestion;
 pub mod summary;

@@ -5,11 +5,9 @@ use gait_optimizer::Subject;
 use gait_optimizer::reference::distance;
 use gaitwright_store::Connection;
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
-use serde::Serialize;
-use utoipa::ToSchema;
 
 /// A reference gait and the distance between the measured person and a subject.
-#[derive(Debug, Clone, Serialize, ToSchema)]
+#[derive(Debug, Clone)]
 pub struct ReferenceGaitMatch {
     /// The reference gait.
     pub reference_gait: ReferenceGait,

@@ -2,7 +2,7 @@
 
 use super::search_space::{self, GivenSpace};
 use super::subject::{self, NewSubject};
-use super::{built_in_entries, membership};
+use super::{built_in_entries, membership, study_plan_schemas};
 use crate::access::{Caller, Reach};
 use crate::error::{Error, FieldError};
 use crate::printable;
@@ -11,8 +11,8 @@ use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, Tu
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
 use gaitwright_store::{
-    Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, openapi_schemas,
-    reference_gaits, studies, subjects,
+    Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
+    studies, subjects,
 };
 use serde::Deserialize;
 use serde_json::json;
@@ -39,23 +39,23 @@ pub struct NewStudy {
     pub muscles: bool,
     /// Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     #[serde(default)]
-    #[schema(value_type = openapi_schemas::GaitSettings)]
+    #[schema(value_type = study_plan_schemas::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.
     #[serde(default)]
-    #[schema(value_type = openapi_schemas::SolveOptions)]
+    #[schema(value_type = study_plan_schemas::SolveOptions)]
     pub solve_options: SolveOptions,
     /// Values of the bounds that are not tuned.
     #[serde(default)]
-    #[schema(value_type = openapi_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::Bounds)]
     pub base_bounds: TunedBounds,
     /// Tuned bounds and their values. Table I of the paper by default.
     #[serde(default)]
-    #[schema(value_type = Option<openapi_schemas::SearchSpace>)]
+    #[schema(value_type = Option<study_plan_schemas::SearchSpace>)]
     pub search_space: Option<GivenSpace>,
     /// Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
     #[serde(default)]
-    #[schema(value_type = openapi_schemas::LearnerSettings)]
+    #[schema(value_type = study_plan_schemas::LearnerSettings)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
     #[serde(default = "automatic")]

@@ -13,10 +13,8 @@ use super::presentations::{Judgement, Presentation, SELECT};
 use super::{
     Connection, Instant, LabControllerFileId, LabSessionId, PresentationId, StoreResult, StudyId, TrialId, now,
 };
-use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
-use utoipa::ToSchema;
 
 /// Draws which gait walk 2 of a session uses, balanced over the sessions with the same number of all subjects.
 ///
@@ -60,7 +58,7 @@ pub struct OfSession {
 }
 
 /// Download of the controller file of a walk.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ControllerFileDownload {
     /// Number of the walk, 2 or 3.
     pub walk: u8,

@@ -46,8 +46,7 @@ impl FromStr for Source {
 }
 
 /// Content of an entry, in terms of trials.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(tag = "kind", rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FeedbackContent {
     /// Label of a trial.
     Label {
@@ -73,7 +72,6 @@ pub enum FeedbackContent {
     /// An action would have been better than a trial.
     Suggestion {
         /// Index of the suggested action.
-        #[schema(value_type = u64)]
         suggested: ActionIndex,
         /// Trial that it would have been better than.
         over: TrialId,

@@ -7,13 +7,11 @@ pub use content::{FeedbackContent, Source};
 use super::many_rows::read_many;
 use super::{Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use gait_learner::ActionIndex;
-use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
-use utoipa::ToSchema;
 
 /// Entry of the feedback log.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FeedbackRow {
     /// Sequence number.
     pub seq: i64,
@@ -40,7 +38,7 @@ pub struct FeedbackRow {
 }
 
 /// Retraction of an answer.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Retraction {
     /// Who retracted it.
     pub author: String,

@@ -13,19 +13,16 @@ pub use state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
 use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body};
-use serde::Serialize;
 use serde_json::Value;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Study.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Study {
     /// Identifier.
     pub id: StudyId,
     /// Set-up.
-    #[serde(flatten)]
     pub plan: StudyPlan,
     /// Parent, if the study is a fork.
     pub forked_from: Option<StudyId>,

@@ -1,6 +1,6 @@
 //! Set-up of a study.
 
-use crate::{DeviceId, ReferenceGaitId, StoreError, StoreResult, SubjectId, openapi_schemas};
+use crate::{DeviceId, ReferenceGaitId, StoreError, StoreResult, SubjectId};
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
 use serde::{Deserialize, Serialize};
@@ -71,7 +71,7 @@ impl FromStr for Evaluation {
 }
 
 /// Set-up of a study.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct StudyPlan {
     /// Name shown to users.
     pub name: String,
@@ -79,7 +79,6 @@ pub struct StudyPlan {
     pub subject_id: SubjectId,
     /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
     /// entered first.
-    #[schema(value_type = Option<openapi_schemas::Body>)]
     pub body: Option<Body>,
     /// Device.
     pub device_id: DeviceId,
@@ -89,19 +88,14 @@ pub struct StudyPlan {
     /// C4).
     pub muscles: bool,
     /// Settings of the gait problem.
-    #[schema(value_type = openapi_schemas::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.
-    #[schema(value_type = openapi_schemas::SolveOptions)]
     pub solve_options: SolveOptions,
     /// Values of bounds that are not tuned.
-    #[schema(value_type = openapi_schemas::Bounds)]
     pub base_bounds: TunedBounds,
     /// Tuned bounds and their values, with each dimension named after its bound.
-    #[schema(value_type = openapi_schemas::SearchSpace)]
     pub search_space: SearchSpace,
     /// Settings of the learner.
-    #[schema(value_type = openapi_schemas::LearnerSettings)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
     pub feedback_mode: FeedbackMode,

@@ -7,16 +7,14 @@ pub use progress::{Measured, TrialCounts, counts, improvements, measured};
 pub use state::TrialState;
 
 use super::many_rows::read_many;
-use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now, openapi_schemas};
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now};
 use gait_learner::ActionIndex;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
-use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
-use utoipa::ToSchema;
 
 /// Trial of a study.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Identifier.
     pub id: TrialId,
@@ -25,10 +23,8 @@ pub struct Trial {
     /// Number within the study, from 1, in the order of proposal.
     pub number: u32,
     /// Index of the action in the search space.
-    #[schema(value_type = u64)]
     pub action_index: ActionIndex,
     /// Action as bounds.
-    #[schema(value_type = openapi_schemas::Bounds)]
     pub action: TunedBounds,
     /// Reason for the trial.
     pub reason: String,
@@ -41,7 +37,6 @@ pub struct Trial {
     /// State.
     pub state: TrialState,
     /// How the solve ended.
-    #[schema(value_type = Option<openapi_schemas::SolveStatus>)]
     pub status: Option<SolveStatus>,
     /// Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
     /// iterate.
@@ -57,10 +52,8 @@ pub struct Trial {
     /// Wall time of the solve, s.
     pub seconds_total: Option<f64>,
     /// All figures of the solve.
-    #[schema(value_type = Option<openapi_schemas::SolveReport>)]
     pub report: Option<SolveReport>,
     /// Most violated rows, worst first.
-    #[schema(value_type = Vec<openapi_schemas::Violation>)]
     pub violations: Vec<Violation>,
     /// Human-readable message about how the trial ended; may be empty.
     pub message: String,

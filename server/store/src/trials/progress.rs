@@ -1,12 +1,10 @@
 //! How far the trials of a study are, and how long solves take.
 
 use crate::{Connection, StoreResult, StudyId};
-use serde::Serialize;
 use sqlx::Row;
-use utoipa::ToSchema;
 
 /// Numbers of trials of a study by state.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TrialCounts {
     /// All trials.
     pub total: u32,

@@ -11,15 +11,12 @@ use gaitwright_compute::OnPool;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions;
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
-use gaitwright_store::{
-    Connection, LabSessionId, MeasurementFileId, Packed, PackedText, Store, Writer, gaits, openapi_schemas,
-};
+use gaitwright_store::{Connection, LabSessionId, MeasurementFileId, Packed, PackedText, Store, Writer, gaits};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use utoipa::ToSchema;
 
 /// Muscle activity of a walk over the gait cycle.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WalkActivity {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
@@ -29,20 +26,17 @@ pub struct WalkActivity {
     pub measurement_file_id: MeasurementFileId,
     /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
     /// the peak of walk 1.
-    #[schema(value_type = Vec<openapi_schemas::CycleActivity>)]
     pub channels: Vec<CycleActivity>,
     /// Mean of each channel over the cycle.
     pub averages: Vec<f64>,
     /// EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
-    #[schema(value_type = Option<openapi_schemas::EmgRmse>)]
     pub emg_rmse: Option<EmgRmse>,
 }
 
 /// Processed EMG recordings of a session.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EmgResult {
     /// Settings of the filters.
-    #[schema(value_type = openapi_schemas::EmgSettings)]
     pub settings: EmgSettings,
     /// Walks with an EMG recording.
     pub walks: Vec<WalkActivity>,
@@ -115,17 +109,16 @@ pub async fn keep_result(
 }
 
 /// Muscle activity of the model for a walk.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct WalkModel {
     /// Number of the walk, 2 or 3.
     pub walk: u8,
     /// Each channel whose muscle is in the model.
-    #[schema(value_type = Vec<openapi_schemas::ModelActivity>)]
     pub muscles: Vec<ModelActivity>,
 }
 
 /// Processed EMG of a session, with the model's muscle activity.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EmgView {
     /// Measured activity.
     pub result: EmgResult,
@@ -183,7 +176,7 @@ pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Resu
 }
 
 /// Limit cycles of a walk.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LimitCycles {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
@@ -192,7 +185,6 @@ pub struct LimitCycles {
     /// Cut-off frequency of the zero-phase low-pass filter before central differences, Hz.
     pub cutoff_hz: f64,
     /// Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
-    #[schema(value_type = Vec<openapi_schemas::PhasePortrait>)]
     pub joints: Vec<PhasePortrait>,
 }
 

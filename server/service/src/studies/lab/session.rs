@@ -79,7 +79,7 @@ impl LabSessionState {
 }
 
 /// Walk of a session.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct WalkView {
     /// Number of the walk, 1 to 3.
     pub number: u8,
@@ -92,7 +92,7 @@ pub struct WalkView {
 }
 
 /// Lab session, without blinded data.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LabSessionView {
     /// Identifier.
     pub id: LabSessionId,

@@ -1,0 +1,66 @@
+//! Assessments.
+
+use super::feedback::Retraction;
+use gaitwright_store::assessments::{self, AssessmentAnswer};
+use gaitwright_store::feedback::Source;
+use gaitwright_store::{AssessmentId, FeedbackId, Instant, StudyId, TrialId};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// A recorded assessment.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Assessment {
+    /// Identifier.
+    id: AssessmentId,
+    /// The study.
+    study_id: StudyId,
+    /// The trial with gait A.
+    trial_a: TrialId,
+    /// The trial with gait B.
+    trial_b: TrialId,
+    /// The answer.
+    answer: AssessmentAnswer,
+    /// Who answered.
+    source: Source,
+    /// Author.
+    author: String,
+    /// Free text.
+    note: String,
+    /// Preference that was derived from it, if any.
+    feedback_id: Option<FeedbackId>,
+    /// Time of recording.
+    created_at: Instant,
+    /// Retraction, if it was retracted.
+    retraction: Option<Retraction>,
+}
+
+impl From<assessments::Assessment> for Assessment {
+    fn from(row: assessments::Assessment) -> Self {
+        let assessments::Assessment {
+            id,
+            study_id,
+            trial_a,
+            trial_b,
+            answer,
+            source,
+            author,
+            note,
+            feedback_id,
+            created_at,
+            retraction,
+        } = row;
+        Self {
+            id,
+            study_id,
+            trial_a,
+            trial_b,
+            answer,
+            source,
+            author,
+            note,
+            feedback_id,
+            created_at,
+            retraction: retraction.map(Into::into),
+        }
+    }
+}

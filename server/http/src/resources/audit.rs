@@ -1,0 +1,36 @@
+//! Rows of the audit trail.
+
+use super::documents;
+use gaitwright_store::{Instant, audit};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+/// Row of the audit trail.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct AuditRow {
+    /// Sequence number.
+    seq: i64,
+    /// Time of the change.
+    at: Instant,
+    /// Who made the change.
+    actor: String,
+    /// Kind of change, such as `subject.add` or `study.pause`.
+    action: String,
+    /// What was changed, such as `study 0190...`.
+    object: String,
+    /// Details of the change, with the reason if there is one.
+    #[schema(value_type = documents::AuditDetail)]
+    detail: Value,
+    /// Hash of the previous row.
+    previous: String,
+    /// Hash over this row and the hash of the previous row.
+    hash: String,
+}
+
+impl From<audit::AuditRow> for AuditRow {
+    fn from(row: audit::AuditRow) -> Self {
+        let audit::AuditRow { seq, at, actor, action, object, detail, previous, hash } = row;
+        Self { seq, at, actor, action, object, detail, previous, hash }
+    }
+}

@@ -1,0 +1,237 @@
+//! Certificates of gaits.
+
+use gait_optimizer::certificate;
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+/// A certificate: the result of checking a gait independently of the optimiser.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Certificate {
+    /// Version of this layout and of its checks.
+    format_version: u32,
+    /// The gait that was checked; null if it is malformed.
+    certified: Option<CertifiedGait>,
+    /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
+    passed: bool,
+    /// Reasons if it failed; otherwise empty.
+    failures: Vec<String>,
+    /// Every quantity with its worst value and its limit.
+    checks: Vec<CertificateCheck>,
+    /// How the simulation ended early; null if it did not.
+    fall: Option<String>,
+    /// The stride-to-stride map.
+    return_map: Option<ReturnMap>,
+    /// The stride-to-stride map with a free hip velocity (zero dynamics).
+    free_hip_return_map: Option<ReturnMap>,
+    /// Largest pushes from which the walker recovers. Null if the gait is not stable.
+    pushes: Option<Pushes>,
+}
+
+impl From<certificate::Certificate> for Certificate {
+    fn from(certificate: certificate::Certificate) -> Self {
+        let certificate::Certificate {
+            format_version,
+            certified,
+            passed,
+            failures,
+            checks,
+            fall,
+            return_map,
+            free_hip_return_map,
+            pushes,
+        } = certificate;
+        Self {
+            format_version,
+            certified: certified.map(Into::into),
+            passed,
+            failures,
+            checks: checks.into_iter().map(Into::into).collect(),
+            fall,
+            return_map: return_map.map(Into::into),
+            free_hip_return_map: free_hip_return_map.map(Into::into),
+            pushes: pushes.map(Into::into),
+        }
+    }
+}
+
+/// What a certificate is about, computed from the gait.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct CertifiedGait {
+    /// SHA-256 of the gait as compact JSON, hexadecimal.
+    gait_sha256: String,
+    /// Version of the optimiser that made the certificate.
+    optimizer_version: String,
+    /// The subject.
+    subject: CertifiedSubject,
+    /// Name of the device. `differences` shows whether its values are those of the built-in device.
+    device: String,
+    /// Whether the muscle constraints were checked.
+    muscles: bool,
+    /// Values of the device and of the settings that differ from AMPRO3 and the default settings.
+    differences: Vec<CertifiedDifference>,
+    /// Mechanical cost of transport, computed with the unsmoothed magnitudes of the joint powers. The objective, and
+    /// therefore the `cost_of_transport` of a trial, uses smoothed magnitudes, which are smaller.
+    unsmoothed_cost_of_transport: f64,
+}
+
+impl From<certificate::CertifiedGait> for CertifiedGait {
+    fn from(gait: certificate::CertifiedGait) -> Self {
+        let certificate::CertifiedGait {
+            gait_sha256,
+            optimizer_version,
+            subject,
+            device,
+            muscles,
+            differences,
+            unsmoothed_cost_of_transport,
+        } = gait;
+        Self {
+            gait_sha256,
+            optimizer_version,
+            subject: subject.into(),
+            device,
+            muscles,
+            differences: differences.into_iter().map(Into::into).collect(),
+            unsmoothed_cost_of_transport,
+        }
+    }
+}
+
+/// Height and mass of a certified walker.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct CertifiedSubject {
+    /// Body height, m.
+    height_m: f64,
+    /// Body mass, kg.
+    body_mass_kg: f64,
+}
+
+impl From<gait_optimizer::Subject> for CertifiedSubject {
+    fn from(subject: gait_optimizer::Subject) -> Self {
+        let gait_optimizer::Subject { height_m, body_mass_kg } = subject;
+        Self { height_m, body_mass_kg }
+    }
+}
+
+/// A value that differs from the built-in problem.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct CertifiedDifference {
+    /// Name, as in the gait: `settings.limits.friction`, `device.knee_torque_limit_n_m`.
+    name: String,
+    /// Value of the gait; null if it is not set.
+    value: Value,
+    /// Value of the built-in problem; null if it is not set.
+    built_in: Value,
+}
+
+impl From<certificate::Difference> for CertifiedDifference {
+    fn from(difference: certificate::Difference) -> Self {
+        let certificate::Difference { name, value, built_in } = difference;
+        Self { name, value, built_in }
+    }
+}
+
+/// The worst value of a quantity.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct CertificateCheck {
+    /// What was measured.
+    name: String,
+    /// Unit of the value and the limit; empty if dimensionless.
+    unit: String,
+    /// Worst value; null if it could not be determined, which counts as failed.
+    value: Option<f64>,
+    /// Largest allowed value. Null if the value is only reported.
+    limit: Option<f64>,
+    /// Domain and time of the worst value.
+    place: String,
+}
+
+impl From<certificate::Check> for CertificateCheck {
+    fn from(check: certificate::Check) -> Self {
+        let certificate::Check { name, unit, value, limit, place } = check;
+        Self { name, unit, value, limit, place }
+    }
+}
+
+/// Stability of a gait, from the stride-to-stride map.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct ReturnMap {
+    /// Largest change of the state over one stride from the gait's own first state, rad and rad/s.
+    gait_residual: f64,
+    /// Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
+    fixed_point_residual: f64,
+    /// Largest component of the difference between the gait's first state and the fixed point, rad and rad/s.
+    fixed_point_distance: f64,
+    /// Multipliers from variational equations and saltation matrices, largest first.
+    multipliers: Vec<Multiplier>,
+    /// Largest modulus of the multipliers.
+    largest: f64,
+    /// Largest modulus of the multipliers, from finite differences of simulated domains.
+    largest_by_differences: f64,
+    /// Resolution of the finite differences.
+    differences_resolve: f64,
+    /// Fraction of a proportional change of all velocities that remains after one stride.
+    speed_kept: f64,
+    /// Change in other coordinates that a proportional change of all velocities causes within one stride, relative to its size.
+    speed_leak: f64,
+}
+
+impl From<certificate::ReturnMap> for ReturnMap {
+    fn from(map: certificate::ReturnMap) -> Self {
+        let certificate::ReturnMap {
+            gait_residual,
+            fixed_point_residual,
+            fixed_point_distance,
+            multipliers,
+            largest,
+            largest_by_differences,
+            differences_resolve,
+            speed_kept,
+            speed_leak,
+        } = map;
+        Self {
+            gait_residual,
+            fixed_point_residual,
+            fixed_point_distance,
+            multipliers: multipliers.into_iter().map(Into::into).collect(),
+            largest,
+            largest_by_differences,
+            differences_resolve,
+            speed_kept,
+            speed_leak,
+        }
+    }
+}
+
+/// A multiplier of the stride-to-stride map.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Multiplier {
+    /// Real part.
+    real: f64,
+    /// Imaginary part.
+    imaginary: f64,
+}
+
+impl From<certificate::Multiplier> for Multiplier {
+    fn from(multiplier: certificate::Multiplier) -> Self {
+        let certificate::Multiplier { real, imaginary } = multiplier;
+        Self { real, imaginary }
+    }
+}
+
+/// Largest changes in the hip's forward velocity from which the walker recovers, m/s.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Pushes {
+    /// Forwards.
+    forwards_m_s: f64,
+    /// Backwards.
+    backwards_m_s: f64,
+}
+
+impl From<certificate::Pushes> for Pushes {
+    fn from(pushes: certificate::Pushes) -> Self {
+        let certificate::Pushes { forwards_m_s, backwards_m_s } = pushes;
+        Self { forwards_m_s, backwards_m_s }
+    }
+}

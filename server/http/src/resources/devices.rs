@@ -1,0 +1,28 @@
+//! Devices.
+
+use super::documents;
+use gait_optimizer::Device as Definition;
+use gaitwright_store::{DeviceId, Instant, devices};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Device. Changing a definition creates a new device, so that studies keep the one they use.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Device {
+    /// Identifier.
+    id: DeviceId,
+    /// Name shown to users.
+    name: String,
+    /// Definition of the device.
+    #[schema(value_type = documents::DeviceDefinition)]
+    definition: Definition,
+    /// Time of creation.
+    created_at: Instant,
+}
+
+impl From<devices::Device> for Device {
+    fn from(row: devices::Device) -> Self {
+        let devices::Device { id, name, definition, created_at } = row;
+        Self { id, name, definition, created_at }
+    }
+}

@@ -1,0 +1,129 @@
+//! Entries of the feedback log, and retractions.
+
+use gait_learner::ActionIndex;
+use gaitwright_store::feedback::{self, Source};
+use gaitwright_store::{FeedbackId, Instant, StudyId, TrialId};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Entry of the feedback log.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct FeedbackRow {
+    /// Sequence number.
+    seq: i64,
+    /// Identifier.
+    id: FeedbackId,
+    /// The study.
+    study_id: StudyId,
+    /// Content of the entry.
+    content: FeedbackContent,
+    /// Who or what it came from.
+    source: Source,
+    /// Author.
+    author: String,
+    /// Free text.
+    note: String,
+    /// Whether it comes from a rater's blind comparison.
+    by_rater: bool,
+    /// Whether the rater could have known the allocation, so that the entry does not count as blind.
+    could_have_known: bool,
+    /// Time of recording.
+    created_at: Instant,
+    /// Retraction, if it was retracted.
+    retraction: Option<Retraction>,
+}
+
+impl From<feedback::FeedbackRow> for FeedbackRow {
+    fn from(row: feedback::FeedbackRow) -> Self {
+        let feedback::FeedbackRow {
+            seq,
+            id,
+            study_id,
+            content,
+            source,
+            author,
+            note,
+            by_rater,
+            could_have_known,
+            created_at,
+            retraction,
+        } = row;
+        Self {
+            seq,
+            id,
+            study_id,
+            content: content.into(),
+            source,
+            author,
+            note,
+            by_rater,
+            could_have_known,
+            created_at,
+            retraction: retraction.map(Into::into),
+        }
+    }
+}
+
+/// Content of an entry, in terms of trials.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub(crate) enum FeedbackContent {
+    /// Label of a trial.
+    Label {
+        /// The trial.
+        trial: TrialId,
+        /// Category: 0 for not converged, 1 for converged.
+        category: u32,
+    },
+    /// One trial is better than another.
+    Preference {
+        /// Better trial.
+        winner: TrialId,
+        /// Worse trial.
+        loser: TrialId,
+    },
+    /// Two trials are equally good.
+    Tie {
+        /// One trial.
+        a: TrialId,
+        /// The other trial.
+        b: TrialId,
+    },
+    /// An action would have been better than a trial.
+    Suggestion {
+        /// Index of the suggested action.
+        #[schema(value_type = u64)]
+        suggested: ActionIndex,
+        /// Trial that it would have been better than.
+        over: TrialId,
+    },
+}
+
+impl From<feedback::FeedbackContent> for FeedbackContent {
+    fn from(content: feedback::FeedbackContent) -> Self {
+        match content {
+            feedback::FeedbackContent::Label { trial, category } => Self::Label { trial, category },
+            feedback::FeedbackContent::Preference { winner, loser } => Self::Preference { winner, loser },
+            feedback::FeedbackContent::Tie { a, b } => Self::Tie { a, b },
+            feedback::FeedbackContent::Suggestion { suggested, over } => Self::Suggestion { suggested, over },
+        }
+    }
+}
+
+/// Retraction of an answer.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Retraction {
+    /// Who retracted it.
+    author: String,
+    /// Reason, never empty.
+    reason: String,
+    /// Time of the retraction.
+    created_at: Instant,
+}
+
+impl From<feedback::Retraction> for Retraction {
+    fn from(row: feedback::Retraction) -> Self {
+        let feedback::Retraction { author, reason, created_at } = row;
+        Self { author, reason, created_at }
+    }
+}

@@ -1,0 +1,139 @@
+//! Lab sessions.
+
+use gaitwright_service::studies::lab::{self, AnswerView, Condition, LabSessionState};
+use gaitwright_store::{Instant, LabSessionId, StudyId, TrialId, allocations, lab_sessions};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Completed step of a session.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct LabSessionStep {
+    /// Reason or note.
+    note: String,
+    /// Who did it.
+    actor: String,
+    /// Time.
+    at: Instant,
+}
+
+impl From<lab_sessions::LabSessionStep> for LabSessionStep {
+    fn from(row: lab_sessions::LabSessionStep) -> Self {
+        let lab_sessions::LabSessionStep { note, actor, at } = row;
+        Self { note, actor, at }
+    }
+}
+
+/// Download of the controller file of a walk.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct ControllerFileDownload {
+    /// Number of the walk, 2 or 3.
+    walk: u8,
+    /// Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
+    to_device: bool,
+    /// Who fetched it.
+    actor: String,
+    /// Time.
+    at: Instant,
+}
+
+impl From<allocations::ControllerFileDownload> for ControllerFileDownload {
+    fn from(row: allocations::ControllerFileDownload) -> Self {
+        let allocations::ControllerFileDownload { walk, to_device, actor, at } = row;
+        Self { walk, to_device, actor, at }
+    }
+}
+
+/// Walk of a session.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct WalkView {
+    /// Number of the walk, 1 to 3.
+    number: u8,
+    /// Condition of the walk. Absent while it is blinded.
+    condition: Option<Condition>,
+    /// Who recorded the walk, and when.
+    recorded: Option<LabSessionStep>,
+    /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
+    after_unblinding: bool,
+}
+
+impl From<lab::WalkView> for WalkView {
+    fn from(walk: lab::WalkView) -> Self {
+        let lab::WalkView { number, condition, recorded, after_unblinding } = walk;
+        Self { number, condition, recorded: recorded.map(Into::into), after_unblinding }
+    }
+}
+
+/// Lab session, without blinded data.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct LabSessionView {
+    /// Identifier.
+    id: LabSessionId,
+    /// The study.
+    study_id: StudyId,
+    /// Number of the session in this study, from 1.
+    number: u32,
+    /// State of the session.
+    state: LabSessionState,
+    /// The trial with the first of the two gaits. Does not imply the order of the walks.
+    trial_a: TrialId,
+    /// The trial with the second of the two gaits.
+    trial_b: TrialId,
+    /// Free text.
+    notes: String,
+    /// The three walks.
+    walks: Vec<WalkView>,
+    /// Current answer of the subject. Absent if there is none.
+    answer: Option<AnswerView>,
+    /// Who unblinded the session, when and why. Absent while it is blinded.
+    unblinded: Option<LabSessionStep>,
+    /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
+    /// it.
+    allocation_included: bool,
+    /// Who fetched controller files of the walks.
+    controller_files: Vec<ControllerFileDownload>,
+    /// Who closed the session, and when.
+    closed: Option<LabSessionStep>,
+    /// Who planned the session.
+    planned_by: String,
+    /// Time of planning.
+    created_at: Instant,
+}
+
+impl From<lab::LabSessionView> for LabSessionView {
+    fn from(session: lab::LabSessionView) -> Self {
+        let lab::LabSessionView {
+            id,
+            study_id,
+            number,
+            state,
+            trial_a,
+            trial_b,
+            notes,
+            walks,
+            answer,
+            unblinded,
+            allocation_included,
+            controller_files,
+            closed,
+            planned_by,
+            created_at,
+        } = session;
+        Self {
+            id,
+            study_id,
+            number,
+            state,
+            trial_a,
+            trial_b,
+            notes,
+            walks: walks.into_iter().map(Into::into).collect(),
+            answer,
+            unblinded: unblinded.map(Into::into),
+            allocation_included,
+            controller_files: controller_files.into_iter().map(Into::into).collect(),
+            closed: closed.map(Into::into),
+            planned_by,
+            created_at,
+        }
+    }
+}

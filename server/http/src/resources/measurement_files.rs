@@ -1,0 +1,35 @@
+//! Measurement files.
+
+use gaitwright_store::measurement_files::{self, MeasurementKind};
+use gaitwright_store::{Instant, LabSessionId, MeasurementFileId};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Measurement file, without its content.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct MeasurementFile {
+    /// Identifier.
+    id: MeasurementFileId,
+    /// The session.
+    session_id: LabSessionId,
+    /// Number of the walk, 1 to 3.
+    walk: u8,
+    /// Kind of measurement.
+    kind: MeasurementKind,
+    /// Name of the file, if it is known.
+    file_name: Option<String>,
+    /// SHA-256 of the file.
+    raw_sha256: String,
+    /// Who uploaded it.
+    actor: String,
+    /// Time of the upload.
+    created_at: Instant,
+}
+
+impl From<measurement_files::MeasurementFile> for MeasurementFile {
+    fn from(row: measurement_files::MeasurementFile) -> Self {
+        let measurement_files::MeasurementFile { id, session_id, walk, kind, file_name, raw_sha256, actor, created_at } =
+            row;
+        Self { id, session_id, walk, kind, file_name, raw_sha256, actor, created_at }
+    }
+}

@@ -1,0 +1,186 @@
+//! Studies.
+
+use gait_learner::{LearnerSettings, SearchSpace};
+use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
+use gaitwright_service::studies::study_plan_schemas;
+use gaitwright_store::studies::{self, Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Study.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Study {
+    /// Identifier.
+    id: StudyId,
+    /// Set-up.
+    #[serde(flatten)]
+    plan: StudyPlan,
+    /// Parent, if the study is a fork.
+    forked_from: Option<StudyId>,
+    /// State.
+    state: StudyState,
+    /// Reason for the state; may be empty.
+    state_reason: String,
+    /// Revision, which increases with each change.
+    revision: i64,
+    /// Tags, by which people find the study.
+    tags: Vec<String>,
+    /// Notes of people.
+    notes: String,
+    /// Time at which it was archived. Lists do not show archived studies unless asked.
+    archived_at: Option<Instant>,
+    /// Time of creation.
+    created_at: Instant,
+    /// Time of the last change.
+    updated_at: Instant,
+}
+
+impl From<studies::Study> for Study {
+    fn from(row: studies::Study) -> Self {
+        let studies::Study {
+            id,
+            plan,
+            forked_from,
+            state,
+            state_reason,
+            revision,
+            tags,
+            notes,
+            archived_at,
+            created_at,
+            updated_at,
+        } = row;
+        Self {
+            id,
+            plan: plan.into(),
+            forked_from,
+            state,
+            state_reason,
+            revision,
+            tags,
+            notes,
+            archived_at,
+            created_at,
+            updated_at,
+        }
+    }
+}
+
+/// Set-up of a study.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct StudyPlan {
+    /// Name shown to users.
+    name: String,
+    /// Subject of the study.
+    subject_id: SubjectId,
+    /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
+    /// entered first.
+    body: Option<Body>,
+    /// Device.
+    device_id: DeviceId,
+    /// Reference gait for Gait RMSE.
+    reference_gait_id: ReferenceGaitId,
+    /// Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
+    /// C4).
+    muscles: bool,
+    /// Settings of the gait problem.
+    #[schema(value_type = study_plan_schemas::GaitSettings)]
+    gait_settings: Box<GaitSettings>,
+    /// Limits of one solve.
+    #[schema(value_type = study_plan_schemas::SolveOptions)]
+    solve_options: SolveOptions,
+    /// Values of bounds that are not tuned.
+    #[schema(value_type = study_plan_schemas::Bounds)]
+    base_bounds: TunedBounds,
+    /// Tuned bounds and their values, with each dimension named after its bound.
+    #[schema(value_type = study_plan_schemas::SearchSpace)]
+    search_space: SearchSpace,
+    /// Settings of the learner.
+    #[schema(value_type = study_plan_schemas::LearnerSettings)]
+    learner: LearnerSettings,
+    /// Who answers comparisons.
+    feedback_mode: FeedbackMode,
+    /// Who evaluates trials.
+    evaluation: Evaluation,
+    /// Number of trials.
+    trial_budget: u32,
+    /// Total solve time, s, after which no new trial starts.
+    solve_seconds_budget: Option<f64>,
+    /// The study finishes when the best action has not changed over this many results.
+    unchanged_limit: Option<u32>,
+    /// Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
+    /// Always true for studies created by versions without this setting.
+    repeat_results: bool,
+    /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
+    parallel_trials: u32,
+    /// Priority, -10 to 10. Higher values run first.
+    priority: i32,
+    /// Seed for all random draws except allocations.
+    seed: u64,
+}
+
+impl From<studies::StudyPlan> for StudyPlan {
+    fn from(row: studies::StudyPlan) -> Self {
+        let studies::StudyPlan {
+            name,
+            subject_id,
+            body,
+            device_id,
+            reference_gait_id,
+            muscles,
+            gait_settings,
+            solve_options,
+            base_bounds,
+            search_space,
+            learner,
+            feedback_mode,
+            evaluation,
+            trial_budget,
+            solve_seconds_budget,
+            unchanged_limit,
+            repeat_results,
+            parallel_trials,
+            priority,
+            seed,
+        } = row;
+        Self {
+            name,
+            subject_id,
+            body: body.map(Into::into),
+            device_id,
+            reference_gait_id,
+            muscles,
+            gait_settings,
+            solve_options,
+            base_bounds,
+            search_space,
+            learner,
+            feedback_mode,
+            evaluation,
+            trial_budget,
+            solve_seconds_budget,
+            unchanged_limit,
+            repeat_results,
+            parallel_trials,
+            priority,
+            seed,
+        }
+    }
+}
+
+/// Height and mass of a subject.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Body {
+    /// Body height, m.
+    height_m: f64,
+    /// Body mass, kg.
+    body_mass_kg: f64,
+}
+
+impl From<gait_optimizer::Subject> for Body {
+    fn from(subject: gait_optimizer::Subject) -> Self {
+        let gait_optimizer::Subject { height_m, body_mass_kg } = subject;
+        Self { height_m, body_mass_kg }
+    }
+}

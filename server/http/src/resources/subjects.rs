@@ -1,0 +1,76 @@
+//! Subjects, corrections and consents.
+
+use gaitwright_store::consents::{self, ConsentKind};
+use gaitwright_store::{Instant, SubjectId, subjects};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Subject, known by a pseudonym only.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Subject {
+    /// Identifier.
+    id: SubjectId,
+    /// Unique pseudonym assigned by the site.
+    pseudonym: String,
+    /// Body height, m.
+    height_m: f64,
+    /// Body mass, kg.
+    body_mass_kg: f64,
+    /// Free text.
+    notes: String,
+    /// Time of creation.
+    created_at: Instant,
+}
+
+impl From<subjects::Subject> for Subject {
+    fn from(row: subjects::Subject) -> Self {
+        let subjects::Subject { id, pseudonym, height_m, body_mass_kg, notes, created_at } = row;
+        Self { id, pseudonym, height_m, body_mass_kg, notes, created_at }
+    }
+}
+
+/// Correction of height and mass.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Correction {
+    /// Sequence number.
+    seq: i64,
+    /// Corrected body height, m.
+    height_m: f64,
+    /// Corrected body mass, kg.
+    body_mass_kg: f64,
+    /// Reason.
+    reason: String,
+    /// Who corrected it.
+    actor: String,
+    /// Time of the correction.
+    created_at: Instant,
+}
+
+impl From<subjects::Correction> for Correction {
+    fn from(row: subjects::Correction) -> Self {
+        let subjects::Correction { seq, height_m, body_mass_kg, reason, actor, created_at } = row;
+        Self { seq, height_m, body_mass_kg, reason, actor, created_at }
+    }
+}
+
+/// A subject's consent, or withdrawal of consent. The newest entry applies.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Consent {
+    /// Sequence number.
+    seq: i64,
+    /// Consent or withdrawal.
+    kind: ConsentKind,
+    /// For consent, the name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
+    note: String,
+    /// Who recorded it.
+    actor: String,
+    /// Time of recording.
+    created_at: Instant,
+}
+
+impl From<consents::Consent> for Consent {
+    fn from(row: consents::Consent) -> Self {
+        let consents::Consent { seq, kind, note, actor, created_at } = row;
+        Self { seq, kind, note, actor, created_at }
+    }
+}

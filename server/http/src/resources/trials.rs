@@ -1,0 +1,165 @@
+//! Trials and their attempts.
+
+use super::solve_reports::{SolveReport, SolveStatus, Violation};
+use gait_learner::ActionIndex;
+use gait_optimizer::TunedBounds;
+use gaitwright_service::studies::study_plan_schemas;
+use gaitwright_store::trials::{self, TrialState};
+use gaitwright_store::{Instant, StudyId, TrialId, results};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Trial of a study.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Trial {
+    /// Identifier.
+    id: TrialId,
+    /// The study it belongs to.
+    study_id: StudyId,
+    /// Number within the study, from 1, in the order of proposal.
+    number: u32,
+    /// Index of the action in the search space.
+    #[schema(value_type = u64)]
+    action_index: ActionIndex,
+    /// Action as bounds.
+    #[schema(value_type = study_plan_schemas::Bounds)]
+    action: TunedBounds,
+    /// Reason for the trial.
+    reason: String,
+    /// Best trial when this one was proposed.
+    best_before: Option<TrialId>,
+    /// Trial whose gait is the warm start. Absent for a cold start.
+    warm_started_from: Option<TrialId>,
+    /// Script that evaluates the trial. Absent if the service does.
+    asked_by: Option<String>,
+    /// State.
+    state: TrialState,
+    /// How the solve ended.
+    status: Option<SolveStatus>,
+    /// Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
+    /// iterate.
+    gait_rmse_rad: Option<f64>,
+    /// Cost of transport of a converged gait, dimensionless.
+    cost_of_transport: Option<f64>,
+    /// Objective of the solve.
+    objective: Option<f64>,
+    /// Largest violation, scaled.
+    max_violation: Option<f64>,
+    /// Interior-point iterations.
+    iterations: Option<u32>,
+    /// Wall time of the solve, s.
+    seconds_total: Option<f64>,
+    /// All figures of the solve.
+    report: Option<SolveReport>,
+    /// Most violated rows, worst first.
+    violations: Vec<Violation>,
+    /// Human-readable message about how the trial ended; may be empty.
+    message: String,
+    /// Time of proposal.
+    created_at: Instant,
+    /// Time at which a worker first started it.
+    started_at: Option<Instant>,
+    /// Time at which it ended.
+    finished_at: Option<Instant>,
+}
+
+impl From<trials::Trial> for Trial {
+    fn from(row: trials::Trial) -> Self {
+        let trials::Trial {
+            id,
+            study_id,
+            number,
+            action_index,
+            action,
+            reason,
+            best_before,
+            warm_started_from,
+            asked_by,
+            state,
+            status,
+            gait_rmse_rad,
+            cost_of_transport,
+            objective,
+            max_violation,
+            iterations,
+            seconds_total,
+            report,
+            violations,
+            message,
+            created_at,
+            started_at,
+            finished_at,
+        } = row;
+        Self {
+            id,
+            study_id,
+            number,
+            action_index,
+            action,
+            reason,
+            best_before,
+            warm_started_from,
+            asked_by,
+            state,
+            status: status.map(Into::into),
+            gait_rmse_rad,
+            cost_of_transport,
+            objective,
+            max_violation,
+            iterations,
+            seconds_total,
+            report: report.map(Into::into),
+            violations: violations.into_iter().map(Into::into).collect(),
+            message,
+            created_at,
+            started_at,
+            finished_at,
+        }
+    }
+}
+
+/// Numbers of trials of a study by state.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct TrialCounts {
+    /// All trials.
+    total: u32,
+    /// Queued or running trials.
+    open: u32,
+    /// Converged trials.
+    converged: u32,
+    /// Trials that did not converge.
+    not_converged: u32,
+    /// Failed, lost or cancelled trials.
+    without_result: u32,
+}
+
+impl From<trials::TrialCounts> for TrialCounts {
+    fn from(counts: trials::TrialCounts) -> Self {
+        let trials::TrialCounts { total, open, converged, not_converged, without_result } = counts;
+        Self { total, open, converged, not_converged, without_result }
+    }
+}
+
+/// Result of an attempt.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct AttemptResult {
+    /// Number of the attempt, from 1.
+    attempt: u32,
+    /// Name of the worker.
+    worker: String,
+    /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
+    taken: bool,
+    /// How the solve ended.
+    status: SolveStatus,
+    /// Figures of the solve. Figures that are not finite are omitted.
+    report: Option<SolveReport>,
+    /// Time of arrival.
+    received_at: Instant,
+}
+
+impl From<results::AttemptResult> for AttemptResult {
+    fn from(row: results::AttemptResult) -> Self {
+        let results::AttemptResult { attempt, worker, taken, status, report, received_at } = row;
+        Self { attempt, worker, taken, status: status.into(), report: report.map(Into::into), received_at }
+    }
+}

@@ -1,0 +1,30 @@
+//! Users.
+
+use gaitwright_store::rights::Role;
+use gaitwright_store::{Instant, UserId, users};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// User.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct User {
+    /// Identifier.
+    id: UserId,
+    /// Name or code, unique ignoring case.
+    name: String,
+    /// Role.
+    role: Role,
+    /// Whether the user has a password. Otherwise only one-time links work.
+    has_password: bool,
+    /// Time at which the user was disabled, if disabled.
+    disabled_at: Option<Instant>,
+    /// Time of creation.
+    created_at: Instant,
+}
+
+impl From<users::User> for User {
+    fn from(row: users::User) -> Self {
+        let users::User { id, name, role, has_password, disabled_at, created_at, password: _ } = row;
+        Self { id, name, role, has_password, disabled_at, created_at }
+    }
+}

@@ -1,0 +1,39 @@
+//! Schemas of the parts of a study plan that commands receive and REST serves as other crates read and write them.
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// Settings of the gait problem.
+#[derive(Debug, ToSchema)]
+pub struct GaitSettings(pub BTreeMap<String, Value>);
+
+/// Limits of one solve.
+#[derive(Debug, ToSchema)]
+pub struct SolveOptions(pub BTreeMap<String, Value>);
+
+/// Settings of the learner.
+#[derive(Debug, ToSchema)]
+pub struct LearnerSettings(pub BTreeMap<String, Value>);
+
+/// The tuned bounds of one action.
+#[derive(Debug, ToSchema)]
+pub struct Bounds(pub BTreeMap<String, Value>);
+
+/// A grid of actions.
+#[derive(Debug, ToSchema)]
+pub struct SearchSpace {
+    /// One dimension for each tuned bound.
+    pub dimensions: Vec<Dimension>,
+}
+
+/// One tuned bound of a search space.
+#[derive(Debug, ToSchema)]
+pub struct Dimension {
+    /// Name of the bound.
+    pub name: String,
+    /// Its values, ascending.
+    pub values: Vec<f64>,
+    /// How far apart two values can be while their gaits are still expected to have similar utility.
+    pub lengthscale: f64,
+}
