@@ -91,8 +91,6 @@ pub(super) fn state(document: &mut Value) {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
             set(schemas, component, "source", one);
         }
-        let assessments = json!({ "enum": ["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"] });
-        set(schemas, "NewAssessment", "answer", assessments);
         let answers = json!({ "enum": [
             "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both",
         ] });

@@ -1,4 +1,4 @@
-//! The errors of the service. `http::problem` maps them to HTTP responses.
+//! The errors of the service. `http::problem_details` maps them to HTTP responses.
 
 use crate::studies::lifecycle::NotPossible;
 use crate::workers::DispatchError;

@@ -241,7 +241,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, token).await?;
     let (token, number) = (shown.presentation.token.clone(), shown.presentation.number);
-    let not_blind = shown.presentation.unblinded
+    let not_blind = shown.presentation.could_have_known
         || blind::could_have_known(&mut reader, caller, shown.presentation.study_id).await?;
     if shown.presentation.answer.is_some() {
         let saved = read_back(&mut reader, shown).await?;

@@ -37,7 +37,7 @@ pub(super) async fn answers(
             continue;
         };
         let author = printable::person(&row.author);
-        let walked = sessions.iter().filter(|session| sorted(session.gait_one, session.gait_two) == compared).count();
+        let walked = sessions.iter().filter(|session| sorted(session.trial_a, session.trial_b) == compared).count();
         let most = if author == printable::person(subject) { 1 + walked } else { 1 };
         let count = answered.entry((compared, author)).or_default();
         *count += 1;

@@ -181,7 +181,7 @@ async fn lab(
 ) -> Result<Vec<LabSession>, Error> {
     let sessions = at("lab_sessions", lab_sessions::of_study(db, study).await)?;
     for session in &sessions {
-        at(format!("lab session {}", session.id), of_gaits(trials, [session.gait_one, session.gait_two]))?;
+        at(format!("lab session {}", session.id), of_gaits(trials, [session.trial_a, session.trial_b]))?;
         for found in at("measurement_files", measurement_files::of_session(db, session.id).await)? {
             at(format!("measurement file {}", found.id), lab::check_kept(db, pool, &found).await)?;
         }
