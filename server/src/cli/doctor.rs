@@ -24,7 +24,7 @@ enum Found {
     Good(String),
     Bad(String),
 }
-use Found::{Good, Bad};
+use Found::{Bad, Good};
 
 impl Doctor {
     pub(super) fn flags(&self) -> Flags {

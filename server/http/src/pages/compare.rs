@@ -34,6 +34,7 @@ use gaitwright_service::studies::walkable;
 use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::idempotency::{self, Kept, fingerprint};
+use gaitwright_store::presentations::Judgement;
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
     AssessmentId, Connection, FeedbackId, Instant, StudyId, TrialId, assessments, commit, events, feedback, gaits,
@@ -373,7 +374,7 @@ impl GivenAnswer {
     async fn still_closes(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
         match self {
             Self::Assessment(given) if self.is_about_safety() => {
-                let gaits = given.answer.unsafe_of((given.first, given.second));
+                let gaits = Judgement::from(given.answer).unsafe_of((given.trial_a, given.trial_b));
                 Ok(SafetyReports::read(db, study).await?.close_all(&gaits))
             }
             _ => Ok(true),
