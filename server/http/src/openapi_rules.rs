@@ -31,7 +31,7 @@ const NAMES: [(&str, &str, u32); 12] = [
     ("NewStudy", "name", 120),
     ("Change", "name", 120),
     ("Fork", "name", 120),
-    ("Ask", "worker", 80),
+    ("Ask", "script", 80),
     ("NewPreference", "author", 80),
     ("NewAssessment", "author", 80),
     ("NewSafetyReport", "author", 80),
