@@ -1,4 +1,4 @@
-//! Gaitwright: a preference-learning tuning service for walking gaits of powered prostheses.
+//! Gaitwright tunes walking gaits for powered prostheses by preference learning.
 
 // Commands print through `cli::output`, which handles closed pipes and full disks.
 #![warn(clippy::print_stdout, clippy::print_stderr)]

@@ -18,13 +18,13 @@ fn doctor(folder: &Path, arguments: &[&str]) -> (Option<i32>, Vec<String>) {
     (output.status.code(), text.lines().map(str::to_owned).collect())
 }
 
-/// The only trouble of a run, which fails.
+/// The only error of a run, which fails.
 #[track_caller]
-fn trouble((code, lines): (Option<i32>, Vec<String>)) -> String {
+fn only_error((code, lines): (Option<i32>, Vec<String>)) -> String {
     assert_eq!(code, Some(1), "{lines:?}");
-    let mut troubles = lines.iter().filter(|line| line.starts_with("trouble"));
-    let found = troubles.next().expect("a trouble").clone();
-    assert!(troubles.next().is_none(), "{lines:?}");
+    let mut errors = lines.iter().filter(|line| line.starts_with("error "));
+    let found = errors.next().expect("an error").clone();
+    assert!(errors.next().is_none(), "{lines:?}");
     found
 }
 
@@ -42,7 +42,7 @@ fn doctor_describes_a_machine_without_a_record_and_creates_nothing() {
     let said: Vec<&str> = lines.iter().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
     assert_eq!(said, ["program", "kernels", "disk", "record", "clock", "broker"]);
     assert!(lines.iter().all(|line| line.starts_with("ok ")), "{lines:?}");
-    assert!(lines[3].contains("there is none yet"), "{lines:?}");
+    assert!(lines[3].contains("no record yet at"), "{lines:?}");
     assert!(cli::files(folder.path()).is_empty());
 }
 
@@ -57,7 +57,7 @@ async fn doctor_reports_a_clock_that_was_set_back() {
     access_clock::reach(&mut writer, "2099-01-01T00:00:00.000Z".parse().unwrap()).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
-    let clock = trouble(doctor(folder.path(), &["--database", "a.db"]));
+    let clock = only_error(doctor(folder.path(), &["--database", "a.db"]));
     assert!(clock.contains("clock") && clock.contains("was set back"), "{clock}");
 }
 
@@ -65,16 +65,16 @@ async fn doctor_reports_a_clock_that_was_set_back() {
 async fn doctor_reports_a_changed_row() {
     let (folder, database) = filled().await;
     change(&database, "update subjects set notes = 'forged'").await;
-    let record = trouble(doctor(folder.path(), &["--database", "a.db"]));
+    let record = only_error(doctor(folder.path(), &["--database", "a.db"]));
     assert!(record.contains("record") && record.contains("of subjects was changed"), "{record}");
 }
 
 #[test]
 fn doctor_reports_an_unreachable_broker_and_a_missing_folder() {
     let folder = tempfile::tempdir().unwrap();
-    let broker = trouble(doctor(folder.path(), &["--nats", "nats://127.0.0.1:1"]));
+    let broker = only_error(doctor(folder.path(), &["--nats", "nats://127.0.0.1:1"]));
     assert!(broker.contains("The NATS broker failed"), "{broker}");
-    let disk = trouble(doctor(folder.path(), &["--database", "no/such/a.db"]));
+    let disk = only_error(doctor(folder.path(), &["--database", "no/such/a.db"]));
     assert!(disk.contains("does not exist"), "{disk}");
 }
 

@@ -17,7 +17,7 @@ Installed-Size: {kibibytes}
 Depends: libc6 (>= {glibc}), libgcc-s1
 Section: science
 Priority: optional
-Description: preference-learning tuning service for walking gaits
+Description: tuning of walking gaits for powered prostheses
  Gaitwright tunes walking gaits of powered prostheses: an optimiser computes
  gaits, a preference learner proposes bounds, people or motion capture compare.
 """

@@ -28,6 +28,7 @@ mod network;
 pub mod openapi;
 mod openapi_binary;
 mod openapi_dependent_rules;
+mod openapi_descriptions;
 mod openapi_rules;
 mod openapi_settings;
 pub mod page_error;

@@ -17,16 +17,34 @@ use utoipa_axum::router::OpenApiRouter;
 #[openapi(
     info(
         title = "Gaitwright",
-        description = "A preference-learning tuning service for walking gaits of powered prostheses. Research software; \
-                       not a medical device.\n\nThe published method, or the paper, is: Li, Tucker, Gehlhar, Yue, Ames, \
-                       Natural Multicontact Walking for Robotic Assistive Devices via Musculoskeletal Models and \
-                       Hybrid Zero Dynamics, IEEE Robotics and Automation Letters 2022.\n\nLengths are in metres, masses \
-                       in kilograms and angles in radians, unless a name or a description says otherwise. Times are \
-                       RFC 3339 in UTC. Whole numbers are written without a fraction: 10, not 10.0.\n\nLists come in \
-                       pages: `items` has the entries, and `next` is the `cursor` of the next page.",
+        description = "A service that tunes walking gaits for powered prostheses by preference learning. Research software; \
+                       not a medical device.\n\n*The paper* and *the published method* refer to Li, Tucker, Gehlhar, Yue, \
+                       Ames, *Natural Multicontact Walking for Robotic Assistive Devices via Musculoskeletal Models and \
+                       Hybrid Zero Dynamics*, IEEE Robotics and Automation Letters, 2022.\n\nLengths are in metres, masses \
+                       in kilograms and angles in radians, unless a name or a description says otherwise. Times are in UTC \
+                       (RFC 3339). Whole numbers are written without a fraction: 10, not 10.0.\n\nLists are paginated: \
+                       `items` has the entries, and `next` is the `cursor` of the next page.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
-    servers((url = "/"))
+    servers((url = "/")),
+    tags(
+        (name = "access", description = "Users, tokens, sign-in sessions, and members of studies."),
+        (name = "blind", description = "Blind pairs: two gaits that a rater compares without knowing which trials they are."),
+        (name = "devices", description = "Models of powered prostheses."),
+        (name = "figures", description = "Charts of studies, trials, lab sessions and reference gaits."),
+        (name = "health", description = "State of the service, for monitoring."),
+        (name = "lab", description = "Lab sessions: plans, walks, answers, measurement files and unblinding."),
+        (name = "operation", description = "Operation of the service: audit trail, access log, jobs, workers and backups."),
+        (
+            name = "preferences",
+            description = "Answers about gaits: preferences, assessments, suggestions, safety reports and their reviews."
+        ),
+        (name = "reference-gaits", description = "Gaits against which Gait RMSE measures."),
+        (name = "scripts", description = "Trials that lab scripts ask for and evaluate."),
+        (name = "studies", description = "Tuning runs."),
+        (name = "subjects", description = "People who walk: body measures, consent and muscles."),
+        (name = "trials", description = "Evaluated actions of a study, and their gaits.")
+    )
 )]
 struct Described;
 
@@ -146,7 +164,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     // A host name that the service does not answer to is refused before anything else.
     problems.push(("403", "Not allowed"));
     match operation.get("security") {
-        Some(_) => problems.push(("401", "Sign in first")),
+        Some(_) => problems.push(("401", "The session or token is missing or not valid")),
         None => operation["security"] = json!([]),
     }
     if takes("path", &parameters) {
@@ -183,7 +201,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     for status in ["201", "202"] {
         if let Some(response) = responses.get_mut(status) {
             response["headers"]["Location"] =
-                json!({ "description": "Address of the new object", "schema": { "type": "string" } });
+                json!({ "description": "URL of the new object", "schema": { "type": "string" } });
         }
     }
     answer_problems(responses);

@@ -5,10 +5,12 @@
 //! of their own checks.
 
 use super::openapi_dependent_rules;
+use super::openapi_descriptions;
 use super::openapi_settings::settings;
 use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
+use gait_optimizer::settings::Naturalness;
 use gait_optimizer::{BasinChoice, Device, GaitSettings, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
@@ -84,8 +86,9 @@ pub(super) fn state(document: &mut Value) {
         add(schemas, "NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
         add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
-        let people =
-            json!({ "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who answers." });
+        let people = json!({
+            "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who gives the answer."
+        });
         schemas.insert("PersonSource".to_owned(), people);
         for component in ["NewPreference", "NewAssessment", "NewSafetyReport", "Suggestion"] {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
@@ -143,9 +146,8 @@ pub(super) fn state(document: &mut Value) {
         close(schemas, "SearchSpace");
         state_bounds(schemas);
         let mut gait = settings(widest_durations(), |s: &GaitSettings| s.validate().err().map(Error::from));
-        if let Some(muscles) = gait.pointer_mut("/properties/muscles") {
-            *muscles = json!({ "$ref": format!("{SCHEMAS}MuscleParameters") });
-        }
+        // The muscles are absent if they have their default values.
+        gait["properties"]["muscles"] = json!({ "$ref": format!("{SCHEMAS}MuscleParameters") });
         for (name, schema) in [
             ("GaitSettings", gait),
             ("SolveOptions", solve_options()),
@@ -155,6 +157,7 @@ pub(super) fn state(document: &mut Value) {
         ] {
             put(schemas, name, schema);
         }
+        openapi_descriptions::state(schemas);
         openapi_dependent_rules::state(schemas);
     }
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
@@ -217,9 +220,11 @@ fn state_emg(schemas: &mut Map<String, Value>) {
     close(schemas, "EmgSettings");
 }
 
-/// Settings whose durations leave each other the widest ranges; `x-depends` has the rule between them.
+/// Settings whose durations leave each other the widest ranges; `x-depends` has the rule between them. Naturalness terms
+/// are on, because they are absent otherwise.
 fn widest_durations() -> GaitSettings {
-    let mut settings = GaitSettings::default();
+    let naturalness = Naturalness { reference_weight: 1.0, trailing_load_share: 0.1 };
+    let mut settings = GaitSettings { naturalness, ..GaitSettings::default() };
     let (least, most) = (&mut settings.limits.duration_min_s, &mut settings.limits.duration_max_s);
     (least.ds2, least.ds3, least.ss2, least.ss1) = (0.005, 0.005, 0.005, 0.005);
     (most.ds2, most.ds3, most.ss2, most.ss1) = (2.0, 2.0, 2.0, 2.0);

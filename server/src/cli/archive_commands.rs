@@ -94,8 +94,8 @@ impl NewKey {
 
 #[derive(Debug, Args)]
 pub(super) struct Prune {
-    /// Delete the motions of gaits in studies that ended more than this many days ago. Keeps those of gaits that are or
-    /// may be recommended, of the gaits that these were warm-started from, and of gaits of lab sessions.
+    /// Delete the trajectories of gaits in studies that ended more than this many days ago. Keeps those of gaits that are
+    /// or may be recommended, of the gaits from which these were warm-started, and of gaits of lab sessions.
     #[arg(long, value_name = "DAYS", value_parser = days, allow_negative_numbers = true)]
     older_than_days: u32,
     #[command(flatten)]
@@ -110,9 +110,15 @@ impl Prune {
         let expired = retention::drop_expired(&store).await;
         store.close().await;
         let (Dropped { answers, sessions, links }, trajectories) = (expired?, done?);
-        tell(&format!("deleted: idempotency keys {answers}, sessions {sessions}, sign-in links {links}"));
+        let (keys, sessions) = (count(answers, "idempotency key"), count(sessions, "session"));
+        tell(&format!("deleted {keys}, {sessions} and {}", count(links, "sign-in link")));
         data(&format!("trajectories deleted: {trajectories}"))
     }
+}
+
+/// How many things expired, as in `2 expired sessions`.
+fn count(number: u64, what: &str) -> String {
+    format!("{number} expired {what}{}", if number == 1 { "" } else { "s" })
 }
 
 /// Deletes the trajectories of studies that ended more than `days` ago, except gaits that are or may be recommended.

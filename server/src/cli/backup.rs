@@ -43,7 +43,7 @@ impl Restore {
         let database = settings.database();
         exists(&self.from)?;
         if let Some(kept) = restore::from_file(&self.from, &database, settings.anchor().as_deref()).await? {
-            tell(&format!("the current database is kept as {}", kept.display()));
+            tell(&format!("the replaced record is kept as {}", kept.display()));
         }
         tell(&format!("restored {}", database.display()));
         Ok(())

@@ -15,7 +15,8 @@ pub(super) struct Certify {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// Reference gait used in the solve, given as for `solve`; needed to check the Gait RMSE stated in a file written by `solve --out`.
+    /// Reference gait used in the solve: a name or file, as for `solve --reference`. Needed to check the Gait RMSE that a
+    /// file written by `solve --out` states.
     #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Print the certificate as one JSON object.
@@ -30,7 +31,7 @@ impl Certify {
         let reference = reference_of(self.reference.as_deref())?;
         if let Some(report) = report {
             check_figures(&gait, &report, &reference)
-                .map_err(|reason| Error::Malformed(format!("{} is not certified: {reason}", self.gait.display())))?;
+                .map_err(|reason| Error::Malformed(format!("Cannot certify {}: {reason}", self.gait.display())))?;
         }
         let certificate = Pool::new(1).run(move |_| certify(&gait)).await??;
         if self.json {
@@ -65,7 +66,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
         lines.push(format!("  gait {}, {}", certified.gait_sha256, certified.walker_in_words()));
         lines.extend(certified.differences.iter().map(|difference| format!("  differs: {}", difference.in_words())));
         lines.push(format!(
-            "  cost of transport {:.4} (with the magnitudes of the joint powers, which the objective smooths)",
+            "  cost of transport {:.4} (from absolute joint powers, which the objective smooths)",
             certified.unsmoothed_cost_of_transport
         ));
     }
@@ -76,7 +77,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(
-            "  largest multiplier {:.4e} (finite differences: {:.4e}, resolution {:.0e}): {}; of a change in speed, {:.1e} remains after one stride and {:.1e} spreads to other coordinates",
+            "  largest multiplier {:.4e} (finite differences: {:.4e}, resolution {:.0e}): {}; {:.1e} of a change in speed remains after one stride, and {:.1e} of it spreads to other coordinates",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
@@ -85,7 +86,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
             map.speed_leak
         ));
         lines.push(format!(
-            "  distance of the gait from the periodic motion {:.1e} rad, rad/s; simulated for {STRIDES} strides",
+            "  largest deviation of the gait from the periodic motion: {:.1e} (rad or rad/s); {STRIDES} strides simulated",
             map.fixed_point_distance
         ));
     }

@@ -45,7 +45,7 @@ pub(super) struct Convert {
 impl Convert {
     pub(super) fn run(self) -> Result<(), Error> {
         let gait = read_gait_file(&self.gait)?.gait;
-        let out = self.out.as_deref().map(|out| OutFile::open(out, &[&self.gait])).transpose()?;
+        let out = OutFile::instead_of_stdout(self.out.as_deref(), &[&self.gait])?;
         let text = match self.to {
             Form::Csv => gait_csv(&gait),
             Form::Mot => motion_file(&gait, self.rate_hz)?,

@@ -22,9 +22,9 @@ pub(super) struct Doctor {
 /// The outcome of a check.
 enum Found {
     Good(String),
-    Trouble(String),
+    Bad(String),
 }
-use Found::{Good, Trouble};
+use Found::{Bad, Good};
 
 impl Doctor {
     pub(super) fn flags(&self) -> Flags {
@@ -43,14 +43,14 @@ impl Doctor {
             checks.push(("record", record(&database, settings.anchor().as_slice()).await));
             checks.push(("clock", clock_after(&database).await));
         } else {
-            checks.push(("record", Good(format!("there is none yet at {}", database.display()))));
+            checks.push(("record", Good(format!("no record yet at {}", database.display()))));
             checks.push(("clock", Good(now().to_string())));
         }
         checks.push(("broker", broker(settings).await?));
         for (what, found) in &checks {
             let (state, text) = match found {
                 Good(text) => ("ok", text),
-                Trouble(text) => ("trouble", text),
+                Bad(text) => ("error", text),
             };
             data(&format!("{state:<8}{what:<9}{text}"))?;
         }
@@ -68,9 +68,9 @@ fn disk(database: &Path, reserve: u64) -> Found {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
     let folder = database.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     match free_bytes(folder) {
-        _ if !folder.is_dir() => Trouble(format!("the folder {} does not exist", folder.display())),
+        _ if !folder.is_dir() => Bad(format!("the folder {} does not exist", folder.display())),
         Some(free) if free < reserve => {
-            Trouble(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
+            Bad(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
         }
         Some(free) => Good(format!("{} free, reserve {}", gigabytes(free), gigabytes(reserve))),
         None => Good("this system does not report free space".to_owned()),
@@ -86,7 +86,7 @@ async fn record(database: &Path, anchors: &[PathBuf]) -> Found {
             whole.seals.map_or(0, |(seals, _)| seals),
             whole.anchors.len()
         )),
-        Err(error) => Trouble(error.to_string()),
+        Err(error) => Bad(error.to_string()),
     }
 }
 
@@ -95,10 +95,10 @@ async fn clock_after(database: &Path) -> Found {
     let present = now();
     match access_clock::latest_of_file(database).await {
         Ok(Some(latest)) if latest > present.plus_seconds(CLOCKS_DIFFER_S) => {
-            Trouble(format!("{present} is earlier than {latest} in the record: the clock was set back"))
+            Bad(format!("{present} is earlier than {latest} in the record: the clock was set back"))
         }
         Ok(_) => Good(present.to_string()),
-        Err(error) => Trouble(error.to_string()),
+        Err(error) => Bad(error.to_string()),
     }
 }
 
@@ -107,7 +107,7 @@ async fn broker(settings: &Settings) -> Result<Found, Error> {
         #[cfg(feature = "nats")]
         Some((url, _)) => Ok(match nats::reach(url).await {
             Ok(version) => Good(format!("NATS {version} with JetStream")),
-            Err(error) => Trouble(error.to_string()),
+            Err(error) => Bad(error.to_string()),
         }),
         _ => Ok(Good("no NATS broker is set".to_owned())),
     }

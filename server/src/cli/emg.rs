@@ -48,8 +48,8 @@ pub(super) struct Emg {
     /// Print the results as one JSON object.
     #[arg(long)]
     json: bool,
-    /// Output file for the mean cycles: percent, then mean and standard deviation of each channel, relative to the peak
-    /// without the device.
+    /// Output file for the mean cycles: percentage of the gait cycle, then mean and standard deviation of each channel,
+    /// relative to the peak without the device.
     #[arg(long, value_name = "FILE.csv")]
     cycles: Option<PathBuf>,
     /// Output file for the envelopes: time, then each channel in the unit of the recording.

@@ -60,12 +60,13 @@ enum Ended {
     Failed,
 }
 
-/// A preference-learning tuning service for walking gaits of powered prostheses.
+/// Tunes walking gaits for powered prostheses by preference learning.
 ///
 /// Research software; not a medical device.
 ///
-/// The paper is K. Li, M. Tucker, R. Gehlhar, Y. Yue, A. D. Ames, Natural Multicontact Walking for Robotic Assistive
-/// Devices via Musculoskeletal Models and Hybrid Zero Dynamics, IEEE Robotics and Automation Letters, 2022.
+/// In this help, "the paper" is K. Li, M. Tucker, R. Gehlhar, Y. Yue, A. D. Ames, Natural Multicontact Walking for
+/// Robotic Assistive Devices via Musculoskeletal Models and Hybrid Zero Dynamics, IEEE Robotics and Automation Letters,
+/// 2022.
 #[derive(Debug, Parser)]
 #[command(name = "gaitwright", version, about)]
 struct Cli {
@@ -125,7 +126,7 @@ enum Command {
     Users(users::Users),
     /// Delete old trajectories, while the service is stopped.
     ///
-    /// Results, answers and recommended gaits are kept.
+    /// Results, answers and recommended gaits are kept. Expired idempotency keys, sessions and sign-in links are deleted.
     Prune(archive_commands::Prune),
 }
 

@@ -11,8 +11,8 @@ fn initial_guesses(text: &str) -> Result<usize, String> {
 
 #[derive(Debug, Clone, Args)]
 pub(super) struct MultiStartFlags {
-    /// Smallest number of initial guesses that a cold start tries (default: 2). They may lead to different local
-    /// optima, that is, different gaits.
+    /// Minimum number of initial guesses of a cold start (default: 2). Different guesses may lead to different local
+    /// optima, that is, to different gaits.
     #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
     initial_guesses: Option<usize>,
     /// Among the gaits whose objective is within this percentage of the lowest, choose the one with the lowest Gait

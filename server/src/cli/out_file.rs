@@ -25,7 +25,7 @@ impl OutFile {
     /// [`Error::Malformed`] with the reason when it cannot.
     pub(super) fn open(path: &Path, inputs: &[&Path]) -> Result<Self, Error> {
         if path == Path::new("-") {
-            return Err(failed(path, "- is not a file. Omit --out to write to standard output"));
+            return Err(failed(path, "- is not a file"));
         }
         let known = path.canonicalize().ok();
         if let (Some(known), Some(input)) = (&known, inputs.iter().find(|i| i.canonicalize().ok() == known)) {
@@ -46,6 +46,17 @@ impl OutFile {
         // Held while this process lives. Without file locks, no part counts as left over.
         let _ = file.try_lock();
         Ok(Self { path, part: Some(part), file: Some(file) })
+    }
+
+    /// The same for the file given to --out, without which a command writes to standard output.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] with the reason when it cannot.
+    pub(super) fn instead_of_stdout(path: Option<&Path>, inputs: &[&Path]) -> Result<Option<Self>, Error> {
+        if path == Some(Path::new("-")) {
+            return Err(Error::Malformed("- is not a file. Omit --out to write to standard output.".to_owned()));
+        }
+        path.map(|path| Self::open(path, inputs)).transpose()
     }
 
     /// The same for a new file that only its owner can read.
@@ -177,6 +188,9 @@ mod tests {
         let left = ["1", "2", "3", "x"].map(|part| at(&format!(".out.csv.{part}.part")).exists());
         assert_eq!(left, [false, true, true, true]);
         assert_eq!(std::fs::read_to_string(at("out.csv")).unwrap(), "a1\n");
-        assert!(OutFile::open(Path::new("-"), &[]).is_err());
+        let refusal = |result: Result<Option<OutFile>, Error>| result.unwrap_err().to_string();
+        let dash = Path::new("-");
+        assert!(!refusal(OutFile::open(dash, &[]).map(Some)).contains("--out"));
+        assert!(refusal(OutFile::instead_of_stdout(Some(dash), &[])).contains("Omit --out"));
     }
 }

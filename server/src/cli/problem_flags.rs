@@ -34,7 +34,7 @@ pub(super) struct ProblemFiles {
     #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Settings of the interior-point method that differ from the defaults (JSON), as in {"bound_push": 0.01,
-    /// "linear_solver": "delayed_pivots"}. The error for an unknown name lists the known ones.
+    /// "linear_solver": "delayed_pivots"}. An unknown name is refused with a list of the known ones.
     #[arg(long, value_name = "FILE")]
     solver_settings: Option<PathBuf>,
 }
@@ -107,7 +107,7 @@ pub(super) struct ProblemFlags {
     /// Scaled optimality tolerance (default: 1e-6).
     #[arg(long, value_name = "NUMBER", value_parser = number, allow_negative_numbers = true)]
     tolerance: Option<f64>,
-    /// Maximum number of iterations in each stage of a solve (default: 1000). Stages that track the reference gait are
+    /// Maximum number of iterations in each phase of a solve (default: 1000). Phases that track the reference gait are
     /// limited to 200.
     #[arg(long, value_name = "NUMBER", value_parser = iterations, allow_negative_numbers = true)]
     max_iterations: Option<usize>,

@@ -67,7 +67,7 @@ impl Reference {
         let reference = new.definition(&self.recording.display().to_string(), &forces)?;
         let inputs: Vec<&Path> =
             [Some(&self.recording), self.forces.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
-        let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;
+        let out = OutFile::instead_of_stdout(self.out.as_deref(), &inputs)?;
         let json = serde_json::to_string_pretty(&reference).map_err(|e| Error::Internal(e.to_string()))?;
         tell(&reference.provenance);
         match out {

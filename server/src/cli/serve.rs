@@ -36,8 +36,8 @@ const SILENCE: Duration = Duration::from_secs(15);
 pub(super) struct Serve {
     #[command(flatten)]
     pub(super) flags: Flags,
-    /// At the start, print a one-time sign-in link for an administrator. Without this flag, a link is printed only
-    /// as long as no administrator has a password. If all accounts of administrators are disabled, adds a new one.
+    /// At startup, print a one-time sign-in link for an administrator. Without this flag, a link is printed only until an
+    /// administrator has a password. If every administrator account is disabled, an administrator is added.
     #[arg(long)]
     sign_in_link: bool,
 }

@@ -16,7 +16,7 @@ pub(super) struct Simulate {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// Number of simulated walks for each value of --ground.
+    /// Number of simulated walks with random disturbances on each ground.
     #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().walks, value_parser = walks, allow_negative_numbers = true)]
     walks: u32,
     /// Largest height of bumps and depth of dips in the ground, 0 (level) to 50 mm (default: 0, 5 and 10 in turn).
@@ -78,15 +78,15 @@ fn for_people(report: &ExecutionReport) -> String {
     let by_yield: Vec<String> = report
         .strides_by_yield
         .iter()
-        .map(|walk| format!("{} at {:.0} mm", walk.strides, 1000.0 * walk.yield_m))
+        .map(|walk| format!("{} at {:.0} mm", strides_in_words(walk.strides), 1000.0 * walk.yield_m))
         .collect();
-    lines.push(format!("  undisturbed strides on ground that yields under body weight: {}", by_yield.join(", ")));
+    lines.push(format!("  undisturbed walks, by how far the ground yields under body weight: {}", by_yield.join(", ")));
     let [lightest, heaviest] = report.body_mass_kg;
-    lines.push(format!("  disturbed walks: bodies of {lightest:.1} to {heaviest:.1} kg"));
+    lines.push(format!("  disturbed walks: body mass {lightest:.1} to {heaviest:.1} kg"));
     lines.extend(report.grounds.iter().flat_map(ground_for_people));
     lines.push(match report.pushes {
         Some(pushes) => format!(
-            "  pushes survived at the hip: {:.0} N s forwards, {:.0} N s backwards (of at most {:.0} N s)",
+            "  pushes survived at the hip: {:.0} N s forwards, {:.0} N s backwards (largest push tried: {:.0} N s)",
             pushes.forwards_n_s, pushes.backwards_n_s, pushes.largest_tried_n_s
         ),
         None => "  pushes: not tried, because the undisturbed walk is not complete".to_owned(),
@@ -95,6 +95,10 @@ fn for_people(report: &ExecutionReport) -> String {
         "  the intact side is a model of a person who tracks the gait; a real person may do better or worse".to_owned(),
     );
     lines.join("\n")
+}
+
+fn strides_in_words(strides: u32) -> String {
+    format!("{strides} {}", if strides == 1 { "stride" } else { "strides" })
 }
 
 fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
@@ -114,7 +118,7 @@ fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
             ground.halted
         ),
         format!(
-            "    torque at its limit: knee {}, ankle {} of the time; changing as fast as it can: knee {}, ankle {}",
+            "    torque at its limit: knee {}, ankle {} of the time; torque rate at its limit: knee {}, ankle {}",
             percent(ground.knee_saturated_share),
             percent(ground.ankle_saturated_share),
             percent(ground.knee_rate_limited_share),

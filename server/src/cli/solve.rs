@@ -52,9 +52,8 @@ pub(super) struct Solve {
         ]
     )]
     problem: Option<PathBuf>,
-    /// Start from another local optimum in the file given to --warm. They are numbered from 1, in the order in which
-    /// the initial guesses reached them; `solve` prints the list if there are several (default: the local optimum of
-    /// the gait in that file).
+    /// Local optimum in the --warm file to start from (default: that of the gait in the file). Local optima are numbered
+    /// from 1, in the order of the initial guesses that reached them; `solve` lists them if there are several.
     #[arg(long, value_name = "NUMBER", requires = "warm", value_parser = basin, allow_negative_numbers = true)]
     warm_basin: Option<usize>,
     #[command(flatten)]
@@ -66,8 +65,8 @@ pub(super) struct Solve {
     /// Print the results as one JSON object.
     #[arg(long)]
     json: bool,
-    /// If no gait is found, explain which bounds conflict, and which of them gives a gait when relaxed alone. Takes up to
-    /// eight solves for each bound.
+    /// If no gait is found, explain which bounds conflict, and whether relaxing any one of them, or a few together, gives
+    /// a gait. Takes dozens of solves.
     #[arg(long)]
     explain: bool,
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
@@ -86,7 +85,7 @@ struct Figures<'a> {
     #[serde(flatten)]
     report: &'a SolveReport,
     lineage: &'a Lineage,
-    /// Distances of a converged gait from the reference gait of the problem and from the built-in ones.
+    /// Gait RMSE of a converged gait against the reference gait of the problem and against the built-in ones.
     reference_gaits: &'a [ReferenceComparison],
     #[serde(skip_serializing_if = "Option::is_none")]
     certificate: Option<&'a Certificate>,
@@ -198,7 +197,7 @@ impl Solve {
     }
 }
 
-/// The status as in JSON.
+/// The status as in JSON and CSV.
 pub(super) fn status_word(status: SolveStatus) -> &'static str {
     match status {
         SolveStatus::Converged => "converged",
@@ -207,6 +206,17 @@ pub(super) fn status_word(status: SolveStatus) -> &'static str {
         SolveStatus::IterationLimit => "iteration_limit",
         SolveStatus::TimeLimit => "time_limit",
         SolveStatus::Cancelled => "cancelled",
+    }
+}
+
+/// The status as text.
+fn status_in_words(status: SolveStatus) -> &'static str {
+    match status {
+        SolveStatus::IterationLimit => "iteration limit reached",
+        SolveStatus::TimeLimit => "time limit reached",
+        SolveStatus::Converged | SolveStatus::Infeasible | SolveStatus::Stalled | SolveStatus::Cancelled => {
+            status_word(status)
+        }
     }
 }
 
@@ -219,7 +229,7 @@ fn for_people(
 ) -> String {
     let r = &outcome.report;
     let mut lines = vec![
-        format!("{} after {} iterations, {:.2} s", status_word(r.status), r.iterations, r.seconds_total),
+        format!("{} after {} iterations, {:.2} s", status_in_words(r.status), r.iterations, r.seconds_total),
         format!("  cost of transport  {:.5}   objective {:.5}", r.cost_of_transport, r.objective),
         format!("  speed              {:.3} m/s   stride {:.3} m", r.speed_m_s, r.stride_length_m),
         format!("  largest violation  {:.1e}", r.max_violation),

@@ -25,7 +25,7 @@ use std::sync::mpsc;
 pub(super) struct Sweep {
     #[command(flatten)]
     flags: ProblemFlags,
-    /// CSV file of actions. Its columns are all bounds in order: a1,a2 and so on.
+    /// CSV file of actions with the header a1,a2,a3,a4,a5,a6,a7,a8.
     #[arg(long, value_name = "FILE.csv")]
     actions: PathBuf,
     /// Output file with one row for each action, in the same order. Until it is complete, rows are in a hidden file
@@ -131,7 +131,7 @@ impl Table {
         let path = self.out.path().display().to_string();
         if stopped {
             data(self.text.trim_end())?;
-            tell(&format!("stopped: the finished rows are printed above, and {path} is unchanged"));
+            tell(&format!("stopped: the rows were written to standard output; {path} was not written"));
             return Ok(Ended::Interrupted);
         }
         if let Err(error) = self.unwritten.map_or_else(|| self.out.finish(), Err) {

@@ -72,7 +72,8 @@ impl Users {
                 let secret = user_administration::link(&mut writer, &Actor::terminal(), user.id).await?;
                 commit(writer).await?;
                 tell(&format!(
-                    "sign-in link for {}; it works only once and expires after a day; open it at the address of the service",
+                    "sign-in link for {}: append this path to the address of the service. The link works only once and expires \
+                     after a day.",
                     user.name
                 ));
                 data(&format!("/sign-in/{secret}"))

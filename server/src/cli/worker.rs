@@ -43,7 +43,7 @@ impl Worker {
     #[allow(clippy::unused_async)]
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         settings.nats()?;
-        Err(Error::Malformed("This program was built without the feature nats, which workers need.".to_owned()))
+        Err(Error::Malformed("Workers need the feature `nats`, but this program was built without it.".to_owned()))
     }
 
     #[cfg(feature = "nats")]

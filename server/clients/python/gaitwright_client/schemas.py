@@ -10,6 +10,9 @@ from typing import Any, Literal, Optional, TypedDict, Union
 # Kind of access.
 AccessKind = Literal["view", "export", "refused"]
 
+# What a person states instead of a preference between two gaits.
+AssessmentAnswer = Literal["cannot_tell", "unsafe_a", "unsafe_b", "unsafe_both"]
+
 AssessmentId = str
 
 # What exactly was changed; its fields depend on the kind of change.
@@ -24,7 +27,7 @@ Binary = bytes
 CertificateState = Literal["passed", "failed", "being_certified", "not_certified"]
 
 # Condition of a walk.
-Condition = Literal["normal", "trial_a", "trial_b"]
+Condition = Literal["normal", "gait_a", "gait_b"]
 
 # Kind of entry: consent or withdrawal.
 ConsentKind = Literal["given", "withdrawn"]
@@ -86,7 +89,7 @@ Outcome = Literal["converged", "not_converged"]
 # Which of two gaits is better.
 PairAnswer = Literal["a", "b", "no_difference"]
 
-# Who answers.
+# Who gives the answer.
 PersonSource = Literal["subject", "clinician", "script"]
 
 PresentationId = str
@@ -213,24 +216,24 @@ class Ask(TypedDict, total=False):
 
 
 class _AssessmentRequired(TypedDict):
-    # `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
-    answer: Judgement
+    # The answer.
+    answer: AssessmentAnswer
     # Author.
     author: str
     # Time of recording.
     created_at: Instant
-    # The trial with the first of the two gaits.
-    first: TrialId
     # Identifier.
     id: AssessmentId
     # Free text.
     note: str
-    # The trial with the second of the two gaits.
-    second: TrialId
     # Who answered.
     source: Source
     # The study.
     study_id: StudyId
+    # The trial with gait A.
+    trial_a: TrialId
+    # The trial with gait B.
+    trial_b: TrialId
 
 
 class Assessment(_AssessmentRequired, total=False):
@@ -561,6 +564,8 @@ class _FeedbackRowRequired(TypedDict):
     by_rater: bool
     # Content of the entry.
     content: FeedbackContent
+    # Whether the rater could have known the allocation, so that the entry does not count as blind.
+    could_have_known: bool
     # Time of recording.
     created_at: Instant
     # Identifier.
@@ -573,8 +578,6 @@ class _FeedbackRowRequired(TypedDict):
     source: Source
     # The study.
     study_id: StudyId
-    # Whether the rater could have known the allocation, so that the entry does not count as blind.
-    unblinded: bool
 
 
 class FeedbackRow(_FeedbackRowRequired, total=False):
@@ -659,6 +662,7 @@ class _DeviceDefinitionRequired(TypedDict):
     ankle_min_rad: float
     # Largest ankle torque.
     ankle_torque_limit_n_m: float
+    # Whether the subject also carries their own shank and foot, with the knee bent, as with a bypass adapter.
     carried_limb: bool
     # Distance of the foot's centre of mass below the ankle.
     foot_com_down_m: float
@@ -678,6 +682,7 @@ class _DeviceDefinitionRequired(TypedDict):
     knee_housing_mass_kg: float
     # Largest knee torque.
     knee_torque_limit_n_m: float
+    # Name, which no other device has.
     name: str
     # Distance of the shank's centre of mass below the knee, in shank lengths.
     shank_com_fraction: float
@@ -694,6 +699,7 @@ class _DeviceDefinitionRequired(TypedDict):
 class DeviceDefinition(_DeviceDefinitionRequired, total=False):
     """A device: measurements of the prosthesis, each with its range."""
 
+    # Source of each value, by the name of its field.
     sources: dict[str, str]
 
 
@@ -915,69 +921,141 @@ class Frame(_FrameRequired, total=False):
 
 
 class GaitSettingsLimitsDurationMaxS(TypedDict):
+    """Maximum duration of each kind of domain, s."""
+
+    # Maximum duration of DS2, s.
     ds2: float
+    # Maximum duration of DS3, s.
     ds3: float
+    # Maximum duration of SS1, s.
     ss1: float
+    # Maximum duration of SS2, s.
     ss2: float
 
 
 class GaitSettingsLimitsDurationMinS(TypedDict):
+    """Minimum duration of each kind of domain, s."""
+
+    # Minimum duration of DS2, s.
     ds2: float
+    # Minimum duration of DS3, s.
     ds3: float
+    # Minimum duration of SS1, s.
     ss1: float
+    # Minimum duration of SS2, s.
     ss2: float
 
 
 class GaitSettingsLimits(TypedDict, total=False):
+    """Limits of a gait besides the tuned bounds."""
+
+    # Maximum human dorsiflexion torque, N m.
     ankle_dorsiflexion_torque_n_m: float
+    # Maximum human plantarflexion torque, N m.
     ankle_plantarflexion_torque_n_m: float
+    # Minimum clearance of the swing foot at mid-swing, m. It applies if a5 is smaller.
     clearance_min_m: float
+    # Maximum of each component of a contact force, N.
     contact_force_max_n: float
+    # Maximum duration of each kind of domain, s.
     duration_max_s: GaitSettingsLimitsDurationMaxS
+    # Minimum duration of each kind of domain, s.
     duration_min_s: GaitSettingsLimitsDurationMinS
+    # Maximum fibre length, in optimal fibre lengths.
     fibre_length_max: float
+    # Minimum fibre length, in optimal fibre lengths.
     fibre_length_min: float
+    # Friction coefficient of the feet.
     friction: float
+    # Minimum downward velocity of the heel at heel strike, m/s.
     heel_touchdown_m_s: float
+    # Anatomical limit of both hip angles in addition to a7, rad.
     hip_max_rad: float
+    # Maximum human hip torque, N m.
     hip_torque_n_m: float
+    # Friction coefficient of the impulse at heel strike.
     impact_friction: float
+    # Maximum of each component of an impulse, N s.
     impulse_max_n_s: float
+    # Maximum knee flexion, rad.
     knee_max_rad: float
+    # Minimum knee flexion, rad. It excludes the straight knee, which is singular.
     knee_min_rad: float
+    # Maximum human knee torque, N m.
     knee_torque_n_m: float
+    # Minimum normal force at the start of a domain that ends by unloading, N. It decreases linearly to 0.
     liftoff_force_n: float
+    # Minimum forward hip velocity in SS1, m/s. It makes the phase monotonic.
     phase_rate_min_m_s: float
+    # Maximum walking speed, m/s.
     speed_max_m_s: float
+    # Minimum walking speed, m/s.
     speed_min_m_s: float
+    # Maximum length of each step, m.
     step_max_m: float
+    # Minimum length of each step, m.
     step_min_m: float
+    # Minimum downward velocity of the toe at toe strike, m/s.
     toe_touchdown_m_s: float
+    # Minimum half width of the range of torso lean, rad. It applies if a6 is smaller.
     torso_tolerance_rad: float
 
 
 class GaitSettingsMesh(TypedDict, total=False):
+    """Number of mesh intervals of each kind of domain."""
+
+    # Intervals of DS2, double support on the stance heel and the trailing toe.
     ds2: int
+    # Intervals of DS3, double support on the flat stance foot and the trailing toe.
     ds3: int
+    # Intervals of SS1, single support on the stance toe.
     ss1: int
+    # Intervals of SS2, single support on the flat stance foot.
     ss2: int
 
 
+class GaitSettingsNaturalness(TypedDict, total=False):
+    """Naturalness terms beyond the paper."""
+
+    # Weight of the squared distance from the joint angles of the reference gait, relative to the cost of transport. 0
+    # disables the term.
+    reference_weight: float
+    # Minimum share of the weight of the walker on the trailing foot at heel strike of the other foot. It decreases
+    # linearly to 0 at toe-off. 0 disables the term.
+    trailing_load_share: float
+
+
 class GaitSettingsRegularisation(TypedDict, total=False):
+    """Regularisation of the objective. Each weight multiplies the time integral of a square."""
+
+    # Weight of accelerations, relative to 30 m/s² and 30 rad/s².
     acceleration: float
+    # Weight of muscle activations.
     activation: float
+    # Weight of the second differences of muscle activations over adjacent nodes of a domain.
     activation_bend: float
+    # Weight of contact forces, relative to 500 N.
     contact_force: float
+    # Weight of fibre velocities, relative to the maximum velocity of each muscle.
     fibre_velocity: float
+    # Smoothing of the magnitudes of joint powers, W: with the smoothing e, |P| becomes sqrt(P² + e²) - e.
     power_smoothing_w: float
+    # Weight of torques, relative to 100 N m.
     torque: float
 
 
 class GaitSettings(TypedDict, total=False):
     """Settings of the gait problem."""
 
+    # Limits of a gait besides the tuned bounds.
     limits: GaitSettingsLimits
+    # Number of mesh intervals of each kind of domain.
     mesh: GaitSettingsMesh
+    # Differences of the subject's muscles from the published table.
+    muscles: MuscleParameters
+    # Naturalness terms beyond the paper.
+    naturalness: GaitSettingsNaturalness
+    # Regularisation of the objective. Each weight multiplies the time integral of a square.
     regularisation: GaitSettingsRegularisation
 
 
@@ -1167,10 +1245,6 @@ class _LabSessionViewRequired(TypedDict):
     controller_files: list[ControllerFileDownload]
     # Time of planning.
     created_at: Instant
-    # The trial with the first of the two gaits. Does not imply the order of the walks.
-    trial_a: TrialId
-    # The trial with the second of the two gaits.
-    trial_b: TrialId
     # Identifier.
     id: LabSessionId
     # Free text.
@@ -1183,6 +1257,10 @@ class _LabSessionViewRequired(TypedDict):
     state: LabSessionState
     # The study.
     study_id: StudyId
+    # The trial with the first of the two gaits. Does not imply the order of the walks.
+    trial_a: TrialId
+    # The trial with the second of the two gaits.
+    trial_b: TrialId
     # The three walks.
     walks: list[WalkView]
 
@@ -1201,32 +1279,67 @@ class LabSessionView(_LabSessionViewRequired, total=False):
 class LearnerSettings(TypedDict, total=False):
     """Settings of the learner."""
 
+    # Share of the prior variance in functions of one dimension.
     additive_share: float
+    # Region of avoidance (ROIAL): an action is not proposed if its mean plus this many standard deviations is below the
+    # threshold of labels, unless no other action is left. ROIAL uses -0.45. Null disables the region.
     avoidance: Optional[float]
+    # Lengthscale of the additive and pairwise parts, as a multiple of the range of each dimension.
     broad_lengthscale: float
+    # If `partner` is `previous`: number of actions before a batch with which each action of the batch is compared.
     buffer: int
+    # Noise scale of suggestions, in units of utility.
     coactive_noise: float
+    # Share of the prior variance of feasibility in functions of one dimension.
     feasibility_additive_share: float
+    # Factor on every lengthscale of feasibility.
     feasibility_lengthscale_factor: float
+    # Method of approximate inference: `laplace`, a normal distribution at the mode of the posterior;
+    # `expectation_propagation`, which needs the link `probit`.
     inference: Literal["laplace", "expectation_propagation"]
+    # What labels tell about: `in_utility`, the utility, as in the literature; `separate`, the feasibility of actions, a
+    # second Gaussian process.
     labels: Literal["in_utility", "separate"]
+    # Number of trials after which lengthscales and preference noise are learned again. Null keeps them as they are set.
     learn_every: Optional[int]
+    # Factor on the lengthscale of every dimension.
     lengthscale_factor: float
+    # Number of trials after which `eubo` searches the whole search space instead of lines.
     line_trials: int
+    # Number of random lines through the best action that `eubo` searches. With 0, it searches the whole search space.
     lines: int
+    # Distribution of the noise: `logistic`, or `probit` for the normal distribution.
     link: Literal["logistic", "probit"]
+    # How the next action is chosen: `linecospar`, the best action of a posterior sample on a random line through the
+    # best action; `eubo`, the action whose comparison with the best one is expected to be most useful; `thompson`, the
+    # best action of a posterior sample over the whole search space; `information_gain`, the action whose feedback is
+    # expected to tell most about the utility; `random`, a random action that was not tried.
     method: Literal["linecospar", "eubo", "thompson", "information_gain", "random"]
+    # Variance added to the diagonal of the prior covariance, called *GP noise* in the literature.
     nugget: float
+    # Noise scale of labels, in units of utility.
     ordinal_noise: float
+    # Threshold between the labels *not converged* and *converged*, in units of utility.
     ordinal_thresholds: list[float]
+    # Share of the prior variance in functions of two dimensions. The rest of the variance is in the product kernel of
+    # the literature.
     pairwise_share: float
+    # Earlier actions with which a new one is compared: `previous`, the other actions of its batch and the last `buffer`
+    # actions before the batch; `incumbent`, the best one; `every`, all of them.
     partner: Literal["previous", "incumbent", "every"]
+    # Noise scale of preferences, in units of utility.
     preference_noise: float
+    # Whether `linecospar` may propose an action again that was tried.
     repeats: bool
+    # Number of actions in a batch.
     samples_per_iteration: int
+    # Prior variance of the utility.
     signal_variance: float
+    # First action of a study: `random`, a random one; `centre`, the middle value of every dimension.
     start: Literal["random", "centre"]
+    # Noise scale of ties, in units of utility.
     tie_noise: float
+    # Difference of utilities below which two gaits feel equal.
     tie_width: float
 
 
@@ -1411,6 +1524,8 @@ class Multiplier(TypedDict):
 
 
 class MuscleParametersGas(TypedDict, total=False):
+    """Gastrocnemius."""
+
     # Largest moment arm at the ankle, m.
     ankle_lever_m: Optional[float]
     # Largest moment arm at the knee, m.
@@ -1426,6 +1541,8 @@ class MuscleParametersGas(TypedDict, total=False):
 
 
 class MuscleParametersGlu(TypedDict, total=False):
+    """Gluteus."""
+
     # Largest moment arm at the hip, m.
     hip_lever_m: Optional[float]
     # Maximum isometric force, N.
@@ -1439,6 +1556,8 @@ class MuscleParametersGlu(TypedDict, total=False):
 
 
 class MuscleParametersHam(TypedDict, total=False):
+    """Hamstrings."""
+
     # Largest moment arm at the hip, m.
     hip_lever_m: Optional[float]
     # Largest moment arm at the knee, m.
@@ -1454,6 +1573,8 @@ class MuscleParametersHam(TypedDict, total=False):
 
 
 class MuscleParametersHfl(TypedDict, total=False):
+    """Hip flexors."""
+
     # Largest moment arm at the hip, m.
     hip_lever_m: Optional[float]
     # Maximum isometric force, N.
@@ -1467,6 +1588,8 @@ class MuscleParametersHfl(TypedDict, total=False):
 
 
 class MuscleParametersSol(TypedDict, total=False):
+    """Soleus."""
+
     # Largest moment arm at the ankle, m.
     ankle_lever_m: Optional[float]
     # Maximum isometric force, N.
@@ -1480,6 +1603,8 @@ class MuscleParametersSol(TypedDict, total=False):
 
 
 class MuscleParametersTa(TypedDict, total=False):
+    """Tibialis anterior."""
+
     # Largest moment arm at the ankle, m.
     ankle_lever_m: Optional[float]
     # Maximum isometric force, N.
@@ -1493,6 +1618,8 @@ class MuscleParametersTa(TypedDict, total=False):
 
 
 class MuscleParametersVas(TypedDict, total=False):
+    """Vasti."""
+
     # Largest moment arm at the knee, m.
     knee_lever_m: Optional[float]
     # Maximum isometric force, N.
@@ -1508,24 +1635,32 @@ class MuscleParametersVas(TypedDict, total=False):
 class MuscleParameters(TypedDict, total=False):
     """Muscle values that differ from the default ones."""
 
+    # Gastrocnemius.
     gas: MuscleParametersGas
+    # Gluteus.
     glu: MuscleParametersGlu
+    # Hamstrings.
     ham: MuscleParametersHam
+    # Hip flexors.
     hfl: MuscleParametersHfl
+    # Whether lengths and moment arms scale with body height, and forces with body mass, from the 1.8 m and 80 kg of the
+    # published table. Given values are not scaled.
     scaled_to_body: bool
+    # Soleus.
     sol: MuscleParametersSol
+    # Tibialis anterior.
     ta: MuscleParametersTa
+    # Vasti.
     vas: MuscleParametersVas
 
 
 class _NewAssessmentRequired(TypedDict):
-    # `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. To state which gait is better, record a
-    # preference instead.
-    answer: Literal["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
-    # The trial with the first of the two gaits.
-    first: TrialId
-    # The trial with the second of the two gaits.
-    second: TrialId
+    # The answer. To state which gait is better, record a preference instead.
+    answer: AssessmentAnswer
+    # The trial with gait A.
+    trial_a: TrialId
+    # The trial with gait B.
+    trial_b: TrialId
 
 
 class NewAssessment(_NewAssessmentRequired, total=False):
@@ -1871,6 +2006,8 @@ class PhasePortrait(TypedDict):
 
 
 class _PresentationRequired(TypedDict):
+    # Whether the rater could have known the allocation.
+    could_have_known: bool
     # Time at which the pair was drawn.
     created_at: Instant
     # Identifier.
@@ -1887,8 +2024,6 @@ class _PresentationRequired(TypedDict):
     shown_second: TrialId
     # The study.
     study_id: StudyId
-    # Whether the rater could have known the allocation.
-    unblinded: bool
 
 
 class Presentation(_PresentationRequired, total=False):
@@ -1979,14 +2114,14 @@ class _RaterFiguresRequired(TypedDict):
     answered: int
     # Number of "cannot tell" answers.
     cannot_tell: int
+    # Number of presentations in which the rater could have known the allocation. The shares exclude them.
+    could_have_known: int
     # Name of the rater.
     rater: str
     # Share of repeated pairs with the same answer as before, among blind answers.
     repeats_agree: Proportion
     # Number of presentations.
     shown: int
-    # Number of presentations in which the rater could have known the allocation. The shares exclude them.
-    unblinded: int
     # Number of answers that reported a gait as unsafe.
     unsafe_gaits: int
 
@@ -2126,6 +2261,7 @@ class RelaxedBound(_RelaxedBoundRequired, total=False):
 
 
 class _RetractRequired(TypedDict):
+    # Why the answer is void.
     reason: str
 
 
@@ -2303,13 +2439,23 @@ class SolveOptionsBasinChoice(TypedDict):
 class SolveOptions(TypedDict, total=False):
     """Limits of one solve."""
 
+    # Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the
+    # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.
     basin_choice: Union[Literal["lowest_objective"], SolveOptionsBasinChoice]
+    # Minimum number of initial guesses of a cold start.
     initial_guesses: int
+    # Maximum number of iterations in each phase of a solve. Phases that track the reference gait are limited to 200.
     max_iterations: int
+    # Whether a cold start tries further initial guesses until one converges.
     retry: bool
+    # Number of threads. The result does not depend on it.
     threads: int
+    # Maximum number of rounds in which bounds are tightened and the solve continues, because the gait violates them
+    # between nodes. 0 disables the check.
     tightening_rounds: int
+    # Maximum wall time of a solve, s. Null for no limit. With a limit, the result depends on the speed of the machine.
     time_limit_s: Optional[float]
+    # Scaled optimality tolerance.
     tolerance: float
 
 
@@ -2472,10 +2618,13 @@ class StudyActionReason(TypedDict, total=False):
 
 class _StudyComparisonRequired(TypedDict):
     id: StudyId
+    # Whether gaits are computed with muscles.
     muscles: bool
+    # Name of the study.
     name: str
     # Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
+    # Seed of the random draws of the study.
     seed: int
     # Total time of all solves, s.
     solve_seconds: float

@@ -35,8 +35,11 @@ pub(super) struct Which {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct StudyComparison {
     id: StudyId,
+    /// Name of the study.
     name: String,
+    /// Whether gaits are computed with muscles.
     muscles: bool,
+    /// Seed of the random draws of the study.
     seed: u64,
     /// Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId,

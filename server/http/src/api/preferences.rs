@@ -164,6 +164,7 @@ pub(super) async fn create(
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Retract {
+    /// Why the answer is void.
     #[schema(min_length = 1, max_length = 2000)]
     pub(super) reason: String,
     /// Author of the retraction. Defaults to the caller's name.

@@ -20,6 +20,7 @@ struct ReferencePage {
 /// The operations with one tag.
 struct Group {
     name: String,
+    meaning: String,
     operations: Vec<Operation>,
 }
 
@@ -70,7 +71,12 @@ fn groups(document: &Value) -> Vec<Group> {
             let described = described(document, path, method, operation);
             match groups.iter_mut().find(|group| group.name == name) {
                 Some(group) => group.operations.push(described),
-                None => groups.push(Group { name, operations: vec![described] }),
+                None => {
+                    let tag =
+                        document["tags"].as_array().into_iter().flatten().find(|tag| tag["name"] == name.as_str());
+                    let meaning = tag.and_then(|tag| tag["description"].as_str()).unwrap_or_default().to_owned();
+                    groups.push(Group { name, meaning, operations: vec![described] });
+                }
             }
         }
     }

@@ -50,7 +50,7 @@ impl InWords {
                 format!("{kept}, {leak}"),
             ));
             let distance = format::number(map.fixed_point_distance);
-            figures.push(("Distance of the gait from the periodic motion, rad and rad/s", distance));
+            figures.push(("Largest deviation of the gait from the periodic motion, rad or rad/s", distance));
         }
         if let Some(free) = &certificate.free_hip_return_map {
             let words = format!("{:.3} (finite differences: {:.3})", free.largest, free.largest_by_differences);

@@ -81,7 +81,7 @@ impl Shown {
             ("Largest push at the hip survived without other disturbances", pushes(&report)),
             (
                 "Disturbed walks",
-                format!("{walks} on each ground, seed {seed}, bodies of {lightest:.1} to {heaviest:.1} kg"),
+                format!("{walks} on each ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"),
             ),
             ("Gait (SHA-256)", report.gait_sha256.clone()),
         ];
@@ -96,7 +96,7 @@ fn pushes(report: &ExecutionReport) -> String {
     };
     let number = format::number;
     format!(
-        "{} N s forwards, {} N s backwards (of at most {} N s)",
+        "{} N s forwards, {} N s backwards (largest push tried: {} N s)",
         number(pushes.forwards_n_s),
         number(pushes.backwards_n_s),
         number(pushes.largest_tried_n_s)

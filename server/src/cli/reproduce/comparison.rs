@@ -115,10 +115,10 @@ impl PairComparison {
     pub(super) fn sentence(&self) -> String {
         let last = self.last.map_or_else(
             || "at least one of the two studies has no gait".to_owned(),
-            |(without, with)| format!("at the end {with:.4} rad with, {without:.4} rad without"),
+            |(without, with)| format!("final values: {with:.4} rad with muscles, {without:.4} rad without"),
         );
         format!(
-            "subject {}, seed {}: muscles give the lower Gait RMSE at {} of {} iterations{}; {last}",
+            "subject {}, seed {}: Gait RMSE is lower with muscles at {} of {} iterations{}; {last}",
             self.subject,
             self.seed,
             self.lower,

@@ -69,7 +69,7 @@ pub(super) struct Reproduce {
     /// Number of consecutive seeds. Several are needed, because local optima can tip the comparison either way.
     #[arg(long, default_value = "3", value_name = "NUMBER", value_parser = seeds, allow_negative_numbers = true)]
     seeds: u64,
-    /// Reference gait, given as for `solve` (default: falisse-2019).
+    /// Reference gait: a name or file, as for `solve --reference` (default: falisse-2019).
     #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Folder for the database, the report and the tables. Finished studies in it are not repeated.

@@ -44,7 +44,7 @@ fn lower_rmse(subject: u32, pair_comparisons: &[PairComparison]) -> Statement {
         here: format!("throughout for {throughout} of {} seeds; at {lower} of {compared} iterations", pairs.len()),
         agrees: match throughout {
             0 => "no",
-            1 if pairs.len() == 1 => "with its only seed",
+            1 if pairs.len() == 1 => "yes, but only one seed",
             all if all == pairs.len() => "yes",
             _ => "in part",
         },

@@ -22,7 +22,8 @@ pub(in crate::cli) struct AnchoredFlags {
     #[command(flatten)]
     pub(super) record: RecordFlags,
     /// Second anchor file, for the newest hashes of the record, preferably on another disk; the first one is next to
-    /// the database (default: none). An empty name overrides the settings file: no second anchor file.
+    /// the database (default: none). With an empty name there is none, whatever the
+    /// settings file says.
     #[arg(long, value_name = "FILE")]
     pub(super) anchor: Option<String>,
 }

@@ -67,7 +67,7 @@ impl Settings {
         let queue = self.text("nats_queue");
         queue_name(queue).map_err(|_| self.refused("nats_queue", QUEUE_NAMES))?;
         if cfg!(not(feature = "nats")) && !self.text("nats").is_empty() {
-            return Err(self.refused("nats", "empty, because this program was built without the feature nats"));
+            return Err(self.refused("nats", "empty, because this program was built without the feature `nats`"));
         }
         Ok(Some((self.text("nats"), queue)).filter(|(url, _)| !url.is_empty()))
     }
@@ -138,7 +138,7 @@ impl Settings {
             ("", _) => Err(self.refused("tls_certificate", "a file, because tls_key is set")),
             (_, "") => Err(self.refused("tls_key", "a file, because tls_certificate is set")),
             _ if cfg!(not(feature = "tls")) => {
-                Err(self.refused("tls_certificate", "empty, because this program was built without the feature tls"))
+                Err(self.refused("tls_certificate", "empty, because this program was built without the feature `tls`"))
             }
             (certificate, key) => Ok(Some((certificate.into(), key.into()))),
         }

@@ -109,7 +109,7 @@ class PreferencesMethods(Transport):
         States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
         recommended, compared or planned for lab sessions until staff have reviewed the report.
 
-        Fields: answer, first, second; optionally author, note, source.
+        Fields: answer, trial_a, trial_b; optionally author, note, source.
         """
         return cast(
             Assessment,
