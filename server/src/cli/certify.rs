@@ -65,7 +65,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
         lines.push(format!("  gait {}, {}", certified.gait_sha256, certified.walker_in_words()));
         lines.extend(certified.differences.iter().map(|difference| format!("  differs: {}", difference.in_words())));
         lines.push(format!(
-            "  cost of transport {:.4} (with the magnitudes of the joint powers, which the objective smooths)",
+            "  cost of transport {:.4} (from absolute joint powers, which the objective smooths)",
             certified.unsmoothed_cost_of_transport
         ));
     }
