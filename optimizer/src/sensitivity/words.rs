@@ -95,7 +95,14 @@ mod tests {
             bound: "a6",
             value: 0.3,
             active: vec![ActiveConstraint { place: "SS1_R node 3, torso".to_owned(), multiplier: 1.0 }],
-            derivatives: FigureDerivatives { cost_of_transport: 0.1, gait_rmse_rad: 0.2 },
+            derivatives: FigureDerivatives {
+                objective: 0.1,
+                cost_of_transport: 0.1,
+                gait_rmse_rad: 0.2,
+                speed_m_s: 0.0,
+                largest_angles_rad: [0.0; 7],
+                smallest_angles_rad: [0.0; 7],
+            },
             interval,
             is_weakly_active: false,
         };
