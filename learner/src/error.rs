@@ -9,7 +9,21 @@ pub enum LearnerError {
     /// The search space has no dimension.
     #[error("the search space needs at least one dimension")]
     NoDimension,
-    /// A dimension has invalid values, or its name is taken.
+    /// The search space has too many dimensions.
+    #[error("the search space has {given} dimensions; at most {limit} are allowed")]
+    TooManyDimensions {
+        /// Number of dimensions given.
+        given: usize,
+        /// Largest number of dimensions allowed.
+        limit: usize,
+    },
+    /// Two dimensions have the same name.
+    #[error("dimension `{dimension}`: another dimension has the same name")]
+    DuplicateDimension {
+        /// The name.
+        dimension: String,
+    },
+    /// A dimension has invalid values, or is unsuitable for a request.
     #[error("dimension `{dimension}`: {reason}")]
     InvalidDimension {
         /// Name of the dimension.

@@ -127,19 +127,15 @@ impl SearchSpace {
         if dimensions.is_empty() {
             return Err(LearnerError::NoDimension);
         }
+        if dimensions.len() > MAX_DIMENSIONS {
+            return Err(LearnerError::TooManyDimensions { given: dimensions.len(), limit: MAX_DIMENSIONS });
+        }
         let mut len = 1_u64;
         for (d, dimension) in dimensions.iter().enumerate() {
-            dimension.validate()?;
-            if d >= MAX_DIMENSIONS || dimensions[..d].iter().any(|other| other.name == dimension.name) {
-                return Err(LearnerError::InvalidDimension {
-                    dimension: dimension.name.clone(),
-                    reason: if d >= MAX_DIMENSIONS {
-                        format!("it is dimension {}; at most {MAX_DIMENSIONS} are allowed", d + 1)
-                    } else {
-                        "another dimension has the same name".into()
-                    },
-                });
+            if dimensions[..d].iter().any(|other| other.name == dimension.name) {
+                return Err(LearnerError::DuplicateDimension { dimension: dimension.name.clone() });
             }
+            dimension.validate()?;
             len = len
                 .checked_mul(dimension.values.len() as u64)
                 .filter(|&len| len <= MAX_ACTIONS)

@@ -1,4 +1,4 @@
-//! Execution of gaits outside the optimiser's model: shares of simulated walks of 20 strides without a fall.
+//! Execution of gaits, simulated by a model other than the optimiser's: shares of simulated walks of 20 strides without a fall.
 //!
 //! `cargo run --release -p gait-optimizer --example execution -- [--walks 200] [--threads 2] [--training COUNT] [--gaits FILE...]`
 //!

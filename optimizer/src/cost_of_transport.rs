@@ -1,4 +1,4 @@
-//! The mechanical cost of transport of a gait, with the magnitudes of the joint powers.
+//! The mechanical cost of transport of a gait, from absolute joint powers.
 
 use crate::body::{GRAVITY, JOINTS};
 use crate::gait::Gait;

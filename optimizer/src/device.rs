@@ -21,7 +21,8 @@ pub struct Device {
     pub adapter_mass_kg: f64,
     /// Radius of gyration of the adapter, m.
     pub adapter_gyration_radius_m: f64,
-    /// Whether the user's own bent shank and foot are carried behind: an able-bodied user with a bypass adapter.
+    /// Whether the model includes the subject's own shank and foot, carried behind with the knee bent: a subject without an
+    /// amputation, with a bypass adapter.
     pub carried_limb: bool,
     /// Mass of the prosthetic shank, kg.
     pub shank_mass_kg: f64,

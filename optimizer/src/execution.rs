@@ -1,4 +1,4 @@
-//! Execution of a gait outside the optimiser's model: simulated walks under laboratory controllers.
+//! Execution of a gait: walks under laboratory controllers, simulated by a model other than the optimiser's.
 //!
 //! The plant has a floating base, compliant ground under heel and toe of both feet, Coulomb friction, joint stops, and
 //! drives with limited torque and torque rate (`plant`, `ground`, `actuator`). The prosthesis tracks the gait with what

@@ -25,7 +25,7 @@ use relaxation::alone;
 pub use relaxation::{JointRelaxation, Relaxation, RelaxedBound};
 use search::Search;
 use solves::{Solves, Stop, Unmet};
-pub use words::status_in_words;
+pub use words::{quantity, status_in_words, unit_after_number};
 
 /// Largest number of bounds in a joint relaxation.
 const MOST_TOGETHER: usize = 3;

@@ -235,7 +235,8 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     let level = format!("{} of 4 simulated walks on level ground", report["grounds"][0]["completed"]);
     assert!(found["sentence"].as_str().unwrap().starts_with(&level), "{}", found["sentence"]);
     let strides = format!("{} of 20", report["undisturbed_strides"]);
-    for text in [found["sentence"].as_str().unwrap(), "ground of ±10 mm", "seed 3", &strides, "/help/method#execution"]
+    for text in
+        [found["sentence"].as_str().unwrap(), "ground uneven by ±10 mm", "seed 3", &strides, "/help/method#execution"]
     {
         assert!(shown.contains(text), "{text}: {shown}");
     }

@@ -236,6 +236,10 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
     ] {
         let said = service.post(&answers, &body).await;
         assert_eq!(said.status, status, "{body}: {}", said.text);
+        if body["answer"] == "retracted" {
+            let allowed = "one of first, second, no_difference, cannot_tell, unsafe_first, unsafe_second, unsafe_both";
+            assert_eq!(said.json()["allowed"], allowed, "{}", said.text);
+        }
     }
     let back = service.post(&format!("{lab}/retract-answer"), &json!({})).await.json();
     assert_eq!((&back["answer_number"], &back["answer"]), (&json!(2), &Value::Null));

@@ -60,7 +60,7 @@ class Walker:
 
     @staticmethod
     def _right_thigh(height, mass, length):
-        """Human thigh, knee housing, adapter, and the user's bent shank and foot, lumped into one body."""
+        """Human thigh, knee housing, adapter, and the subject's own shank and foot, knee bent, lumped into one body."""
         own = 0.245 * height
         limb = 0.061 * mass
         parts = [

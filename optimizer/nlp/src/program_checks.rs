@@ -28,8 +28,8 @@ pub(crate) fn check_pattern(
         if column.windows(2).any(|r| r[0] >= r[1]) {
             return fail(format!("row indices of column {j} are not ascending"));
         }
-        if column.last().is_some_and(|&i| i >= rows) {
-            return fail(format!("column {j} has a row index beyond {rows}"));
+        if let Some(i) = column.last().filter(|&&i| i >= rows) {
+            return fail(format!("column {j} has a row index of {i}; it must be less than {rows}"));
         }
         if lower && column.first().is_some_and(|&i| i < j) {
             return fail(format!("column {j} has an entry above the diagonal"));
@@ -42,8 +42,27 @@ pub(crate) fn check_pattern(
 pub(crate) fn check_bounds(name: &str, lower: &[f64], upper: &[f64]) -> Result<(), NlpError> {
     for (i, (l, u)) in lower.iter().zip(upper).enumerate() {
         if l.is_nan() || u.is_nan() || l > u || *l == f64::INFINITY || *u == f64::NEG_INFINITY {
-            return Err(NlpError::InvalidProblem(format!("bounds of {name} {i} are {l} and {u}")));
+            return Err(NlpError::InvalidProblem(format!(
+                "the bounds of {name} {i}, {l} and {u}, contain no finite value"
+            )));
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refused_pattern_and_bounds_are_quoted() {
+        let pattern = SparsityPattern { rows: 2, columns: 1, column_starts: vec![0, 2], row_indices: vec![0, 2] };
+        let error = check_pattern("Jacobian", &pattern, 2, 1, false).unwrap_err();
+        let reason = "Jacobian pattern: column 0 has a row index of 2; it must be less than 2";
+        assert_eq!(error, NlpError::InvalidProblem(reason.to_owned()));
+        let error = check_bounds("variable", &[0.0, 1.0], &[0.0, -1.0]).unwrap_err();
+        let reason = "the bounds of variable 1, 1 and -1, contain no finite value";
+        assert_eq!(error, NlpError::InvalidProblem(reason.to_owned()));
+    }
 }

@@ -219,6 +219,15 @@ fn invalid_input_is_reported_by_name() {
     let crossed = Small::new("p", &[0.0], &[(1.0, -1.0)], &[], |x| (x[0], vec![x[0]]));
     assert!(matches!(go(&crossed, vec![0.0], &settings), Err(NlpError::InvalidProblem(_))));
     let mut blocks = cart_pole(10, 20.0, 1);
+    let count = blocks.blocks.as_ref().unwrap().parent.len();
+    for parent in [0, count] {
+        let mut wrong = cart_pole(10, 20.0, 1);
+        wrong.blocks.as_mut().unwrap().parent[0] = Some(parent);
+        let start = StartPoint::Cold(wrong.start.clone());
+        let error = solve(&wrong, &start, &settings, &mut |_| {}, &|| false).unwrap_err().to_string();
+        let reason = format!("the parent of block 0 is {parent}; it must be more than 0 and less than {count}");
+        assert!(error.contains(&reason), "{error}");
+    }
     blocks.blocks.as_mut().unwrap().block_of_row[3] = 0;
     blocks.blocks.as_mut().unwrap().block_of_row[30] = 0;
     let start = StartPoint::Cold(blocks.start.clone());

@@ -181,8 +181,8 @@ fn human_leg(mass: f64, leg: &LegGeometry) -> [Body; 3] {
     ]
 }
 
-/// The right thigh link: human thigh, knee housing, adapter and, if `carried_limb`, the user's bent shank and foot,
-/// lumped into one body.
+/// The right thigh link: human thigh, knee housing, adapter and, if `carried_limb`, the subject's own shank and
+/// foot with the knee bent, lumped into one body.
 fn prosthetic_leg(subject: &Subject, device: &Device, leg: &LegGeometry) -> [Body; 3] {
     let (height, mass) = (subject.height_m, subject.body_mass_kg);
     let human_thigh = THIGH_LENGTH * height;

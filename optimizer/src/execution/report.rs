@@ -59,7 +59,7 @@ pub struct StridesOnYield {
     pub strides: u32,
 }
 
-/// The execution of a gait outside the optimiser's model.
+/// The execution of a gait, simulated by a model other than the optimiser's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExecutionReport {

@@ -149,8 +149,8 @@ fn sentence_counts_the_complete_walks_of_each_ground() {
     let report = simulate(&walkable_gait(), &options, &AtomicU32::new(0), &CancelToken::new()).unwrap().unwrap();
     let [level, low, high] = [0, 1, 2].map(|ground| report.grounds[ground].completed);
     let expected = format!(
-        "{level} of 2 simulated walks on level ground, {low} of 2 simulated walks on ground of ±5 mm and {high} of 2 simulated \
-         walks on ground of ±10 mm lasted 1 stride."
+        "{level} of 2 simulated walks on level ground, {low} of 2 simulated walks on ground uneven by ±5 mm and {high} of 2 \
+         simulated walks on ground uneven by ±10 mm lasted 1 stride."
     );
     assert_eq!(report.sentence(), expected);
 }

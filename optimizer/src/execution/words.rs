@@ -3,11 +3,11 @@
 use super::report::{ExecutionReport, WalksOnGround};
 
 impl WalksOnGround {
-    /// The ground, as in "ground of ±5 mm".
+    /// The ground, as in "ground uneven by ±5 mm".
     pub fn ground_in_words(&self) -> String {
         match 1000.0 * self.ground_height_m {
             0.0 => "level ground".to_owned(),
-            millimetres => format!("ground of ±{millimetres} mm"),
+            millimetres => format!("ground uneven by ±{millimetres} mm"),
         }
     }
 }

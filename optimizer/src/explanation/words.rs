@@ -21,15 +21,24 @@ pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
     }
 }
 
-/// A bound with its value: `a7 = 5 ° (hip angle)` for the meaning `hip angle, °`.
-fn quantity(bound: &str, meaning: &str, value: f64) -> String {
+/// A bound with its value: `a7 = 5° (hip angle)` for the meaning `hip angle, °`.
+pub fn quantity(bound: &str, meaning: &str, value: f64) -> String {
     let (limited, unit) = parts(meaning);
     format!("{bound} = {value}{unit} ({limited})")
 }
 
-/// The quantity of a bound, and its unit after a space.
+/// The unit of a bound as it follows a number: ` m/s` or `°`, for the meaning `hip velocity, m/s` or `hip angle, °`.
+pub fn unit_after_number(meaning: &str) -> String {
+    parts(meaning).1
+}
+
+/// The quantity of a bound, and its unit as it follows a number.
 fn parts(meaning: &str) -> (&str, String) {
-    meaning.rsplit_once(", ").map_or_else(|| (meaning, String::new()), |(limited, unit)| (limited, format!(" {unit}")))
+    match meaning.rsplit_once(", ") {
+        None => (meaning, String::new()),
+        Some((limited, "°")) => (limited, "°".to_owned()),
+        Some((limited, unit)) => (limited, format!(" {unit}")),
+    }
 }
 
 /// A list: `a, b and c`.
@@ -127,7 +136,7 @@ impl Conflict {
 }
 
 impl GivenBound {
-    /// `a7 = 5 ° (hip angle)`.
+    /// `a7 = 5° (hip angle)`.
     fn in_words(&self) -> String {
         quantity(&self.bound, &self.meaning, self.value)
     }
@@ -179,7 +188,7 @@ impl JointRelaxation {
 }
 
 impl GivenBound {
-    /// The limit in words: `a hip angle of at most 15 °`.
+    /// The limit in words: `a hip angle of at most 15°`.
     fn limit_in_words(&self) -> String {
         let (limited, unit) = parts(&self.meaning);
         let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound);
@@ -332,7 +341,7 @@ mod tests {
         };
         assert_eq!(
             of(&[(6, 15.0), (4, 0.1)]),
-            "These bounds conflict: a hip angle of at most 15 ° and a swing-foot clearance of at least 0.1 m."
+            "These bounds conflict: a hip angle of at most 15° and a swing-foot clearance of at least 0.1 m."
         );
         assert_eq!(
             of(&[(2, 1.5)]),
@@ -348,11 +357,11 @@ mod tests {
         assert_eq!(
             sentences[1..],
             [
-                "a4 = 0.5 m/s (hip velocity upper bound) and a7 = 5 ° (hip angle) conflict with each other: with both, and \
+                "a4 = 0.5 m/s (hip velocity upper bound) and a7 = 5° (hip angle) conflict with each other: with both, and \
                  the other tuned bounds at their loosest values, no gait was found from 5 starts; the nearest motion violates \
                  SS1_R node 12, C3 forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
                  there is a gait.",
-                "Relaxing a7 (hip angle) alone, to 15 ° instead of 5 °, gives a gait; with 14.6 °, no gait was found from 3 \
+                "Relaxing a7 (hip angle) alone, to 15° instead of 5°, gives a gait; with 14.6°, no gait was found from 3 \
                  starts.",
                 "Relaxing a4 (hip velocity upper bound) alone, up to its loosest value, 3 m/s, is not sufficient: no gait was \
                  found from 3 starts.",
@@ -375,7 +384,7 @@ mod tests {
         );
         assert!(alone.ends_with("With it at its loosest value as well, there is a gait."), "{alone}");
         let three = conflict(&[(1, 20.0), (4, 0.1), (6, 5.0)]).in_words();
-        assert!(three.contains("(coordinate acceleration), a5 = 0.1 m (swing-foot clearance) and a7 = 5 °"), "{three}");
+        assert!(three.contains("(coordinate acceleration), a5 = 0.1 m (swing-foot clearance) and a7 = 5°"), "{three}");
         assert!(three.ends_with("With any one of them at its loosest value as well, there is a gait."), "{three}");
         let fixed = Conflict { naturalness_terms: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
         assert_eq!(
@@ -386,7 +395,7 @@ mod tests {
         );
         let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words();
         assert!(
-            further.starts_with("With a4 at its loosest value, another conflict remains. With a8 = 5 °"),
+            further.starts_with("With a4 at its loosest value, another conflict remains. With a8 = 5°"),
             "{further}"
         );
     }
@@ -395,8 +404,8 @@ mod tests {
     fn joint_relaxations_name_their_bounds_together() {
         assert_eq!(
             together(Some([0.65, 9.1])).in_words(),
-            "Relaxing these bounds together, to a4 = 0.65 m/s (hip velocity upper bound) instead of 0.5 m/s and a8 = 9.1 ° \
-             (ankle angle) instead of 5 °, gives a gait; with a4 = 0.61 m/s and a8 = 8.6 °, no gait was found from 3 starts."
+            "Relaxing these bounds together, to a4 = 0.65 m/s (hip velocity upper bound) instead of 0.5 m/s and a8 = 9.1° \
+             (ankle angle) instead of 5°, gives a gait; with a4 = 0.61 m/s and a8 = 8.6°, no gait was found from 3 starts."
         );
         let in_vain = together(None).in_words();
         assert!(
@@ -422,7 +431,7 @@ mod tests {
         let nothing = Explanation { violations: Vec::new(), ..earlier };
         assert!(nothing.conflicts_in_words().is_empty());
         let unknown = Relaxation { starts: 0, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words();
-        assert!(unknown.ends_with("with 14.6 °, no gait was found."), "{unknown}");
+        assert!(unknown.ends_with("with 14.6°, no gait was found."), "{unknown}");
     }
 
     #[test]

@@ -17,6 +17,8 @@ const CHANGES: [(&str, f64); TunedBounds::COUNT] = [
 ];
 /// Number of places that a sentence names.
 const PLACES: usize = 3;
+/// An interval without ends.
+const ANY_VALUE: &str = "any value";
 
 impl GaitSensitivities {
     /// One sentence for each bound that matters, and one for the others.
@@ -33,6 +35,22 @@ impl GaitSensitivities {
 }
 
 impl BoundSensitivity {
+    /// The values with the same active constraints, as far as the bound can have them: `0.1 to 0.2`, `0.1 or more`.
+    pub fn interval_in_words(&self, number: fn(f64) -> String) -> String {
+        let range = TunedBounds::NAMES.iter().zip(TunedBounds::RANGES).find(|(name, _)| **name == self.bound);
+        let (lowest, highest) = range.map_or((f64::NEG_INFINITY, f64::INFINITY), |(_, range)| range);
+        let (least, most) = self.interval;
+        let least = least.filter(|least| *least > lowest).map(number);
+        let most = most.filter(|most| *most < highest).map(number);
+        match (least, most) {
+            (None, None) => ANY_VALUE.to_owned(),
+            (Some(least), None) => format!("{least} or more"),
+            (None, Some(most)) => format!("{most} or less"),
+            (Some(least), Some(most)) if least == most => format!("about {least}"),
+            (Some(least), Some(most)) => format!("{least} to {most}"),
+        }
+    }
+
     fn sentence(&self, cost_of_transport: f64) -> String {
         let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound).unwrap_or(0);
         let (change, by) = CHANGES[place];
@@ -51,16 +69,54 @@ impl BoundSensitivity {
         } else {
             ""
         };
-        let end = |value: Option<f64>| value.map_or_else(|| "any value".to_owned(), figure);
+        let values = match self.interval_in_words(figure).as_str() {
+            ANY_VALUE => ANY_VALUE.to_owned(),
+            values => format!("values of {values}"),
+        };
         format!(
             "{} ({quantity}): {change} {stricter} changes the cost of transport by {} % and Gait RMSE by {} rad. Active at {}. \
-             The same constraints stay active from {} to {}.{weak}",
+             The same constraints stay active for {values}.{weak}",
             self.bound,
             figure(100.0 * by * derivatives.cost_of_transport / cost_of_transport),
             figure(by * derivatives.gait_rmse_rad),
             places.join("; "),
-            end(self.interval.0),
-            end(self.interval.1),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ActiveConstraint, FigureDerivatives};
+    use super::*;
+
+    #[test]
+    fn sentence_names_the_values_with_the_same_active_constraints() {
+        let of = |interval| BoundSensitivity {
+            bound: "a6",
+            value: 0.3,
+            active: vec![ActiveConstraint { place: "SS1_R node 3, torso".to_owned(), multiplier: 1.0 }],
+            derivatives: FigureDerivatives {
+                objective: 0.1,
+                cost_of_transport: 0.1,
+                gait_rmse_rad: 0.2,
+                speed_m_s: 0.0,
+                largest_angles_rad: [0.0; 7],
+                smallest_angles_rad: [0.0; 7],
+            },
+            interval,
+            is_weakly_active: false,
+        };
+        for (interval, values) in [
+            ((None, None), "for any value."),
+            ((Some(0.25), None), "for values of 0.25 or more."),
+            ((None, Some(0.5)), "for values of 0.5 or less."),
+            ((Some(0.25), Some(0.5)), "for values of 0.25 to 0.5."),
+            ((Some(0.3), Some(0.300_01)), "for values of about 0.3."),
+            // Ends outside the range of the bound are none.
+            ((Some(-1.0), Some(100.0)), "for any value."),
+        ] {
+            let sentence = of(interval).sentence(1.0);
+            assert!(sentence.ends_with(&format!("The same constraints stay active {values}")), "{sentence}");
+        }
     }
 }

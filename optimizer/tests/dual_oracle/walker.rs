@@ -166,7 +166,8 @@ impl Walker {
     }
 }
 
-/// The right thigh lumps human thigh, knee housing, adapter, and the user's own bent shank and foot.
+/// The right thigh lumps human thigh, knee housing, adapter, and the subject's own shank and foot with
+/// the knee bent.
 fn right_thigh(height: f64, mass: f64, length: f64) -> Body {
     let own_thigh = 0.245 * height;
     let limb = 0.061 * mass;

@@ -70,7 +70,10 @@ impl Parallel {
     pub fn legend(&self) -> Vec<(String, String)> {
         let mut legend = Vec::new();
         if self.lines.iter().any(|line| line.outcome.is_some()) {
-            legend.push(("key c0 solid".to_owned(), "trial with a gait: the better, the stronger".to_owned()));
+            legend.push((
+                "key c0 solid".to_owned(),
+                "trial with a gait: the better the gait, the stronger the line".to_owned(),
+            ));
         }
         if self.lines.iter().any(|line| line.outcome.is_none()) {
             legend.push(("key c1 dashed".to_owned(), "trial without a gait".to_owned()));
@@ -113,7 +116,7 @@ impl Parallel {
         let outcomes = Axis::over(self.lines.iter().filter_map(|line| line.outcome), 5, false);
         let height = |outcome: f64| {
             let place = outcomes.place(outcome);
-            // The best end is on top.
+            // Better outcomes are at the top.
             if self.low_is_good { TOP + place * (bottom - TOP) } else { bottom - place * (bottom - TOP) }
         };
         let level = |axis: &ParallelAxis, level: usize| {

@@ -120,20 +120,6 @@ pub(crate) fn walks_in_words(judgement: Judgement) -> &'static str {
     }
 }
 
-/// The answer of a rater about the two sides of a pair.
-pub(crate) fn sides_in_words(answer: Judgement) -> &'static str {
-    match answer {
-        Judgement::First => "the first gait is better",
-        Judgement::Second => "the second gait is better",
-        Judgement::NoDifference => "no difference",
-        Judgement::CannotTell => "cannot tell",
-        Judgement::UnsafeFirst => "the first gait is unsafe",
-        Judgement::UnsafeSecond => "the second gait is unsafe",
-        Judgement::UnsafeBoth => "both gaits are unsafe",
-        Judgement::Retracted => "retracted",
-    }
-}
-
 /// Where an answer comes from.
 pub(crate) fn source(row: &FeedbackRow) -> &'static str {
     // A rater need not be the subject or a clinician; known is only whether the answer is blind.

@@ -1,4 +1,4 @@
-//! `gaitwright simulate`: walks with a gait outside the optimiser's model.
+//! `gaitwright simulate`: simulates walks with a gait, by a model other than the optimiser's.
 
 use super::flag_numbers::{number, seed, whole};
 use super::gait_file::read_gait_file;

@@ -41,7 +41,7 @@ impl FromStr for Kind {
         [Self::View, Self::Export, Self::Refused]
             .into_iter()
             .find(|kind| kind.as_str() == text)
-            .ok_or_else(|| super::StoreError::Damaged { what: "kind of access", reason: text.to_owned() })
+            .ok_or_else(|| super::StoreError::unknown_value("kind of access", text))
     }
 }
 

@@ -78,7 +78,7 @@ pub async fn of_subject(db: &mut Connection, subject: SubjectId) -> StoreResult<
             let kind = match row.try_get("kind")? {
                 "given" => ConsentKind::Given,
                 "withdrawn" => ConsentKind::Withdrawn,
-                other => return Err(StoreError::Damaged { what: "consent", reason: other.to_owned() }),
+                other => return Err(StoreError::unknown_value("consent", other)),
             };
             Ok(Consent {
                 seq: row.try_get("seq")?,

@@ -237,6 +237,14 @@ pub enum StoreError {
 }
 
 impl StoreError {
+    /// A stored text that is none of the known values of its column.
+    pub(super) fn unknown_value(what: &'static str, text: &str) -> Self {
+        let reason = format!(
+            "unknown value {text:?}. Run `gaitwright audit verify`, then restore a backup with `gaitwright restore`"
+        );
+        Self::Damaged { what, reason }
+    }
+
     /// Whether the change was refused, here or by a trigger, because the subject withdrew consent.
     pub fn is_withdrawal(&self) -> bool {
         match self {
@@ -301,5 +309,20 @@ impl<T> OnConstraint<T> for StoreResult<T> {
             StoreError::Database(sqlx::Error::Database(d)) if d.message().contains(name) => error(),
             _ => e.into(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::StudyState;
+
+    #[test]
+    fn unknown_stored_value_is_quoted_with_what_to_do() {
+        let error = "sleeping".parse::<StudyState>().unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "The record is damaged (study state): unknown value \"sleeping\". Run `gaitwright audit verify`, then restore a \
+             backup with `gaitwright restore`."
+        );
     }
 }

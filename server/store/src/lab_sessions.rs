@@ -41,7 +41,7 @@ impl FromStr for Act {
         Self::ALL
             .into_iter()
             .find(|act| act.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "act of a lab session", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("act of a lab session", text))
     }
 }
 

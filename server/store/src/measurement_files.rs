@@ -39,7 +39,7 @@ impl FromStr for MeasurementKind {
         [Self::Electromyogram, Self::Motion]
             .into_iter()
             .find(|kind| kind.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "kind of a measurement file", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("kind of a measurement file", text))
     }
 }
 

@@ -43,7 +43,7 @@ impl FromStr for Kind {
         [Self::New, Self::Repeat, Self::Null]
             .into_iter()
             .find(|kind| kind.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "presentation kind", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("presentation kind", text))
     }
 }
 
@@ -149,7 +149,7 @@ impl FromStr for Judgement {
         Self::ALL
             .into_iter()
             .find(|judgement| judgement.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "presentation answer", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("presentation answer", text))
     }
 }
 

@@ -105,9 +105,6 @@ impl Role {
 impl FromStr for Role {
     type Err = StoreError;
     fn from_str(text: &str) -> Result<Self, StoreError> {
-        Self::ALL
-            .into_iter()
-            .find(|role| role.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "role", reason: text.to_owned() })
+        Self::ALL.into_iter().find(|role| role.as_str() == text).ok_or_else(|| StoreError::unknown_value("role", text))
     }
 }

@@ -33,7 +33,7 @@ impl FromStr for SafetyDecision {
         [Self::Walkable, Self::Unsafe]
             .into_iter()
             .find(|decision| decision.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "decision of a safety review", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("decision of a safety review", text))
     }
 }
 

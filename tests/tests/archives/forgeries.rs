@@ -278,7 +278,7 @@ pub(super) const FORGERIES: [Forgery; 68] = [
     (
         "a preference from nowhere",
         |r| of_source(r, "clinician")["source"] = "convergence".into(),
-        "the source of a preference is convergence",
+        "a preference cannot have the source convergence",
     ),
     (
         "an answer by a name with spaces around it",

@@ -256,7 +256,10 @@ async fn browser_rater_with_two_tabs_answers_once() {
         .await;
     }
     let told = other.text("main").await;
-    assert!(told.contains("was already answered") && told.contains("“first”, counts"), "{told}");
+    assert!(
+        told.contains("was already answered") && told.contains("Your first answer counts: the first gait is better."),
+        "{told}"
+    );
     assert_eq!(other.text("h1").await, "Answer not saved");
     other.click("main a.button[href='/rate']").await;
     other.wait_until("location.pathname === '/rate'").await;

@@ -58,7 +58,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     page.wait_until(&format!("{phase} !== {before:?}")).await;
     // The sentence about certainty states what the recommendation says.
     let sure = page.text("[data-part=best]").await;
-    assert!(sure.contains("Its Gait RMSE is measured, not believed: it is the lowest of"), "{sure}");
+    assert!(sure.contains("Its Gait RMSE is computed, not estimated: it is the lowest of"), "{sure}");
     // Another gait walks once this one is reported as unsafe.
     let report = format!("/api/v1/trials/{}/safety-reports", best["trial_id"].as_str().unwrap());
     assert!(site.service.post(&report, &serde_json::json!({"note": "fell"})).await.status.is_success());
@@ -98,7 +98,11 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     let study = site.service.study(|new| new.trial_budget = 200).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.resize(1280, 800).await;
-    assert!(page.text("[data-walker]").await.contains("walks here after the first converged trial"));
+    assert!(
+        page.text("[data-walker]")
+            .await
+            .contains("An animation of the recommended gait appears here after the first converged trial")
+    );
     // The first gait walks without a reload, and the better one after it.
     page.run("window.same = true").await;
     page.wait_for(".outcome fieldset:enabled [data-phase]").await;

@@ -28,8 +28,8 @@ pub(crate) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Re
         ));
     }
     for (b, parent) in blocks.parent.iter().enumerate() {
-        if parent.is_some_and(|p| p <= b || p >= count) {
-            return fail(format!("the parent of block {b} must have a larger number"));
+        if let Some(p) = parent.filter(|&p| p <= b || p >= count) {
+            return fail(format!("the parent of block {b} is {p}; it must be more than {b} and less than {count}"));
         }
     }
     let of = block_of_index(blocks);

@@ -47,7 +47,7 @@ pub(super) async fn ask(
             return request.done(&app, writer, &Trial::from(trial)).await;
         }
     }
-    Err(Error::conflict("The study is changing too fast. Try again.").into())
+    Err(Error::conflict("The study was changed at the same time. Try again.").into())
 }
 
 /// Gives out a trial again, unless its bounds were reported as unsafe in the meantime.
@@ -90,5 +90,5 @@ pub(super) async fn tell(
             return request.done(&app, writer, &Trial::from(trial)).await;
         }
     }
-    Err(Error::conflict("The study is changing too fast. Try again.").into())
+    Err(Error::conflict("The study was changed at the same time. Try again.").into())
 }

@@ -181,7 +181,11 @@ fn worse(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Option
 
 fn believed_worse(behind: &Prediction) -> String {
     let percent = percent(behind.probability_above_zero());
-    if is_told(behind) { format!("yes, with {percent}") } else { format!("too few comparisons to tell ({percent})") }
+    if is_told(behind) {
+        format!("yes ({percent} sure)")
+    } else {
+        format!("too few comparisons to tell ({percent} sure)")
+    }
 }
 
 /// The bounds with several values, the one that matters most first.

@@ -25,15 +25,15 @@ fn measured(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
     let rmse = |trial: &&Trial| trial.gait_rmse_rad.unwrap_or(f64::INFINITY);
     let lowest = others.min_by(|a, b| rmse(a).total_cmp(&rmse(b)));
     Some(match (lowest, belief.gaits.len()) {
-        (None, _) => "Its Gait RMSE is measured, not believed. It is the only gait so far.".to_owned(),
+        (None, _) => "Its Gait RMSE is computed, not estimated. It is the only gait so far.".to_owned(),
         (Some(other), _) if rmse(&other) < own => format!(
-            "Gait RMSE is measured, not believed: that of trial {} is lower, {} rad. The learner recommends by utility, \
-             which it also infers from gaits with similar bounds.",
+            "Trial {} has a lower Gait RMSE, {} rad. The learner recommends by estimated utility, which also draws on gaits \
+             with similar bounds.",
             other.number,
             figure(other.gait_rmse_rad)
         ),
         (Some(_), gaits) => {
-            format!("Its Gait RMSE is measured, not believed: it is the lowest of {gaits} different gaits.")
+            format!("Its Gait RMSE is computed, not estimated: it is the lowest of {gaits} different gaits.")
         }
     })
 }

@@ -34,7 +34,7 @@ impl InWords {
             let words = if differences.is_empty() { "none".to_owned() } else { differences.join("; ") };
             figures.push(("Differences from the built-in device and the default settings", words));
             let cost = format::number(certified.unsmoothed_cost_of_transport);
-            figures.push(("Cost of transport with the magnitudes of the joint powers", cost));
+            figures.push(("Cost of transport from absolute joint powers, not smoothed", cost));
         }
         if let Some(map) = &certificate.return_map {
             figures.push(("Largest Poincaré multiplier", format::number(map.largest)));

@@ -9,7 +9,7 @@ use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::Violation;
-use gait_optimizer::explanation::{Explanation, status_in_words};
+use gait_optimizer::explanation::{Explanation, quantity, status_in_words};
 use gaitwright_service::access::Run;
 use gaitwright_service::studies::explanation::{self, Effort, Elapsed, ExplanationState};
 use gaitwright_store::trials::Trial;
@@ -40,7 +40,7 @@ impl NoGait {
         let usual = match elapsed.usual_seconds {
             None => "This is the first explanation since the service started; most take a few minutes.".to_owned(),
             Some(usual) if usual > elapsed.seconds => format!("About {} left.", time(usual - elapsed.seconds)),
-            Some(usual) => format!("Earlier explanations took about {}; this one takes longer.", time(usual)),
+            Some(usual) => format!("Earlier explanations took about {}; this one is taking longer.", time(usual)),
         };
         format!("Running for {}. {usual}", time(elapsed.seconds))
     }
@@ -70,7 +70,7 @@ impl NoGait {
 
 /// A relaxation that gives a gait.
 pub(super) struct WayOut {
-    /// `a7 = 20 ° (hip angle)`.
+    /// `a7 = 20° (hip angle)`.
     pub(super) label: String,
     /// The bounds and their values as a parameter of the form for a new study: `a5=0.03,a7=20`.
     pub(super) relax: String,
@@ -78,11 +78,7 @@ pub(super) struct WayOut {
 
 impl WayOut {
     fn of(bounds: &[(&str, f64)]) -> Self {
-        let label = |(bound, value): &(&str, f64)| {
-            let meaning = format::meaning(bound);
-            let unit = meaning.rsplit_once(", ").map_or(String::new(), |(_, unit)| format!(" {unit}"));
-            format!("{bound} = {value}{unit} ({})", format::limited(bound))
-        };
+        let label = |(bound, value): &(&str, f64)| quantity(bound, format::meaning(bound), *value);
         let relax = |(bound, value): &(&str, f64)| format!("{bound}={value}");
         Self {
             label: bounds.iter().map(label).collect::<Vec<_>>().join(" and "),
@@ -115,14 +111,14 @@ mod tests {
         assert_eq!(progress(20, Some(80)), "Running for 20 s. About 60 s left.");
         assert_eq!(
             progress(90, Some(80)),
-            "Running for 2 min. Earlier explanations took about 80 s; this one takes longer."
+            "Running for 2 min. Earlier explanations took about 80 s; this one is taking longer."
         );
     }
 
     #[test]
     fn way_out_names_each_bound_with_its_unit() {
         let way = WayOut::of(&[("a5", 0.03), ("a7", 20.0)]);
-        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20 ° (hip angle)");
+        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20° (hip angle)");
         assert_eq!(way.relax, "a5=0.03,a7=20");
     }
 }

@@ -49,7 +49,7 @@ struct GaitPage {
     summary: Option<GaitSummary>,
     may_run: bool,
     certificate: Option<certificate::InWords>,
-    /// Walks outside the optimiser's model, for a converged gait.
+    /// Simulated walks, for a converged gait.
     walks: Option<SimulatedWalks>,
     /// Whether the page offers the sensitivities of a converged gait, which take a second.
     offers_sensitivities: bool,

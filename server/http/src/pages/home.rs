@@ -4,7 +4,7 @@ use crate::AppState;
 use crate::authorization::SignedIn;
 use crate::authorization::{Authorized, Refused};
 use crate::extractors::Params;
-use crate::format::{variant, words};
+use crate::format::variant;
 use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;
@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_charts::sparkline;
 use gaitwright_service::access::{Permission, Rate, Read, Run, sign_in};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::safety_reports;
+use gaitwright_service::studies::{lifecycle, safety_reports};
 use gaitwright_store::studies::{Study, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
@@ -128,7 +128,7 @@ fn is_without_gait(state: StudyState, counts: TrialCounts) -> bool {
 }
 
 fn state_in_words(state: StudyState, counts: TrialCounts) -> String {
-    if is_without_gait(state, counts) { "finished, no gait".to_owned() } else { words(state.as_str()) }
+    if is_without_gait(state, counts) { "finished, no gait".to_owned() } else { lifecycle::in_words(state).to_owned() }
 }
 
 struct Waiting {
@@ -187,7 +187,7 @@ fn waiting(study: Study) -> Waiting {
         // A pause by a user has no reason; a pause by the service has one.
         StudyState::Paused if study.state_reason.is_empty() => ("paused: resume it to continue".to_owned(), ""),
         StudyState::Paused => (format!("paused: {}", study.state_reason), ""),
-        _ => ("not started yet".to_owned(), ""),
+        _ => (lifecycle::in_words(study.state).to_owned(), ""),
     };
     Waiting { link: format!("/studies/{}{place}", study.id), what, study }
 }

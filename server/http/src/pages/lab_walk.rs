@@ -75,7 +75,7 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
             _ if seen.was_unsafe() => "a walk was reported as unsafe".to_owned(),
             (Some(walk), _) => format!("walk {walk} is next"),
             (None, Some(_)) => "all walks recorded, answer pending".to_owned(),
-            (None, None) => "all walks recorded, question answered".to_owned(),
+            (None, None) => "all walks recorded, answer saved".to_owned(),
         };
         sessions.push((session.id, session.created_at, next));
     }

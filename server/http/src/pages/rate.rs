@@ -6,7 +6,6 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extractors::{Form, Params};
-use crate::format;
 use crate::page_error::{Page, PageError, page};
 use crate::problem_details::Problem;
 use askama::Template;
@@ -31,7 +30,7 @@ const SEARCHED: u32 = 200;
 #[template(path = "rate.html")]
 struct RatePage {
     studies: Vec<(StudyId, String)>,
-    /// The study whose next pair comes by itself.
+    /// The study whose next pair appears automatically.
     next: Option<StudyId>,
     /// Whether the caller can see any study.
     assigned: bool,
@@ -53,7 +52,7 @@ impl RatePage {
         self.next.as_ref() == Some(study)
     }
 
-    /// Seconds until the next pair comes by itself, after the time to undo an answer.
+    /// Seconds until the next pair appears automatically, after the time to undo an answer.
     fn pause(&self) -> u32 {
         match (self.nothing, self.undo) {
             (true, _) => LOOK_AGAIN_S,
@@ -85,7 +84,7 @@ impl Saved {
     }
 
     fn words(&self) -> &'static str {
-        format::sides_in_words(self.answer)
+        blind::sides_in_words(self.answer)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Sensitivities on the page of a gait.
 
 use crate::format;
-use gait_optimizer::TunedBounds;
+use gait_optimizer::explanation::unit_after_number;
 use gait_optimizer::sensitivity::BoundSensitivity;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
@@ -45,14 +45,14 @@ impl Row {
     fn new(bound: &BoundSensitivity, step: &BoundStep, cost_of_transport: f64) -> Self {
         let is_active = !bound.active.is_empty();
         let changes = |text: String| if is_active { text } else { "no change".to_owned() };
-        let unit = format::meaning(bound.bound).rsplit_once(", ").map_or("", |(_, unit)| unit);
+        let unit = unit_after_number(format::meaning(bound.bound));
         Self {
             bound: bound.bound,
-            step: format!("{} to {} {unit}", format::number(bound.value), format::number(step.to)),
+            step: format!("{} to {}{unit}", format::number(bound.value), format::number(step.to)),
             cost: changes(change(100.0 * step.cost_of_transport / cost_of_transport)),
             rmse: changes(change(step.gait_rmse_rad)),
             beyond: !step.keeps_active,
-            interval: interval(bound),
+            interval: bound.interval_in_words(format::number),
             active: domains(bound),
         }
     }
@@ -62,22 +62,6 @@ impl Row {
 fn change(value: f64) -> String {
     let sign = if value > 0.0 { "+" } else { "" };
     format!("{sign}{}", format::number(value))
-}
-
-/// The values of a bound with the same active constraints, as far as the bound has them at all.
-fn interval(bound: &BoundSensitivity) -> String {
-    let range = TunedBounds::NAMES.iter().zip(TunedBounds::RANGES).find(|(name, _)| **name == bound.bound);
-    let (lowest, highest) = range.map_or((f64::NEG_INFINITY, f64::INFINITY), |(_, range)| range);
-    let (least, most) = bound.interval;
-    match (least.filter(|least| *least > lowest), most.filter(|most| *most < highest)) {
-        (None, None) => "any value".to_owned(),
-        (Some(least), None) => format!("{} or more", format::number(least)),
-        (None, Some(most)) => format!("{} or less", format::number(most)),
-        (Some(least), Some(most)) if format::number(least) == format::number(most) => {
-            format!("about {}", format::number(least))
-        }
-        (Some(least), Some(most)) => format!("{} to {}", format::number(least), format::number(most)),
-    }
 }
 
 /// `SS1_R (12), DS3_L (2)`, in the order of multipliers; a dash if nothing is active.

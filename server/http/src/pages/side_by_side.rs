@@ -7,7 +7,7 @@ use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::figures::{COURSE, Outcome, StudyResults, course, have_one_reference_gait};
-use crate::format::{self, words};
+use crate::format;
 use crate::page_error::{Page, page};
 use askama::Template;
 use axum::extract::State;
@@ -17,6 +17,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::lifecycle;
 use gaitwright_store::studies::{Study, StudyFilter};
 use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
 use serde::Deserialize;
@@ -123,7 +124,7 @@ fn rows(study: &StudyResults, outcome: &Outcome, comparable: bool) -> Vec<(Strin
     let best = outcome.best.and_then(|id| study.snapshot.trial(id));
     let seconds: f64 = study.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
     let mut rows = vec![
-        ("State".to_owned(), words(study.snapshot.study.state.as_str())),
+        ("State".to_owned(), lifecycle::in_words(study.snapshot.study.state).to_owned()),
         ("Subject".to_owned(), study.subject.clone()),
         ("Reference gait".to_owned(), study.reference_gait.clone()),
         ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),

@@ -77,7 +77,7 @@ impl Shown {
         let [lightest, heaviest] = report.body_mass_kg;
         let figures = vec![
             ("Strides without any disturbance", of_strides(report.undisturbed_strides)),
-            ("Strides without any other disturbance", by_yield.join(", ")),
+            ("Strides on harder and softer ground, otherwise undisturbed", by_yield.join(", ")),
             ("Largest push at the hip survived without other disturbances", pushes(&report)),
             (
                 "Disturbed walks",

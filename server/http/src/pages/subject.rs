@@ -16,6 +16,7 @@ use gaitwright_service::access::{Administer, Caller, Permission, Reach, Read, Ru
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
 use gaitwright_service::studies::lab::LabSessionView;
+use gaitwright_service::studies::lifecycle;
 use gaitwright_service::studies::subject::{self, NewCorrection, NewSubject};
 use gaitwright_store::consents::{self, Consent, ConsentKind};
 use gaitwright_store::studies::Study;
@@ -162,7 +163,7 @@ enum Typed {
 /// A study of the subject.
 struct StudyRow {
     study: Study,
-    state: String,
+    state: &'static str,
     variant: &'static str,
     counts: TrialCounts,
 }
@@ -291,7 +292,12 @@ async fn studies_of(db: &mut Connection, reach: Reach, id: SubjectId) -> Result<
     let mut rows = Vec::new();
     for study in studies::of_subject(db, reach, id, PAGE).await? {
         let counts = trials::counts(db, study.id).await?;
-        rows.push(StudyRow { state: words(study.state.as_str()), variant: variant(study.plan.muscles), counts, study });
+        rows.push(StudyRow {
+            state: lifecycle::in_words(study.state),
+            variant: variant(study.plan.muscles),
+            counts,
+            study,
+        });
     }
     Ok(rows)
 }

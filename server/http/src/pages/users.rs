@@ -30,10 +30,10 @@ const SCOPES: [(Right, &str); 5] = [
     (Right::Read, "see studies, trials and gaits"),
     (Right::Run, "create, start and stop studies; ask for trials and report their outcomes"),
     (Right::Answer, "answer comparisons and review safety reports"),
-    (Right::Rate, "compare gaits blind"),
+    (Right::Rate, "compare gaits blind, and record walks and answers of lab sessions"),
     (
         Right::Device,
-        "fetch the controller files of walks; for the device in the lab, without any other scope: otherwise its downloads count as not blind",
+        "fetch the controller files of walks. For the device in the lab; give its token no other scope, or its downloads count as not blind",
     ),
 ];
 

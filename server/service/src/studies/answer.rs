@@ -26,6 +26,18 @@ pub enum PairAnswer {
     NoDifference,
 }
 
+/// Refuses the answer that only the service gives.
+///
+/// # Errors
+/// [`Error::Invalid`] with the answers that people give.
+pub(super) fn refuse_retracted(answer: Judgement) -> Result<(), Error> {
+    if answer != Judgement::Retracted {
+        return Ok(());
+    }
+    let others = Judgement::ALL.into_iter().filter(|other| *other != answer).map(Judgement::as_str);
+    Err(Error::invalid("answer", "retracted", &format!("one of {}", others.collect::<Vec<_>>().join(", "))))
+}
+
 /// A preference to record.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

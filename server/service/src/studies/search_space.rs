@@ -43,7 +43,16 @@ impl GivenSpace {
         let at = |name: &str| self.dimensions.iter().position(|dimension| dimension.name == name).unwrap_or_default();
         match SearchSpace::new(self.dimensions.clone()) {
             Ok(space) => Ok(space),
-            Err(LearnerError::NoDimension) => Err(Error::invalid(FIELD, json!([]), "at least one dimension")),
+            Err(LearnerError::NoDimension) => Err(Error::invalid(FIELD, json!([]), "a list of at least one dimension")),
+            Err(LearnerError::TooManyDimensions { given, limit }) => {
+                let message = format!("{FIELD} has {given} entries; it must be a list of at most {limit} dimensions.");
+                Err(FieldError::in_words(FIELD, &message).into())
+            }
+            Err(LearnerError::DuplicateDimension { dimension }) => {
+                let last = self.dimensions.iter().rposition(|other| other.name == dimension).unwrap_or_default();
+                let field = format!("{FIELD}[{last}].name");
+                Err(Error::invalid(&field, dimension, "a name that no other dimension has"))
+            }
             Err(LearnerError::InvalidDimension { dimension, reason }) => {
                 let at = at(&dimension);
                 let values = self.dimensions.get(at).map(|dimension| json!(dimension.values)).unwrap_or_default();
@@ -140,6 +149,28 @@ mod tests {
         validate(&space, TunedBounds::default()).unwrap();
         let last = bounds_of(&space, TunedBounds::default(), ActionIndex(11_663)).unwrap();
         assert_eq!(last, TunedBounds { a3: 0.5, a5: 0.039, ..TunedBounds::default() });
+    }
+
+    #[test]
+    fn refused_dimensions_are_named_with_what_is_allowed() {
+        let dimension =
+            |name: &str, values: &[f64]| Dimension { name: name.to_owned(), values: values.to_vec(), lengthscale: 1.0 };
+        let refused = |dimensions: Vec<Dimension>| match (GivenSpace { dimensions }).checked() {
+            Err(Error::Invalid(field)) => (field.field, field.message),
+            other => panic!("{other:?}"),
+        };
+        let (field, message) = refused(Vec::new());
+        assert_eq!(field, "search_space.dimensions");
+        assert_eq!(message, "search_space.dimensions is []; it must be a list of at least one dimension.");
+        let (field, message) = refused(vec![dimension("a1", &[20.0]), dimension("a1", &[20.0, 15.0])]);
+        assert_eq!(field, "search_space.dimensions[1].name");
+        assert!(message.ends_with("it must be a name that no other dimension has."), "{message}");
+        let (field, message) = refused((0..257).map(|i| dimension(&format!("a{i}"), &[1.0])).collect());
+        assert_eq!(field, "search_space.dimensions");
+        assert!(message.contains("has 257 entries") && message.contains("at most 256 dimensions"), "{message}");
+        let (field, message) = refused(vec![dimension("a1", &[20.0]), dimension("a2", &[80.0, 70.0])]);
+        assert_eq!(field, "search_space.dimensions[1].values");
+        assert!(message.contains("it must be a list of increasing values"), "{message}");
     }
 
     #[test]

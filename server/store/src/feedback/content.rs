@@ -41,7 +41,7 @@ impl FromStr for Source {
         [Self::Convergence, Self::GaitRmse, Self::Subject, Self::Clinician, Self::Script]
             .into_iter()
             .find(|source| source.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "feedback source", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("feedback source", text))
     }
 }
 

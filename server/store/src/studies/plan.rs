@@ -36,7 +36,7 @@ impl FromStr for FeedbackMode {
         [Self::Automatic, Self::Human, Self::Mixed]
             .into_iter()
             .find(|mode| mode.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "feedback mode", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("feedback mode", text))
     }
 }
 
@@ -66,7 +66,7 @@ impl FromStr for Evaluation {
         [Self::Optimizer, Self::Script]
             .into_iter()
             .find(|evaluation| evaluation.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "evaluation", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("evaluation", text))
     }
 }
 

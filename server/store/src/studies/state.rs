@@ -48,6 +48,6 @@ impl FromStr for StudyState {
         [Self::Draft, Self::Running, Self::Waiting, Self::Paused, Self::Finished, Self::Stopped]
             .into_iter()
             .find(|state| state.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "study state", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("study state", text))
     }
 }

@@ -60,6 +60,6 @@ impl FromStr for TrialState {
         Self::ALL
             .into_iter()
             .find(|state| state.as_str() == text)
-            .ok_or_else(|| StoreError::Damaged { what: "trial state", reason: text.to_owned() })
+            .ok_or_else(|| StoreError::unknown_value("trial state", text))
     }
 }

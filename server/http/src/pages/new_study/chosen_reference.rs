@@ -62,12 +62,17 @@ fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> Strin
             let name = &first.reference_gait.name;
             format!("{name}: nearest to the subject in height and body mass{}.", away(first))
         }
-        Some(first) => format!(
-            "{}{} is nearer to the subject in height and body mass than this one{}.",
-            first.reference_gait.name,
-            away(first),
-            away(chosen)
-        ),
+        Some(first) => {
+            let chosen = chosen.distance.map_or_else(
+                || "The distance of the chosen one is unknown.".to_owned(),
+                |distance| format!("The distance of the chosen one is {distance:.2}."),
+            );
+            format!(
+                "{}{} is the nearest to the subject in height and body mass. {chosen}",
+                first.reference_gait.name,
+                away(first)
+            )
+        }
         None => String::new(),
     }
 }

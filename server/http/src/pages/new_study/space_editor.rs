@@ -91,6 +91,12 @@ impl SpaceEditor {
             LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
                 Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))
             }
+            LearnerError::TooManyActions { limit } => {
+                let field = self.rows.iter().find(|row| row.tuned).map_or("a1", |row| row.name);
+                let message =
+                    format!("The values of the bounds have more than {limit} combinations. Give fewer values.");
+                FieldError::in_words(&format!("values_{field}"), &message).into()
+            }
             other => Error::Learner(other),
         })?;
         Ok((space, fixed))
@@ -154,6 +160,16 @@ mod tests {
         assert_eq!(refused(&[("tuned_a1", "on"), ("lengthscale_a1", "-5")]), "lengthscale_a1");
         assert_eq!(refused(&[("tuned_a5", "on"), ("fixed_a6", "NaN")]), "fixed_a6");
         assert_eq!(refused(&[("fixed_a6", "0.1")]), "tuned_a1");
+        // 1,000 values of each bound within its range.
+        let mut every = Vec::new();
+        for (name, (low, high)) in TunedBounds::NAMES.into_iter().zip(TunedBounds::RANGES) {
+            let value = |step: usize| (low + (high - low) * step as f64 / 1000.0).to_string();
+            every.push((format!("tuned_{name}"), "on".to_owned()));
+            every.push((format!("values_{name}"), (0..1000).map(value).collect::<Vec<_>>().join(" ")));
+            every.push((format!("lengthscale_{name}"), (high - low).to_string()));
+        }
+        let every: Vec<(&str, &str)> = every.iter().map(|(name, value)| (name.as_str(), value.as_str())).collect();
+        assert_eq!(refused(&every), "values_a1");
         assert!(matches!(SpaceEditor::typed(&typed(&[("values_a0", "1")])), Err(Error::Malformed(_))));
     }
 }

@@ -19,7 +19,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::figures::{COURSE, Outcome, course, utility, warm_starts};
-use crate::format::{self, Bound, words};
+use crate::format::{self, Bound};
 use crate::page_error::{Page, PageError, page};
 use crate::visible::Visible;
 use askama::Template;
@@ -487,7 +487,7 @@ fn view(
     let files = format!("/api/v1/studies/{}/figures", snapshot.study.id);
     let acts = if may_run { acts_of_people(snapshot.study.state) } else { Vec::new() };
     Live {
-        state: words(snapshot.study.state.as_str()),
+        state: lifecycle::in_words(snapshot.study.state).to_owned(),
         may_stop: acts.contains(&Act::Stop),
         may_extend: acts.contains(&Act::Extend),
         acts: acts.into_iter().filter_map(button).collect(),
@@ -525,9 +525,9 @@ fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
     let solves = |count: u32| if count == 1 { "1 solve".to_owned() } else { format!("{count} solves") };
     match (running, queued) {
         (0, _) => "The next solve is queued.".to_owned(),
-        (_, 0) => format!("The next solve is queued. Running: {} of other studies.", solves(running)),
+        (_, 0) => format!("The next solve is queued. Other studies have {} running.", solves(running)),
         (_, others) => {
-            format!("The next solve is queued. Running: {} of other studies; queued: {} more.", solves(running), others)
+            format!("The next solve is queued. Other studies have {} running and {others} queued.", solves(running))
         }
     }
 }

@@ -179,13 +179,7 @@ pub async fn answer(
 ) -> Result<(StudyId, Answered), Error> {
     let sided = own(writer, caller, token).await?;
     let shown = &sided.presentation;
-    if given.answer == Judgement::Retracted {
-        return Err(Error::invalid(
-            "answer",
-            "retracted",
-            "one of the other answers, because this value is reserved for the service",
-        ));
-    }
+    answering::refuse_retracted(given.answer)?;
     printable::note("note", &given.note, 2000)?;
     if given.response_ms.is_some_and(|ms| ms < 0) {
         return Err(Error::invalid("response_ms", json!(given.response_ms), "0 or more"));
@@ -242,10 +236,23 @@ fn answered_already(before: Option<Judgement>) -> String {
     match before {
         Some(Judgement::Retracted) => "This pair was already answered, and the answer was retracted.".to_owned(),
         Some(judgement) => {
-            let judgement = judgement.as_str().replace('_', " ");
-            format!("This pair was already answered. Your first answer, \u{201c}{judgement}\u{201d}, counts.")
+            format!("This pair was already answered. Your first answer counts: {}.", sides_in_words(judgement))
         }
         None => "This pair was already answered.".to_owned(),
+    }
+}
+
+/// The answer of a rater about the two sides of a pair.
+pub fn sides_in_words(answer: Judgement) -> &'static str {
+    match answer {
+        Judgement::First => "the first gait is better",
+        Judgement::Second => "the second gait is better",
+        Judgement::NoDifference => "no difference",
+        Judgement::CannotTell => "cannot tell",
+        Judgement::UnsafeFirst => "the first gait is unsafe",
+        Judgement::UnsafeSecond => "the second gait is unsafe",
+        Judgement::UnsafeBoth => "both gaits are unsafe",
+        Judgement::Retracted => "retracted",
     }
 }
 

@@ -8,6 +8,7 @@ use super::session::{LabSessionProgress, session_progress, still_open, still_sho
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
+use crate::studies::answer as answering;
 use crate::studies::assessment;
 use crate::studies::preference::{self, Again, GivenJudgement};
 use crate::studies::safety_report;
@@ -53,13 +54,7 @@ pub async fn give(
     id: LabSessionId,
     new: &NewAnswer,
 ) -> Result<LabSessionProgress, Error> {
-    if new.answer == Judgement::Retracted {
-        return Err(Error::invalid(
-            "answer",
-            "retracted",
-            "one of the other answers, because this value is reserved for the service",
-        ));
-    }
+    answering::refuse_retracted(new.answer)?;
     printable::note("note", &new.note, LONGEST_NOTE)?;
     let session = still_shown(writer, id).await?;
     let number = next_number(&session);

@@ -124,7 +124,8 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
                 return Err(format!("category {category} does not match the trial state {}", state.as_str()));
             }
             if !matches!(row.source, Source::Convergence | Source::Script) {
-                return Err(format!("the source of a label is {}", row.source.as_str()));
+                let source = row.source.as_str();
+                return Err(format!("the source of a label is {source}; it must be convergence or script"));
             }
         }
         FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
@@ -134,7 +135,7 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
                 return Err("it compares a trial that did not converge".to_owned());
             }
             match row.source {
-                Source::Convergence => return Err("the source of a preference is convergence".to_owned()),
+                Source::Convergence => return Err("a preference cannot have the source convergence".to_owned()),
                 Source::GaitRmse => {
                     if study.plan.feedback_mode == FeedbackMode::Human {
                         return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());

@@ -127,9 +127,7 @@ fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result
     let Some(report) = &trial.report else { return Ok(()) };
     let anew = GaitFigures::of(gait, reference).map_err(|e| e.to_string())?;
     match GaitFigures::stated_in(report).difference(&anew) {
-        Some((name, stated, anew)) => {
-            Err(format!("its stated {name} is {stated}, but computed from its gait it is {anew}"))
-        }
+        Some((name, stated, anew)) => Err(format!("its stated {name} is {stated}, but its gait gives {anew}")),
         None => Ok(()),
     }
 }
