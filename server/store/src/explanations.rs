@@ -2,7 +2,7 @@
 
 use super::audit::Actor;
 use super::members::{binds, reached};
-use super::{Connection, Instant, StoreResult, StudyId, TrialId, json_columns, now};
+use super::{Connection, Instant, StoreResult, StudyId, TrialId, former_documents, json_columns, now};
 use crate::accessible_studies::Reach;
 use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
@@ -31,7 +31,7 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Exp
         Ok(Explained {
             program: row.try_get("program")?,
             problem_sha256: row.try_get("problem_sha256")?,
-            explanation: json_columns::column(&row, "document")?,
+            explanation: former_documents::explanation(row.try_get("document")?)?,
             created_at: row.try_get("created_at")?,
         })
     })

@@ -33,6 +33,7 @@ pub mod events;
 pub mod execution_reports;
 pub mod explanations;
 pub mod feedback;
+mod former_documents;
 mod free_disk_space;
 pub mod gaits;
 mod id;

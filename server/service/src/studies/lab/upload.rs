@@ -36,8 +36,6 @@ pub enum MeasurementFormat {
 #[serde(deny_unknown_fields, default)]
 pub struct EmgReading {
     /// File format.
-    // Older records have the name `form`.
-    #[serde(alias = "form")]
     pub format: MeasurementFormat,
     /// Sampling rate of a CSV file without a `time_s` column, Hz.
     #[schema(minimum = 100, maximum = 20000)]
@@ -184,8 +182,6 @@ pub struct NewEmg {
 pub struct MotionReading {
     /// File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     /// knee_R_rad, ankle_R_rad.
-    // Older records have the name `form`.
-    #[serde(alias = "form")]
     pub format: MeasurementFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     pub unit: Option<Unit>,
@@ -328,7 +324,6 @@ pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Uploa
     /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
     struct Reading {
-        #[serde(alias = "form")]
         format: MeasurementFormat,
     }
     let recording = measurement_files::get(db, id).await?;
