@@ -23,6 +23,7 @@ pub mod authors;
 pub mod backup;
 pub mod backup_folder;
 mod borrowed_connection;
+pub mod cancelled_jobs;
 pub mod certificates;
 mod compressed_columns;
 mod connection;
