@@ -66,8 +66,6 @@ pub struct Certificate {
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
     /// The reasons for a failed certificate, as text; empty if it passed.
-    // Records can name the field `objections`.
-    #[serde(alias = "objections")]
     pub failures: Vec<String>,
     /// Each quantity with its worst value and its limit.
     pub checks: Vec<Check>,

@@ -73,7 +73,7 @@ pub struct Conflict {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
     /// Naturalness terms that take part, if fixed constraints conflict.
-    #[serde(default, skip_serializing_if = "Vec::is_empty", alias = "wishes")] // the name in older records
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub naturalness_terms: Vec<String>,
     /// Violations of the nearest motion with these bounds and the other tuned bounds relaxed, worst first. Stationary
     /// points of the violation are preferred.

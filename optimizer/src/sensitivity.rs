@@ -38,12 +38,13 @@ pub struct BoundSensitivity {
     pub value: f64,
     /// The constraints that it sets and that are active. Empty: small changes of the bound change nothing.
     pub active: Vec<ActiveConstraint>,
-    /// Derivatives of the figures of the gait.
+    /// Derivatives of the results of the gait.
     pub derivatives: FigureDerivatives,
     /// Values of the bound between which the active constraints stay the same, to first order; `None` if they do for every
     /// value in that direction.
     pub interval: (Option<f64>, Option<f64>),
-    /// Whether a constraint is about to become active or inactive, so that the derivatives on the two sides differ.
+    /// Whether a constraint is about to become active or inactive, in which case the derivatives on the two sides
+    /// differ.
     pub is_weakly_active: bool,
 }
 

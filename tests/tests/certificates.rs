@@ -296,7 +296,8 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
     service.post(&format!("{job}/cancel"), &json!({})).await;
     service.stop().await;
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
-    assert_eq!(service.fetch(&job).await.status, StatusCode::NOT_FOUND, "cancelled");
+    until(&service, "cancelled").await;
+    assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
     service.stop().await;
 }
 

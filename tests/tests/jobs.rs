@@ -11,6 +11,7 @@ use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, TokenId, TrialId, commit};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::FORM;
 use gaitwright_tests::certified::Verdicts;
 use gaitwright_tests::cli;
 use gaitwright_tests::explained::{Clearance, with_few_gaits};
@@ -129,7 +130,10 @@ async fn requested_certificate_is_computed_after_a_restart_unless_cancelled() {
     wait_for(&service, &jobs[0], "done").await;
     assert_eq!(service.fetch(&format!("/api/v1/trials/{kept}/certificate")).await.json()["passed"], true);
     assert!(listed(&service, "certificate").await.is_empty());
-    assert_eq!(service.fetch(&jobs[1]).await.status, StatusCode::NOT_FOUND);
+    assert_eq!(service.fetch(&jobs[1]).await.json()["state"], "cancelled", "until it is requested again");
+    assert_eq!(service.fetch(&format!("/api/v1/trials/{cancelled}/certificate")).await.status, StatusCode::NOT_FOUND);
+    address(&service.post(&format!("/api/v1/trials/{cancelled}/certificate"), &json!({})).await);
+    wait_for(&service, &jobs[1], "done").await;
     service.stop().await;
 }
 
@@ -150,6 +154,31 @@ async fn explanation_job_stops_and_starts_again() {
     assert!(listed(&service, "explanation").await.is_empty());
     address(&service.post(&explanation, &json!({})).await);
     wait_for(&service, &job, "running").await;
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.status, StatusCode::OK);
+    let page = service.post_text(&format!("/trials/{trial}/explain"), FORM, "").await;
+    assert_eq!(page.status, StatusCode::SEE_OTHER, "{}", page.text);
+    wait_for(&service, &job, "running").await;
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn cancelled_explanation_stays_cancelled_after_a_restart() {
+    let (folder, service, study, _) = service().await;
+    let trial = first(&service, study, TrialState::NotConverged).await;
+    service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
+    let explanation = format!("/api/v1/trials/{trial}/explanation");
+    let job = address(&service.post(&explanation, &json!({})).await);
+    wait_for(&service, &job, "running").await;
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.status, StatusCode::OK);
+    service.stop().await;
+
+    let solver = Analytic::slow(Duration::from_millis(10));
+    let service = Service::start_explaining(&folder.path().join("a.db"), solver, Clearance::default()).await;
+    wait_for(&service, &job, "cancelled").await;
+    assert!(listed(&service, "explanation").await.is_empty());
+    assert_eq!(service.fetch(&explanation).await.status, StatusCode::NOT_FOUND);
+    address(&service.post(&explanation, &json!({})).await);
+    wait_for(&service, &job, "done").await;
     service.stop().await;
 }
 

@@ -59,10 +59,8 @@ pub struct ReturnMap {
     /// constraints: the component of the result in that direction. It is a multiplier only if the direction is
     /// invariant, which the transition from SS2 to SS1 by force prevents. The multiplier of the zero dynamics is
     /// [`Self::largest`] of the map with a free hip velocity.
-    #[serde(alias = "zero_dynamics")]
     pub speed_kept: f64,
     /// Norm of the response in the other directions, relative to the change.
-    #[serde(alias = "zero_dynamics_leak")]
     pub speed_leak: f64,
 }
 

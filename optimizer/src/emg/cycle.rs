@@ -113,7 +113,7 @@ pub struct EmgRmse {
     /// RMS difference of each channel, in the order of normal walking.
     pub parts: Vec<f64>,
     /// Warnings about doubtful channels.
-    #[serde(default, alias = "remarks", skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
 

@@ -1,5 +1,8 @@
 //! Random draws of a simulated walk. Each walk has a stream of its own, so that its draws depend neither on other walks
 //! nor on threads.
+//!
+//! The learner has a generator of its own (`learner/src/random.rs`): neither crate depends on the other, and with another
+//! generator the seeds of stored reports, or of studies, would no longer give the same numbers.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WalksOnGround {
-    /// Largest height and depth of the plateaus of the ground, m.
+    /// Largest height of bumps and depth of dips in the ground, m.
     pub ground_height_m: f64,
     /// Number of simulated walks.
     pub walks: u32,

@@ -10,7 +10,7 @@ use serde::Serialize;
 /// two nodes share the peak of a joint.
 const LARGEST_CHANGE: f64 = 1e-5;
 
-/// Derivatives of figures per unit of a tuned bound.
+/// Derivatives of the results with respect to a tuned bound.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FigureDerivatives {
     /// Of the objective.

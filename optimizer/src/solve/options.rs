@@ -21,7 +21,6 @@ pub struct SolveOptions {
     /// does not depend on it.
     pub threads: usize,
     /// Number of initial guesses that a cold start always tries ([`InitialGuess::first`]), 1 to [`InitialGuess::MOST`].
-    #[serde(alias = "cold_guesses")] // the name in plans of older records
     pub initial_guesses: usize,
     /// Whether further guesses follow until one converges.
     pub retry: bool,

@@ -37,6 +37,5 @@ pub enum SolvePhase {
     /// Minimisation of the cost of transport.
     Cost,
     /// Minimisation of the cost of transport with tightened bounds.
-    #[serde(alias = "between_points")] // the name in progress of older records
     InterNode,
 }

@@ -18,10 +18,10 @@ use utoipa::ToSchema;
 /// Media type of a problem document.
 pub(super) const PROBLEM_JSON: &str = "application/problem+json";
 
-/// A problem document.
+/// An error response (problem details, RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub(super) struct Problem {
-    /// Address that identifies the kind of problem, and of a page that explains it. It does not change between
+    /// URI of the kind of error, which is also the address of a page that explains it. It does not change between
     /// versions.
     #[serde(rename = "type")]
     pub(super) kind: &'static str,

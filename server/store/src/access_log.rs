@@ -10,7 +10,8 @@ use std::collections::HashMap;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of access.
+/// Kind of access: `view`, data were shown; `export`, data were downloaded as a file; `refused`, the request was
+/// refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = AccessKind)]

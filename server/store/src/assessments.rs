@@ -63,7 +63,7 @@ impl TryFrom<Judgement> for AssessmentAnswer {
 pub struct Assessment {
     /// Identifier.
     pub id: AssessmentId,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// The trial with gait A.
     pub trial_a: TrialId,
@@ -73,7 +73,7 @@ pub struct Assessment {
     pub answer: AssessmentAnswer,
     /// Who answered.
     pub source: Source,
-    /// Author.
+    /// Name or pseudonym of the person who answered.
     pub author: String,
     /// Free text.
     pub note: String,

@@ -52,15 +52,14 @@ pub async fn keep(db: &mut Connection, trial: TrialId, certificate: &Certificate
     Ok(done.rows_affected() > 0)
 }
 
-/// Trials whose certificates were requested and were neither made nor cancelled since. The audit trail holds the
-/// requests, so a request that was acknowledged outlives the process.
+/// Trials whose certificates were requested and not made since. The audit trail holds the requests, so a request that
+/// was acknowledged outlives the process.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn requested(db: &mut Connection) -> StoreResult<Vec<TrialId>> {
     let sql = "select distinct t.id from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) \
                where a.action = ?1 and t.state = 'converged' \
-               and not exists (select 1 from audit c where c.seq > a.seq and c.object = 'job certificate-' || t.id) \
                and not exists (select 1 from certificates c where c.trial_id = t.id and c.format_version = ?2) \
                order by t.id";
     Ok(sqlx::query_scalar(sql).bind(REQUESTED).bind(certificate::FORMAT_VERSION).fetch_all(db).await?)

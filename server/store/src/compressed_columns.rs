@@ -3,7 +3,6 @@
 use super::{StoreError, StoreResult, json_columns};
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
-use std::marker::PhantomData;
 
 /// A compressed text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,12 +36,17 @@ impl PackedText {
 #[derive(Debug, Clone)]
 pub struct Packed<T> {
     json: PackedText,
-    holds: PhantomData<fn() -> T>,
+    parse: fn(&'static str, &str) -> StoreResult<T>,
 }
 
 impl<T: DeserializeOwned> Packed<T> {
     pub(super) fn new(json: PackedText) -> Self {
-        Self { json, holds: PhantomData }
+        Self { json, parse: json_columns::from_text }
+    }
+
+    /// The same, parsed by another function.
+    pub(super) fn read_by(self, parse: fn(&'static str, &str) -> StoreResult<T>) -> Self {
+        Self { parse, ..self }
     }
 
     /// Decompresses the JSON text.
@@ -58,6 +62,6 @@ impl<T: DeserializeOwned> Packed<T> {
     /// # Errors
     /// As [`PackedText::text`], and if the text is not the JSON of such a value.
     pub fn unpack(&self, pool: &OnPool) -> StoreResult<T> {
-        json_columns::from_text(self.json.what, &self.json.text(pool)?)
+        (self.parse)(self.json.what, &self.json.text(pool)?)
     }
 }

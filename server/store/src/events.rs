@@ -9,7 +9,7 @@ use sqlx::Row;
 pub struct Event {
     /// Sequence number over all studies.
     pub seq: i64,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Kind of the event: `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`,
     /// `feedback_retracted`, `lab_session_answered`, `reported_unsafe`, `safety_reviewed`, `gait_certified`, `trial_explained`,

@@ -18,7 +18,7 @@ pub const STORED: &str = "trial.simulate";
 /// Payload of the event with a report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GaitSimulated {
-    /// The trial.
+    /// Identifier of the trial.
     pub trial_id: TrialId,
     /// Its number.
     pub number: u32,
@@ -62,8 +62,8 @@ pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<K
     .transpose()
 }
 
-/// Trials whose reports were requested and neither stored nor cancelled since, with the numbers of walks and the seeds,
-/// oldest request first.
+/// Trials whose reports were requested and not stored since, with the numbers of walks and the seeds, oldest request
+/// first.
 ///
 /// # Errors
 /// Errors of the database.
@@ -71,7 +71,6 @@ pub async fn requested(db: &mut Connection) -> StoreResult<Vec<(TrialId, u32, u6
     let rows = sqlx::query(
         "select t.id, json_extract(a.detail, '$.walks') as walks, json_extract(a.detail, '$.seed') as seed \
          from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) where a.action = ?1 \
-         and not exists (select 1 from audit c where c.seq > a.seq and c.object = 'job execution_report-' || t.id) \
          and not exists (select 1 from audit c where c.seq > a.seq and c.object = a.object and c.action in (?1, ?2)) \
          order by a.seq",
     )

@@ -2,11 +2,14 @@
 
 use super::audit::Actor;
 use super::members::{binds, reached};
-use super::{Connection, Instant, StoreResult, StudyId, TrialId, json_columns, now};
+use super::{Connection, Instant, StoreResult, StudyId, TrialId, former_documents, json_columns, now};
 use crate::accessible_studies::Reach;
 use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
 use std::collections::BTreeSet;
+
+/// The action in the audit trail that requests an explanation.
+pub const REQUESTED: &str = "trial.ask_explanation";
 
 /// A stored explanation.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +34,7 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Exp
         Ok(Explained {
             program: row.try_get("program")?,
             problem_sha256: row.try_get("problem_sha256")?,
-            explanation: json_columns::column(&row, "document")?,
+            explanation: former_documents::explanation(row.try_get("document")?)?,
             created_at: row.try_get("created_at")?,
         })
     })
@@ -77,8 +80,8 @@ pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bo
     Ok(found.await?.is_some())
 }
 
-/// The trials with a requested explanation that is not stored yet, and their studies. Only studies that the caller can
-/// access, of subjects who have not withdrawn consent.
+/// The trials with a requested explanation that is not stored yet, and their studies, oldest request first. Only studies
+/// that the caller can access, of subjects who have not withdrawn consent.
 ///
 /// # Errors
 /// Errors of the database.
@@ -89,7 +92,8 @@ pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(Tr
          join studies s on s.id = t.study_id \
          where r.trial_id not in (select trial_id from explanations) \
          and s.subject_id not in (select subject_id from withdrawn_subjects) and ",
-        reached!("t.study_id")
+        reached!("t.study_id"),
+        " order by r.created_at, r.trial_id"
     ))
     .bind(every)
     .bind(open)
@@ -97,25 +101,6 @@ pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(Tr
     .fetch_all(db)
     .await?;
     rows.iter().map(|row| Ok((row.try_get("trial_id")?, row.try_get("study_id")?))).collect()
-}
-
-/// The trial whose explanation was requested first and is not stored yet. Skips trials in `refused` and of subjects who
-/// have withdrawn consent.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn next_requested(db: &mut Connection, refused: &BTreeSet<TrialId>) -> StoreResult<Option<TrialId>> {
-    Ok(sqlx::query_scalar(
-        "select r.trial_id from explanation_requests r join trials t on t.id = r.trial_id \
-         join studies s on s.id = t.study_id \
-         where r.trial_id not in (select trial_id from explanations) \
-         and r.trial_id not in (select value from json_each(?)) \
-         and s.subject_id not in (select subject_id from withdrawn_subjects) \
-         order by r.created_at, r.trial_id limit 1",
-    )
-    .bind(json_columns::to_text("trials", refused)?)
-    .fetch_optional(db)
-    .await?)
 }
 
 /// The first trial of an ended study that did not converge, can be explained and has no explanation, except those in

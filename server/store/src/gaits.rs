@@ -1,6 +1,6 @@
 //! Stored gaits: trajectory, warm start and iterations of completed solves, compressed.
 
-use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, json_columns, now};
+use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, former_documents, json_columns, now};
 use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
@@ -143,7 +143,8 @@ pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<Pack
 /// # Errors
 /// [`StoreError::Missing`] if the trial has none; errors of the database.
 pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Vec<IterationRecord>>> {
-    column(db, trial, "iterations", "select iterations from gaits where trial_id = ?").await
+    let packed = column(db, trial, "iterations", "select iterations from gaits where trial_id = ?").await?;
+    Ok(packed.read_by(former_documents::iterations))
 }
 
 /// Deletes the gaits of a study, except those of the `kept` trials, their warm starts, and gaits of lab sessions.

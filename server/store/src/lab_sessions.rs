@@ -52,7 +52,7 @@ pub struct LabSessionStep {
     pub note: String,
     /// Who did it.
     pub actor: String,
-    /// Time.
+    /// Time of the step.
     pub at: Instant,
 }
 
@@ -61,7 +61,7 @@ pub struct LabSessionStep {
 pub struct LabSession {
     /// Identifier.
     pub id: LabSessionId,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Number in the study, from 1.
     pub number: u32,
@@ -104,7 +104,7 @@ impl LabSession {
 /// A session to add.
 #[derive(Debug, Clone)]
 pub struct NewLabSession<'a> {
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Number in the study, from 1.
     pub number: u32,

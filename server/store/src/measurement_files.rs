@@ -3,7 +3,7 @@
 use super::audit::Actor;
 use super::{
     Connection, EmgResultId, Instant, LabSessionId, MeasurementFileId, PackedText, StoreError, StoreResult,
-    json_columns, now,
+    former_documents, json_columns, now,
 };
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
@@ -13,7 +13,7 @@ use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of measurement file.
+/// Kind of measurement file: `electromyogram`, an EMG recording; `motion`, joint angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeasurementKind {
@@ -48,7 +48,7 @@ impl FromStr for MeasurementKind {
 pub struct MeasurementFile {
     /// Identifier.
     pub id: MeasurementFileId,
-    /// The session.
+    /// Identifier of the lab session.
     pub session_id: LabSessionId,
     /// Number of the walk, 1 to 3.
     pub walk: u8,
@@ -180,7 +180,7 @@ pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: MeasurementFileI
         .await?
         .ok_or_else(|| missing(id))?;
     let file = PackedText::new("recording", row.try_get("raw")?, Some(row.try_get("raw_sha256")?));
-    Ok((json_columns::column(&row, "reading")?, file))
+    Ok((former_documents::reading(row.try_get("reading")?)?, file))
 }
 
 /// Adds a result of EMG processing.
@@ -214,7 +214,7 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
         .bind(session)
         .fetch_optional(db)
         .await?;
-    row.as_ref().map(|row| json_columns::column(row, "document")).transpose()
+    row.map(|row| former_documents::emg_result(row.try_get("document")?)).transpose()
 }
 
 /// Every result of EMG processing of a session, oldest first.
@@ -223,7 +223,7 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
 /// Errors of the database.
 pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<T>> {
     let rows = sqlx::query("select document from emg_results where session_id = ? order by id").bind(session);
-    rows.fetch_all(db).await?.iter().map(|row| json_columns::column(row, "document")).collect()
+    rows.fetch_all(db).await?.iter().map(|row| former_documents::emg_result(row.try_get("document")?)).collect()
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<MeasurementFile> {

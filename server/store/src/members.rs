@@ -47,7 +47,7 @@ pub enum MemberKind {
 pub struct Member {
     /// Identifier of the membership.
     pub id: MemberId,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Whether it is a user or a token.
     pub kind: MemberKind,

@@ -47,7 +47,8 @@ impl FromStr for Kind {
     }
 }
 
-/// Content of an assessment.
+/// Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. Only the service
+/// gives `retracted`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {
@@ -160,7 +161,7 @@ pub struct Presentation {
     pub id: PresentationId,
     /// Token by which the rater knows the pair.
     pub token: String,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
     pub rater: String,
@@ -203,7 +204,7 @@ impl Presentation {
 pub struct NewPresentation {
     /// Token by which the rater knows the pair.
     pub token: String,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
     pub rater: String,

@@ -15,7 +15,7 @@ pub struct AttemptResult {
     pub taken: bool,
     /// How the solve ended.
     pub status: SolveStatus,
-    /// Figures of the solve. Figures that are not finite are omitted.
+    /// Numerical results of the solve, without those that are not finite.
     pub report: Option<SolveReport>,
     /// Time of arrival.
     pub received_at: Instant,

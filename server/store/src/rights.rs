@@ -5,7 +5,11 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// A right. The scopes of a token are rights.
+/// A right of a user or a token: `read`, everything except blinded data; `run`, create, start, pause and stop studies,
+/// plan lab sessions, and evaluate trials by scripts; `answer`, give preferences without blinding, and review safety
+/// reports; `rate`, compare gaits blind, and record walks and answers in lab sessions; `device`, fetch the controller
+/// files of walks; `administer`, manage users and tokens, unblind, read the audit trail and make backups. The scopes of
+/// a token are rights other than `administer`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Right {
@@ -15,7 +19,7 @@ pub enum Right {
     Run,
     /// Give preferences without blinding; review safety reports.
     Answer,
-    /// Compare gaits blind.
+    /// Compare gaits blind; record walks and answers in lab sessions.
     Rate,
     /// Fetch controller files of lab walks, for the device in the lab. A user who can read and fetches one no longer
     /// counts as blind.
@@ -67,7 +71,8 @@ impl Rights {
     }
 }
 
-/// Role of a user.
+/// Role of a user: `admin` has every right; `clinician` runs studies and gives preferences; `rater` compares gaits
+/// blind and records walks and answers in lab sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -75,7 +80,7 @@ pub enum Role {
     Admin,
     /// Runs studies and gives preferences.
     Clinician,
-    /// Compares gaits blind and sees nothing else.
+    /// Compares gaits blind, and records walks and answers in lab sessions.
     Rater,
 }
 

@@ -10,7 +10,7 @@ use sqlx::sqlite::SqliteRow;
 pub struct SafetyReport {
     /// Identifier.
     pub id: SafetyReportId,
-    /// The trial.
+    /// Identifier of the trial.
     pub trial_id: TrialId,
     /// Kind of the author.
     pub source: Source,

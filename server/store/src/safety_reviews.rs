@@ -7,11 +7,11 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Decision of a review.
+/// Decision of a safety review: `walkable`, the gait is cleared for walking; `unsafe`, it remains marked as unsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SafetyDecision {
-    /// The gait may be walked again.
+    /// The gait is cleared for walking.
     Walkable,
     /// The gait remains marked as unsafe.
     Unsafe,
@@ -46,11 +46,11 @@ pub struct SafetyReview {
     pub trial_id: TrialId,
     /// The reports that the review covers. Another report about the same gait needs another review.
     pub reports: Vec<SafetyReportId>,
-    /// Decision.
+    /// Decision about the reports.
     pub decision: SafetyDecision,
-    /// Reviewer.
+    /// Name or pseudonym of the reviewer.
     pub author: String,
-    /// Reason.
+    /// Reason for the decision.
     pub reason: String,
     /// Time of the review.
     pub created_at: Instant,

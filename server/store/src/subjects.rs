@@ -52,7 +52,7 @@ pub struct Correction {
     pub height_m: f64,
     /// Corrected body mass, kg.
     pub body_mass_kg: f64,
-    /// Reason.
+    /// Reason for the correction.
     pub reason: String,
     /// Who corrected it.
     pub actor: String,

@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant as Steady};
 use utoipa::ToSchema;
 
-/// A time in the record.
+/// A time in UTC (RFC 3339).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[schema(value_type = String, format = DateTime)]
 #[serde(try_from = "String", into = "String")]

@@ -13,7 +13,7 @@ pub struct Token {
     pub id: TokenId,
     /// Unique name that states its purpose.
     pub name: String,
-    /// Scopes.
+    /// Rights of the token.
     pub scopes: Vec<Right>,
     /// Who created it. The token is revoked when this user is disabled or is no longer an administrator.
     pub created_by: String,

@@ -5,14 +5,14 @@ use crate::rights::Role;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-/// User.
+/// A person who signs in: administrator, clinician or rater.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct User {
     /// Identifier.
     pub id: UserId,
     /// Name or code, unique ignoring case.
     pub name: String,
-    /// Role.
+    /// Role, which determines the rights of the user.
     pub role: Role,
     /// Whether the user has a password. Otherwise only one-time links work.
     pub has_password: bool,

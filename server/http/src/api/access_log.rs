@@ -30,7 +30,7 @@ pub(super) struct Filter {
     tag = "operation",
     params(
         ("contains" = Option<String>, Query, max_length = 200, description = "Text to find in the kind, actor, address, object, study or pseudonym"),
-        ("subject_id" = Option<SubjectId>, Query, description = "Rows of this subject")
+        ("subject_id" = Option<SubjectId>, Query, description = "Only rows of this subject")
     ),
     responses((status = 200, description = "A page", body = Page<AccessRow>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),

@@ -34,7 +34,7 @@ const CHUNK_BYTES: usize = 1 << 16;
     path = "/studies/{id}/archive",
     operation_id = "get_study_archive",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "Unsigned archive for `gaitwright import`", body = Binary, content_type = "application/octet-stream"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -108,7 +108,7 @@ impl Write for Chunks {
     path = "/studies/{id}/imports",
     operation_id = "list_study_imports",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "Imports, ending with the one into this record", body = Page<Import>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

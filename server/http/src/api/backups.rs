@@ -49,7 +49,7 @@ pub(super) async fn create(State(app): State<AppState>, request: Idempotent<Admi
     path = "/backups/{id}",
     operation_id = "get_backup",
     tag = "operation",
-    params(("id" = BackupId, Path, description = "The backup")),
+    params(("id" = BackupId, Path, description = "Identifier of the backup")),
     responses((status = 200, description = "Complete, verified backup", body = Backup)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]

@@ -25,9 +25,9 @@ pub(super) struct Pair {
     token: String,
     /// Number of the pair for this rater.
     number: u32,
-    /// Address of the motion that is shown first.
+    /// URL of the motion that is shown first.
     first: String,
-    /// Address of the motion that is shown second.
+    /// URL of the motion that is shown second.
     second: String,
 }
 
@@ -46,7 +46,7 @@ pub(super) struct NextPair {
     path = "/studies/{id}/blind-pairs/next",
     operation_id = "draw_blind_pair",
     tag = "blind",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "Pair, or null if no comparison is pending", body = NextPair)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
@@ -95,7 +95,7 @@ pub(super) enum Side {
     operation_id = "get_blind_motion",
     tag = "blind",
     params(
-        ("token" = String, Path, description = "The pair"),
+        ("token" = String, Path, description = "Token of the pair"),
         ("side" = inline(Side), Path, description = "Which motion of the pair")
     ),
     responses((status = 200, description = "Motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
@@ -134,7 +134,7 @@ pub(super) async fn motion(
     path = "/blind-pairs/{token}/answer",
     operation_id = "answer_blind_pair",
     tag = "blind",
-    params(("token" = String, Path, description = "The pair")),
+    params(("token" = String, Path, description = "Token of the pair")),
     request_body = RaterAnswer,
     responses((status = 200, description = "Confirmation", body = Answered)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
@@ -160,7 +160,7 @@ pub(super) async fn answer(
     path = "/studies/{id}/raters",
     operation_id = "list_rater_agreement",
     tag = "blind",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "One row for each rater", body = Page<RaterFigures>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -204,7 +204,7 @@ pub(super) struct UnblindedRater {
     path = "/studies/{id}/raters/unblind",
     operation_id = "unblind_rater",
     tag = "blind",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body = Unblind,
     responses((status = 200, description = "Pairs of the rater, in order", body = UnblindedRater)),
     security(("token" = ["administer"]), ("session" = ["administer"])),

@@ -25,7 +25,7 @@ use gaitwright_store::{TrialId, certificates};
     path = "/trials/{id}/certificate",
     operation_id = "get_certificate",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Certificate", body = Certificate), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -47,7 +47,7 @@ pub(super) async fn get(
     path = "/trials/{id}/certificate",
     operation_id = "request_certificate",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses(
         (status = 200, description = "Finished job for the existing certificate", body = Job),
         (status = 202, description = "Job that makes the certificate, which takes a few seconds", body = Job)

@@ -39,7 +39,7 @@ pub(super) async fn list(
 
 /// Add a device from a data file
 ///
-/// An identical file returns the existing device.
+/// If there is a device with the same file, the response contains it.
 #[utoipa::path(
     post,
     path = "/devices",
@@ -75,7 +75,7 @@ pub(super) async fn create(
     path = "/devices/{id}",
     operation_id = "get_device",
     tag = "devices",
-    params(("id" = DeviceId, Path, description = "The device")),
+    params(("id" = DeviceId, Path, description = "Identifier of the device")),
     responses((status = 200, description = "Device", body = Device)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

@@ -49,7 +49,7 @@ impl From<KeptReport> for TrialExecutionReport {
     path = "/trials/{id}/execution-report",
     operation_id = "get_execution_report",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Execution report", body = TrialExecutionReport), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -72,7 +72,7 @@ pub(super) async fn get(
     path = "/trials/{id}/execution-report",
     operation_id = "request_execution_report",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     request_body = WalksAsked,
     responses(
         (status = 200, description = "Finished job, if the newest report has this number of walks and this seed", body = Job),

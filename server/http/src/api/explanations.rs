@@ -77,7 +77,7 @@ impl TrialExplanation {
     path = "/trials/{id}/explanation",
     operation_id = "get_explanation",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses(
         (status = 200, description = "Explanation", body = TrialExplanation),
         (status = 409, description = "The trial cannot be explained, or the subject withdrew consent")
@@ -108,7 +108,7 @@ pub(super) async fn get(
     path = "/trials/{id}/explanation",
     operation_id = "request_explanation",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses(
         (status = 200, description = "Finished job for the existing explanation", body = Job),
         (status = 202, description = "Job that makes the explanation, which takes a few minutes and has lower priority than solves", body = Job)

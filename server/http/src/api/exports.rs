@@ -41,7 +41,7 @@ pub(super) fn two_hundred() -> f64 {
     path = "/trials/{id}/problem.json",
     operation_id = "get_solve_problem",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Input for `gaitwright solve --problem`", body = documents::SolveProblem), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -64,7 +64,7 @@ pub(super) async fn problem(
     path = "/trials/{id}/gait.mot",
     operation_id = "get_gait_motion_file",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
     responses((status = 200, description = "OpenSim motion file in degrees, with OpenSim's signs", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -92,7 +92,7 @@ pub(super) async fn motion_file(
     path = "/trials/{id}/controller.json",
     operation_id = "get_controller_file",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
     responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = documents::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

@@ -31,9 +31,9 @@ pub(super) struct ComparedWith<T> {
     operation_id = "get_study_figure",
     tag = "figures",
     params(
-        ("id" = StudyId, Path, description = "The study"),
+        ("id" = StudyId, Path, description = "Identifier of the study"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("other" = Option<StudyId>, Query, description = "Study for comparison")
+        ("other" = Option<StudyId>, Query, description = "Identifier of a study for comparison")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -59,9 +59,9 @@ pub(super) async fn of_study(
     operation_id = "get_trial_figure",
     tag = "figures",
     params(
-        ("id" = TrialId, Path, description = "The trial"),
+        ("id" = TrialId, Path, description = "Identifier of the trial"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("other" = Option<TrialId>, Query, description = "Converged trial of the same study for comparison")
+        ("other" = Option<TrialId>, Query, description = "Identifier of a converged trial of the same study for comparison")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -90,7 +90,7 @@ pub(super) async fn of_trial(
     operation_id = "get_lab_session_figure",
     tag = "figures",
     params(
-        ("id" = LabSessionId, Path, description = "The session"),
+        ("id" = LabSessionId, Path, description = "Identifier of the lab session"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
@@ -113,10 +113,10 @@ pub(super) async fn of_session(
     operation_id = "get_belief_figure",
     tag = "figures",
     params(
-        ("id" = StudyId, Path, description = "The study"),
+        ("id" = StudyId, Path, description = "Identifier of the study"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("x" = Option<String>, Query, description = "The bound to show on the horizontal axis of a map. By default the one that matters most"),
-        ("y" = Option<String>, Query, description = "The bound to show on the vertical axis of a map. By default the one that matters most of the others")
+        ("x" = Option<String>, Query, description = "Bound on the horizontal axis of a map. The most important one by default"),
+        ("y" = Option<String>, Query, description = "Bound on the vertical axis of a map. The second most important one by default")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -139,7 +139,7 @@ pub(super) async fn of_belief(
     operation_id = "get_reference_gait_figure",
     tag = "figures",
     params(
-        ("id" = ReferenceGaitId, Path, description = "The reference gait"),
+        ("id" = ReferenceGaitId, Path, description = "Identifier of the reference gait"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv")))),

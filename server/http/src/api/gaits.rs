@@ -22,7 +22,7 @@ use gaitwright_store::{StoreError, TrialId, gaits, trials};
     path = "/trials/{id}/gait",
     operation_id = "get_gait",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Gait", body = documents::GaitDocument), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -42,7 +42,7 @@ pub(super) async fn get(
     path = "/trials/{id}/gait.csv",
     operation_id = "get_gait_csv",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "One row for each node", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

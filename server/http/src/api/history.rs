@@ -27,7 +27,7 @@ use std::sync::Arc;
     path = "/studies/{id}/history",
     operation_id = "list_study_history",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "A page, in order of iterations", body = Page<Milestone>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -48,7 +48,7 @@ pub(super) async fn of_study(
     path = "/studies/{id}/history.csv",
     operation_id = "get_study_history_csv",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "One row for each iteration of the study", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

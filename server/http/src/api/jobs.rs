@@ -32,7 +32,7 @@ pub(super) struct Job {
     trial_id: Option<TrialId>,
     /// Study of the trial. Null for a backup.
     study_id: Option<StudyId>,
-    /// Address of the result. Null until the job is done.
+    /// URL of the result. Null until the job is done.
     result: Option<String>,
     /// Reason if it failed. Null otherwise.
     reason: Option<String>,
@@ -105,8 +105,8 @@ pub(super) struct Filter {
     operation_id = "list_jobs",
     tag = "operation",
     params(
-        ("kind" = Option<JobKind>, Query, description = "Jobs of this kind"),
-        ("study_id" = Option<StudyId>, Query, description = "Jobs of this study")
+        ("kind" = Option<JobKind>, Query, description = "Only jobs of this kind"),
+        ("study_id" = Option<StudyId>, Query, description = "Only jobs of this study")
     ),
     responses((status = 200, description = "A page", body = Page<Job>)),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -132,7 +132,7 @@ pub(super) async fn list(
     path = "/jobs/{id}",
     operation_id = "get_job",
     tag = "operation",
-    params(("id" = String, Path, description = "The job")),
+    params(("id" = String, Path, description = "Identifier of the job")),
     responses((status = 200, description = "Job", body = Job), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -152,7 +152,7 @@ pub(super) async fn get(
     path = "/jobs/{id}/cancel",
     operation_id = "cancel_job",
     tag = "operation",
-    params(("id" = String, Path, description = "The job")),
+    params(("id" = String, Path, description = "Identifier of the job")),
     responses((status = 200, description = "Cancelled job", body = Job)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

@@ -52,7 +52,7 @@ struct Frame {
     path = "/trials/{id}/motion",
     operation_id = "get_gait_motion",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Motion", body = Motion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

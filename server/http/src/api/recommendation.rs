@@ -42,7 +42,7 @@ pub(super) struct Recommendation {
     passing: Option<Recommended>,
     /// The newest execution report of its gait. Null if nobody requested one.
     execution_report: Option<ExecutionReport>,
-    /// Whether gaits of the study are being certified, so that the recommendation may change.
+    /// Whether gaits of the study are being certified. If so, the recommendation may change.
     certifying: bool,
 }
 
@@ -82,7 +82,7 @@ impl Recommended {
     path = "/studies/{id}/recommendation",
     operation_id = "get_recommendation",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses(
         (status = 200, description = "Best action", body = Recommendation),
         (status = 409, description = "No recommendation yet")
@@ -105,7 +105,7 @@ pub(super) async fn of_study(
     path = "/studies/{id}/recommendation.csv",
     operation_id = "get_recommendation_csv",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses(
         (status = 200, description = "Recommended bounds", body = String, content_type = "text/csv"),
         (status = 409, description = "No recommendation yet")

@@ -38,8 +38,8 @@ pub(super) async fn list(
 
 /// Import a reference gait from a recording
 ///
-/// Segments the recording at right heel strikes and averages its strides. An identical recording returns the existing
-/// reference gait.
+/// Segments the recording at right heel strikes and averages its strides. If the recording was already imported, the
+/// response contains the existing reference gait.
 #[utoipa::path(
     post,
     path = "/reference-gaits",
@@ -79,7 +79,7 @@ pub(super) async fn create(
     path = "/reference-gaits/{id}",
     operation_id = "get_reference_gait",
     tag = "reference-gaits",
-    params(("id" = ReferenceGaitId, Path, description = "The reference gait")),
+    params(("id" = ReferenceGaitId, Path, description = "Identifier of the reference gait")),
     responses((status = 200, description = "Reference gait", body = ReferenceGait)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -99,7 +99,7 @@ pub(super) async fn get(
     path = "/subjects/{id}/reference-gaits",
     operation_id = "list_nearest_reference_gaits",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     responses((status = 200, description = "Reference gaits with distances", body = Page<ReferenceGaitMatch>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

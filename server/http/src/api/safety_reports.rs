@@ -33,8 +33,8 @@ pub(super) struct SafetyReport {
     author: String,
     /// Time of the report.
     created_at: Instant,
-    /// Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. The gait must
-    /// not be walked.
+    /// Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. If so, the
+    /// gait must not be used for walking.
     in_force: bool,
     /// Newest review. Null while the report awaits review.
     review: Option<SafetyReview>,
@@ -59,7 +59,7 @@ impl From<ReportedGait> for SafetyReport {
     path = "/studies/{id}/safety-reports",
     operation_id = "list_safety_reports",
     tag = "preferences",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "Safety reports, oldest first", body = Page<SafetyReport>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -80,14 +80,14 @@ pub(super) async fn of_study(
 
 /// Report a gait as unsafe
 ///
-/// The gait, and every trial of the subject with the same motion, is not recommended, compared or walked until staff
-/// have reviewed the report. The report does not reach the learner.
+/// Until staff have reviewed the report, neither the gait nor any other trial of the subject with the same motion is
+/// recommended, compared or used for walking. The report does not reach the learner.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reports",
     operation_id = "create_safety_report",
     tag = "preferences",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     request_body = Report,
     responses((status = 201, description = "Report", body = SafetyReport)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
@@ -115,15 +115,15 @@ pub(super) async fn report(
 
 /// Review the safety reports of a gait
 ///
-/// If the gait may be walked again, it can be recommended, compared and planned again, and the preferences derived from
-/// the reports are retracted. If a lab session with a report about the gait is unblinded later, that report makes the
-/// gait unsafe again.
+/// If the gait is cleared, it can again be recommended, compared and used in lab sessions, and the preferences derived
+/// from the reports are retracted. If a lab session with a report about the gait is unblinded later, that report makes
+/// the gait unsafe again.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reviews",
     operation_id = "create_safety_review",
     tag = "preferences",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     request_body = Decision,
     responses((status = 201, description = "Review", body = SafetyReview)),
     security(("token" = ["answer"]), ("session" = ["answer"])),

@@ -32,26 +32,28 @@ pub(super) struct TrialSensitivities {
 struct SensitivityToBound {
     /// Name of the bound.
     bound: &'static str,
-    /// Its value.
+    /// Value of the bound.
     value: f64,
     /// The active constraints that it sets. Empty if small changes of the bound change nothing.
     active: Vec<ActiveConstraint>,
-    /// Derivatives of the figures of the gait.
+    /// Derivatives of the results of the gait.
     derivatives: FigureDerivatives,
     /// Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
     /// is null if there is no limit in that direction.
     #[schema(value_type = Vec<Option<f64>>, min_items = 2, max_items = 2)]
     interval: (Option<f64>, Option<f64>),
-    /// Whether a constraint is about to become active or inactive, so that the derivatives on the two sides differ.
+    /// Whether a constraint is about to become active or inactive, in which case the derivatives on the two sides
+    /// differ.
     is_weakly_active: bool,
-    /// Change of the bound by one step of the study's grid. Null if the study does not tune the bound.
+    /// One step of the bound in the search space, and its effect. Null if the study does not tune the bound.
     grid_step: Option<GridStep>,
 }
 
-/// Change of a bound by one step of the grid, and changes of figures to first order.
+/// One step of a bound in the search space, and the first-order changes of the results.
 #[derive(Debug, Serialize, ToSchema)]
 struct GridStep {
-    /// The next stricter value, or the next less strict one if there is none.
+    /// The next stricter value of the search space, or the next looser one if the bound is already at its strictest
+    /// value.
     to: f64,
     /// Change of the mechanical cost of transport.
     cost_of_transport: f64,
@@ -77,14 +79,14 @@ impl SensitivityToBound {
 
 /// Get the sensitivities of a trial
 ///
-/// How the figures of a gait change, to first order, with each tuned bound. Computed on request from the stored
+/// How the results of a gait change, to first order, with each tuned bound. Computed on request from the stored
 /// solution.
 #[utoipa::path(
     get,
     path = "/trials/{id}/sensitivities",
     operation_id = "get_sensitivities",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses(
         (status = 200, description = "Sensitivities", body = TrialSensitivities),
         (status = 409, description = "The gait has no sensitivities, or the subject withdrew consent")

@@ -52,7 +52,7 @@ pub(super) async fn list(
     path = "/sessions/{id}/end",
     operation_id = "end_session",
     tag = "access",
-    params(("id" = SessionId, Path, description = "The session")),
+    params(("id" = SessionId, Path, description = "Identifier of the sign-in session")),
     responses((status = 200, description = "Ended session", body = Session)),
     security(("token" = []), ("session" = [])),
 )]

@@ -98,7 +98,7 @@ pub(super) async fn list(
     path = "/studies/{id}",
     operation_id = "get_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((
         status = 200,
         description = "The study",
@@ -158,8 +158,8 @@ pub(super) struct StudyActionReason {
     path = "/studies/{id}/start",
     operation_id = "start_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional"),
+    params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
+    request_body(content = StudyActionReason, description = "Optional: why"),
     responses((status = 200, description = "Started study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -180,8 +180,8 @@ pub(super) async fn start(
     path = "/studies/{id}/pause",
     operation_id = "pause_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional"),
+    params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
+    request_body(content = StudyActionReason, description = "Optional: why"),
     responses((status = 200, description = "Paused study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -200,8 +200,8 @@ pub(super) async fn pause(
     path = "/studies/{id}/resume",
     operation_id = "resume_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional"),
+    params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
+    request_body(content = StudyActionReason, description = "Optional: why"),
     responses((status = 200, description = "Resumed study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -222,8 +222,8 @@ pub(super) async fn resume(
     path = "/studies/{id}/stop",
     operation_id = "stop_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional"),
+    params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
+    request_body(content = StudyActionReason, description = "Optional: why"),
     responses((status = 200, description = "Stopped study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -261,13 +261,14 @@ async fn act(
 
 /// Update a study
 ///
-/// Changes the name, priority or number of parallel trials.
+/// Changes the name, tags, notes, priority, number of parallel trials or archived state. Absent fields keep their
+/// values.
 #[utoipa::path(
     patch,
     path = "/studies/{id}",
     operation_id = "update_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body = Change,
     responses((status = 200, description = "Updated study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
@@ -297,7 +298,7 @@ pub(super) async fn patch(
     path = "/studies/{id}/extend",
     operation_id = "extend_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body = Extend,
     responses((status = 200, description = "Extended study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
@@ -327,8 +328,8 @@ pub(super) async fn extend(
     path = "/studies/{id}/fork",
     operation_id = "fork_study",
     tag = "studies",
-    params(("id" = StudyId, Path, description = "The study")),
-    request_body(content = Fork, description = "Changes, optional"),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
+    request_body(content = Fork, description = "Optional: the fields that differ from the parent"),
     responses((status = 201, description = "New study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

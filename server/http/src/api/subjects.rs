@@ -44,7 +44,7 @@ pub(super) async fn list(
     path = "/subjects/{id}",
     operation_id = "get_subject",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     responses((status = 200, description = "Subject", body = Subject)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -87,7 +87,7 @@ pub(super) async fn create(
     path = "/subjects/{id}/consents",
     operation_id = "list_consents",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     responses((status = 200, description = "A page, oldest first", body = Page<Consent>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -109,7 +109,7 @@ pub(super) async fn consents(
     path = "/subjects/{id}/consents",
     operation_id = "record_consent",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     request_body = NewConsent,
     responses((status = 200, description = "Consent", body = Consent)),
     security(("token" = ["run"]), ("session" = ["run"])),
@@ -129,13 +129,14 @@ pub(super) async fn consent(
 
 /// Withdraw consent
 ///
-/// Stops every study of the subject. The record is kept, but nothing can be added, shown or exported.
+/// Stops every study of the subject. The data of the subject are kept, but nothing can be added to them, shown or
+/// exported.
 #[utoipa::path(
     post,
     path = "/subjects/{id}/withdraw",
     operation_id = "withdraw_consent",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     request_body = Withdrawal,
     responses((status = 200, description = "Withdrawal", body = Consent)),
     security(("token" = ["run"]), ("session" = ["run"])),
@@ -165,7 +166,7 @@ pub(super) async fn withdraw(
     path = "/subjects/{id}/corrections",
     operation_id = "list_subject_corrections",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     responses((status = 200, description = "A page, oldest first", body = Page<Correction>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -189,7 +190,7 @@ pub(super) async fn corrections(
     path = "/subjects/{id}/corrections",
     operation_id = "correct_subject",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     request_body = NewCorrection,
     responses((status = 200, description = "Correction", body = Correction)),
     security(("token" = ["run"]), ("session" = ["run"])),
@@ -215,7 +216,7 @@ pub(super) async fn correct(
     path = "/subjects/{id}/muscles",
     operation_id = "get_subject_muscles",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = documents::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -237,7 +238,7 @@ pub(super) async fn muscles(
     path = "/subjects/{id}/muscles",
     operation_id = "set_subject_muscles",
     tag = "subjects",
-    params(("id" = SubjectId, Path, description = "The subject")),
+    params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     request_body(content = documents::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the default values"),
     responses((status = 200, description = "Muscle values", body = documents::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),

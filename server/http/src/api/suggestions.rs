@@ -17,13 +17,13 @@ use gaitwright_store::{StudyId, feedback, studies};
 
 /// List suggestions of a study
 ///
-/// Includes retracted preferences. Oldest first.
+/// Includes retracted suggestions. Oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/suggestions",
     operation_id = "list_suggestions",
     tag = "preferences",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     responses((status = 200, description = "A page, oldest first", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -47,7 +47,7 @@ pub(super) async fn of_study(
     path = "/studies/{id}/suggestions",
     operation_id = "create_suggestion",
     tag = "preferences",
-    params(("id" = StudyId, Path, description = "The study")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body = Suggestion,
     responses((status = 201, description = "Suggestion", body = FeedbackRow)),
     security(("token" = ["answer"]), ("session" = ["answer"])),

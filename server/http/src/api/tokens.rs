@@ -52,7 +52,7 @@ pub(super) async fn list(
     path = "/tokens/{id}",
     operation_id = "get_token",
     tag = "access",
-    params(("id" = TokenId, Path, description = "The token")),
+    params(("id" = TokenId, Path, description = "Identifier of the token")),
     responses((status = 200, description = "Token, without its secret", body = Token)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -93,7 +93,7 @@ pub(super) async fn create(
     path = "/tokens/{id}/revoke",
     operation_id = "revoke_token",
     tag = "access",
-    params(("id" = TokenId, Path, description = "The token")),
+    params(("id" = TokenId, Path, description = "Identifier of the token")),
     responses((status = 200, description = "Revoked token", body = Token)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]

@@ -44,15 +44,15 @@ fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
 
 /// List trials of a study
 ///
-/// In order of number, unless `sort` names another column.
+/// Sorted by number, unless `sort` names another column.
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials",
     operation_id = "list_trials",
     tag = "trials",
     params(
-        ("id" = StudyId, Path, description = "The study"),
-        ("state" = Option<TrialState>, Query, description = "Trials in this state"),
+        ("id" = StudyId, Path, description = "Identifier of the study"),
+        ("state" = Option<TrialState>, Query, description = "Only trials in this state"),
         ("sort" = Option<String>, Query, description = "Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a value come last")
     ),
     responses((status = 200, description = "A page", body = Page<Trial>), (status = 409, description = "The subject withdrew consent")),
@@ -97,8 +97,8 @@ pub(super) async fn of_study(
     path = "/studies/{id}/trials.csv",
     operation_id = "get_trials_csv",
     tag = "trials",
-    params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "All trials, in order of number", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
+    params(("id" = StudyId, Path, description = "Identifier of the study")),
+    responses((status = 200, description = "All trials, sorted by number", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study_csv(
@@ -115,7 +115,7 @@ pub(super) async fn of_study_csv(
     path = "/trials/{id}",
     operation_id = "get_trial",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Trial", body = Trial), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -135,7 +135,7 @@ pub(super) async fn get(
     path = "/trials/{id}/cancel",
     operation_id = "cancel_trial",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Cancelled trial", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -162,7 +162,7 @@ pub(super) async fn cancel(
     path = "/trials/{id}/retry",
     operation_id = "retry_trial",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Queued trial", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -187,7 +187,7 @@ pub(super) async fn retry(
     path = "/trials/{id}/iterations",
     operation_id = "list_iterations",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Iterations", body = Page<Iteration>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -214,7 +214,7 @@ pub(super) async fn iterations(
     path = "/trials/{id}/attempts",
     operation_id = "list_attempts",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial")),
+    params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Attempts", body = Page<AttemptResult>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]

@@ -72,7 +72,7 @@ pub(super) async fn list(
     path = "/users/{id}",
     operation_id = "get_user",
     tag = "access",
-    params(("id" = UserId, Path, description = "The user")),
+    params(("id" = UserId, Path, description = "Identifier of the user")),
     responses((status = 200, description = "User", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -122,7 +122,7 @@ pub(super) struct Link {
     path = "/users/{id}/link",
     operation_id = "create_sign_in_link",
     tag = "access",
-    params(("id" = UserId, Path, description = "The user")),
+    params(("id" = UserId, Path, description = "Identifier of the user")),
     responses((status = 200, description = "Link, shown once", body = Link)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
@@ -145,7 +145,7 @@ pub(super) async fn link(
     path = "/users/{id}/disable",
     operation_id = "disable_user",
     tag = "access",
-    params(("id" = UserId, Path, description = "The user")),
+    params(("id" = UserId, Path, description = "Identifier of the user")),
     responses((status = 200, description = "Disabled user", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -163,7 +163,7 @@ pub(super) async fn disable(
     path = "/users/{id}/enable",
     operation_id = "enable_user",
     tag = "access",
-    params(("id" = UserId, Path, description = "The user")),
+    params(("id" = UserId, Path, description = "Identifier of the user")),
     responses((status = 200, description = "Enabled user", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -179,7 +179,7 @@ pub(super) async fn enable(
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NewRole {
-    /// Role.
+    /// New role.
     role: Role,
 }
 
@@ -191,7 +191,7 @@ pub(super) struct NewRole {
     path = "/users/{id}/role",
     operation_id = "set_user_role",
     tag = "access",
-    params(("id" = UserId, Path, description = "The user")),
+    params(("id" = UserId, Path, description = "Identifier of the user")),
     request_body = NewRole,
     responses((status = 200, description = "User with the new role", body = User)),
     security(("token" = ["administer"]), ("session" = ["administer"])),

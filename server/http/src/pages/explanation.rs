@@ -96,6 +96,7 @@ pub(super) async fn post(
     let mut writer = app.write().await?;
     explanation::ask(&mut writer, &authorized.caller.actor, id, app.scheduler.explaining(id)).await?;
     commit(writer).await?;
+    app.scheduler.explain_again(id);
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}#explanation")))
 }

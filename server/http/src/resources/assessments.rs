@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 pub(crate) struct Assessment {
     /// Identifier.
     id: AssessmentId,
-    /// The study.
+    /// Identifier of the study.
     study_id: StudyId,
     /// The trial with gait A.
     trial_a: TrialId,
@@ -22,7 +22,7 @@ pub(crate) struct Assessment {
     answer: AssessmentAnswer,
     /// Who answered.
     source: Source,
-    /// Author.
+    /// Name or pseudonym of the person who answered.
     author: String,
     /// Free text.
     note: String,

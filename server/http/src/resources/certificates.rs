@@ -117,7 +117,7 @@ impl From<gait_optimizer::Subject> for CertifiedSubject {
 /// A value that differs from the built-in problem.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct CertifiedDifference {
-    /// Name, as in the gait: `settings.limits.friction`, `device.knee_torque_limit_n_m`.
+    /// Path of the value in the gait document, such as `settings.limits.friction` or `device.knee_torque_limit_n_m`.
     name: String,
     /// Value of the gait; null if it is not set.
     value: Value,

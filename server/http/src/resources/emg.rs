@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 pub(crate) struct CycleActivity {
     /// Name of the channel.
     channel: String,
-    /// Mean.
+    /// Mean over strides.
     mean: Vec<f64>,
     /// Standard deviation over strides; zero for one stride.
     standard_deviation: Vec<f64>,

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub(crate) struct Event {
     /// Sequence number over all studies.
     seq: i64,
-    /// The study.
+    /// Identifier of the study.
     study_id: StudyId,
     /// Kind of the event: `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`,
     /// `feedback_retracted`, `lab_session_answered`, `reported_unsafe`, `safety_reviewed`, `gait_certified`, `trial_explained`,

@@ -59,7 +59,7 @@ impl From<execution::ExecutionReport> for ExecutionReport {
 /// Simulated walks on one kind of ground.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct WalksOnGround {
-    /// Largest height and depth of the plateaus of the ground, m.
+    /// Largest height of bumps and depth of dips in the ground, m.
     ground_height_m: f64,
     /// Number of simulated walks.
     walks: u32,

@@ -12,9 +12,9 @@ pub(crate) struct BoundAtLimit {
     bound: String,
     /// What it limits, with its unit.
     meaning: String,
-    /// Given value.
+    /// Value of the bound in the problem.
     value: f64,
-    /// Domains in which it is active, or `stride`.
+    /// Domains in which the bound is active; `stride` for a constraint on the whole stride.
     domains: Vec<String>,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct GivenBound {
     bound: String,
     /// What it limits, with its unit.
     meaning: String,
-    /// Given value.
+    /// Value of the bound in the problem.
     value: f64,
 }
 
@@ -64,7 +64,7 @@ pub(crate) struct Conflict {
     /// Number of starting points of the search.
     #[schema(value_type = u64)]
     starts: usize,
-    /// Whether a solve gave up, so that infeasibility is not certain.
+    /// Whether a solve gave up. If so, infeasibility is not certain.
     undecided: bool,
 }
 
@@ -89,18 +89,18 @@ pub(crate) struct Relaxation {
     bound: String,
     /// What it limits, with its unit.
     meaning: String,
-    /// Given value.
+    /// Value of the bound in the problem.
     from: f64,
     /// The value nearest to the given one that was found to give a gait. Null if not even the loosest value does.
     to: Option<f64>,
     /// The loosest value tried that does not give a gait.
     not_with: f64,
-    /// Whether the solve at the `not_with` value gave up, so that infeasibility is not certain.
+    /// Whether the solve at the `not_with` value gave up. If so, infeasibility is not certain.
     undecided: bool,
     /// Number of solves.
     #[schema(value_type = u64)]
     solves: usize,
-    /// Number of starting points of the search at the `not_with` values. 0 if unknown.
+    /// Number of starting points of the search at the `not_with` value. 0 if unknown.
     #[schema(value_type = u64)]
     starts: usize,
 }
@@ -120,7 +120,7 @@ pub(crate) struct RelaxedBound {
     bound: String,
     /// What it limits, with its unit.
     meaning: String,
-    /// Given value.
+    /// Value of the bound in the problem.
     from: f64,
     /// The value nearest to the given one that gives a gait together with the others. Null if not even the loosest
     /// value does.
@@ -142,7 +142,7 @@ impl From<explanation::RelaxedBound> for RelaxedBound {
 pub(crate) struct JointRelaxation {
     /// The bounds, one from each conflict.
     bounds: Vec<RelaxedBound>,
-    /// Whether a solve at the `not_with` values gave up, so that infeasibility is not certain.
+    /// Whether a solve at the `not_with` values gave up. If so, infeasibility is not certain.
     undecided: bool,
     /// Number of solves.
     #[schema(value_type = u64)]

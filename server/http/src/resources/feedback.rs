@@ -13,19 +13,19 @@ pub(crate) struct FeedbackRow {
     seq: i64,
     /// Identifier.
     id: FeedbackId,
-    /// The study.
+    /// Identifier of the study.
     study_id: StudyId,
     /// Content of the entry.
     content: FeedbackContent,
     /// Who or what it came from.
     source: Source,
-    /// Author.
+    /// Name or pseudonym of the person who answered.
     author: String,
     /// Free text.
     note: String,
     /// Whether it comes from a rater's blind comparison.
     by_rater: bool,
-    /// Whether the rater could have known the allocation, so that the entry does not count as blind.
+    /// Whether the rater could have known the allocation. If so, the entry does not count as blind.
     could_have_known: bool,
     /// Time of recording.
     created_at: Instant,
@@ -70,7 +70,7 @@ impl From<feedback::FeedbackRow> for FeedbackRow {
 pub(crate) enum FeedbackContent {
     /// Label of a trial.
     Label {
-        /// The trial.
+        /// Identifier of the trial.
         trial: TrialId,
         /// Category: 0 for not converged, 1 for converged.
         category: u32,

@@ -12,7 +12,7 @@ pub(crate) struct LabSessionStep {
     note: String,
     /// Who did it.
     actor: String,
-    /// Time.
+    /// Time of the step.
     at: Instant,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct ControllerFileDownload {
     to_device: bool,
     /// Who fetched it.
     actor: String,
-    /// Time.
+    /// Time of the download.
     at: Instant,
 }
 
@@ -68,7 +68,7 @@ impl From<lab::WalkView> for WalkView {
 pub(crate) struct LabSessionView {
     /// Identifier.
     id: LabSessionId,
-    /// The study.
+    /// Identifier of the study.
     study_id: StudyId,
     /// Number of the session in this study, from 1.
     number: u32,

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 pub(crate) struct MeasurementFile {
     /// Identifier.
     id: MeasurementFileId,
-    /// The session.
+    /// Identifier of the lab session.
     session_id: LabSessionId,
     /// Number of the walk, 1 to 3.
     walk: u8,

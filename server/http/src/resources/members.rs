@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 pub(crate) struct Member {
     /// Identifier of the membership.
     id: MemberId,
-    /// The study.
+    /// Identifier of the study.
     study_id: StudyId,
     /// Whether it is a user or a token.
     kind: MemberKind,

@@ -14,11 +14,11 @@ pub(crate) struct SafetyReview {
     trial_id: TrialId,
     /// The reports that the review covers. Another report about the same gait needs another review.
     reports: Vec<SafetyReportId>,
-    /// Decision.
+    /// Decision about the reports.
     decision: SafetyDecision,
-    /// Reviewer.
+    /// Name or pseudonym of the reviewer.
     author: String,
-    /// Reason.
+    /// Reason for the decision.
     reason: String,
     /// Time of the review.
     created_at: Instant,

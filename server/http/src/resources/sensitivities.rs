@@ -20,10 +20,10 @@ impl From<sensitivity::ActiveConstraint> for ActiveConstraint {
     }
 }
 
-/// Derivatives of figures per unit of a tuned bound.
+/// Derivatives of the results with respect to a tuned bound.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct FigureDerivatives {
-    /// Of the objective.
+    /// Derivative of the objective.
     objective: f64,
     /// Derivative of the mechanical cost of transport.
     cost_of_transport: f64,

@@ -4,7 +4,9 @@ use gait_optimizer::SolvePhase;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// How a solve ended.
+/// How a solve ended: `converged`, every constraint is satisfied; `infeasible`, at a local minimum of the violation,
+/// with no gait near it; `stalled`, without further progress; `iteration_limit` and `time_limit`, at that limit;
+/// `cancelled`, by a user or a program.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum SolveStatus {
@@ -35,7 +37,8 @@ impl From<gait_optimizer::SolveStatus> for SolveStatus {
     }
 }
 
-/// What a solve started from.
+/// What a solve started from: `cold`, initial guesses; `warm`, the given warm start; `cold_after_warm`, initial
+/// guesses, after the given warm start did not converge.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum StartedFrom {
@@ -57,7 +60,7 @@ impl From<gait_optimizer::StartedFrom> for StartedFrom {
     }
 }
 
-/// The figures of one solve.
+/// Numerical results of one solve.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SolveReport {
     /// How it ended.
@@ -321,7 +324,7 @@ pub(crate) struct Iteration {
     barrier: f64,
     /// Primal step length.
     step: f64,
-    /// Initial guess it belongs to.
+    /// Number of the initial guess to which this iteration belongs.
     #[schema(value_type = u64)]
     guess: usize,
 }

@@ -8,17 +8,17 @@ use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Study.
+/// A tuning run for one subject: its set-up and state.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Study {
     /// Identifier.
     id: StudyId,
-    /// Set-up.
+    /// Set-up of the study.
     #[serde(flatten)]
     plan: StudyPlan,
     /// Parent, if the study is a fork.
     forked_from: Option<StudyId>,
-    /// State.
+    /// State of the study.
     state: StudyState,
     /// Reason for the state; may be empty.
     state_reason: String,
@@ -26,9 +26,10 @@ pub(crate) struct Study {
     revision: i64,
     /// Tags, by which people find the study.
     tags: Vec<String>,
-    /// Notes of people.
+    /// Free-text notes.
     notes: String,
-    /// Time at which it was archived. Lists do not show archived studies unless asked.
+    /// Time at which the study was archived. Lists leave out archived studies unless they are asked for; `GET
+    /// /studies?archived=true` lists them.
     archived_at: Option<Instant>,
     /// Time of creation.
     created_at: Instant,
@@ -72,14 +73,14 @@ impl From<studies::Study> for Study {
 pub(crate) struct StudyPlan {
     /// Name shown to users.
     name: String,
-    /// Subject of the study.
+    /// Identifier of the subject.
     subject_id: SubjectId,
     /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
     /// entered first.
     body: Option<Body>,
-    /// Device.
+    /// Identifier of the device.
     device_id: DeviceId,
-    /// Reference gait for Gait RMSE.
+    /// Identifier of the reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId,
     /// Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
     /// C4).
@@ -87,7 +88,7 @@ pub(crate) struct StudyPlan {
     /// Settings of the gait problem.
     #[schema(value_type = study_plan_schemas::GaitSettings)]
     gait_settings: Box<GaitSettings>,
-    /// Limits of one solve.
+    /// Options of the solver: limits, tolerance, initial guesses and retries.
     #[schema(value_type = study_plan_schemas::SolveOptions)]
     solve_options: SolveOptions,
     /// Values of bounds that are not tuned.
@@ -101,7 +102,7 @@ pub(crate) struct StudyPlan {
     learner: LearnerSettings,
     /// Who answers comparisons.
     feedback_mode: FeedbackMode,
-    /// Who evaluates trials.
+    /// What evaluates trials.
     evaluation: Evaluation,
     /// Number of trials.
     trial_budget: u32,

@@ -38,7 +38,7 @@ pub(crate) struct Correction {
     height_m: f64,
     /// Corrected body mass, kg.
     body_mass_kg: f64,
-    /// Reason.
+    /// Reason for the correction.
     reason: String,
     /// Who corrected it.
     actor: String,

@@ -12,7 +12,7 @@ pub(crate) struct Token {
     id: TokenId,
     /// Unique name that states its purpose.
     name: String,
-    /// Scopes.
+    /// Rights of the token.
     scopes: Vec<Right>,
     /// Who created it. The token is revoked when this user is disabled or is no longer an administrator.
     created_by: String,

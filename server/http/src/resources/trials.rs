@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 pub(crate) struct Trial {
     /// Identifier.
     id: TrialId,
-    /// The study it belongs to.
+    /// Identifier of the study to which the trial belongs.
     study_id: StudyId,
     /// Number within the study, from 1, in the order of proposal.
     number: u32,
@@ -32,7 +32,7 @@ pub(crate) struct Trial {
     warm_started_from: Option<TrialId>,
     /// Script that evaluates the trial. Absent if the service does.
     asked_by: Option<String>,
-    /// State.
+    /// State of the trial.
     state: TrialState,
     /// How the solve ended.
     status: Option<SolveStatus>,
@@ -49,7 +49,7 @@ pub(crate) struct Trial {
     iterations: Option<u32>,
     /// Wall time of the solve, s.
     seconds_total: Option<f64>,
-    /// All figures of the solve.
+    /// All numerical results of the solve.
     report: Option<SolveReport>,
     /// Most violated rows, worst first.
     violations: Vec<Violation>,
@@ -151,7 +151,7 @@ pub(crate) struct AttemptResult {
     taken: bool,
     /// How the solve ended.
     status: SolveStatus,
-    /// Figures of the solve. Figures that are not finite are omitted.
+    /// Numerical results of the solve, without those that are not finite.
     report: Option<SolveReport>,
     /// Time of arrival.
     received_at: Instant,

@@ -5,14 +5,14 @@ use gaitwright_store::{Instant, UserId, users};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// User.
+/// A person who signs in: administrator, clinician or rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct User {
     /// Identifier.
     id: UserId,
     /// Name or code, unique ignoring case.
     name: String,
-    /// Role.
+    /// Role, which determines the rights of the user.
     role: Role,
     /// Whether the user has a password. Otherwise only one-time links work.
     has_password: bool,

@@ -18,9 +18,9 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PairAnswer {
-    /// The first gait.
+    /// Gait A is better.
     A,
-    /// The second gait.
+    /// Gait B is better.
     B,
     /// Neither gait is better.
     NoDifference,
@@ -43,9 +43,9 @@ pub(super) fn refuse_retracted(answer: Judgement) -> Result<(), Error> {
 #[serde(deny_unknown_fields)]
 #[schema(as = NewPreference)]
 pub struct Answer {
-    /// The first gait.
+    /// The trial with gait A.
     pub trial_a: TrialId,
-    /// The second gait.
+    /// The trial with gait B.
     pub trial_b: TrialId,
     /// Which gait is better.
     pub answer: PairAnswer,

@@ -2,8 +2,8 @@
 
 use super::study_plan::LARGEST_SEED;
 use crate::error::Error;
+use gait_optimizer::Gait;
 use gait_optimizer::execution::{ExecutionOptions, ExecutionReport};
-use gait_optimizer::{CancelToken, Gait};
 use gaitwright_store::audit::{self, Actor};
 pub use gaitwright_store::execution_reports::newest;
 use gaitwright_store::execution_reports::{self, GaitSimulated};
@@ -109,7 +109,7 @@ fn why_not(trial: &Trial) -> Option<String> {
     trial.asked_by.is_some().then_some(by_script)
 }
 
-/// Stores a report, unless it was cancelled meanwhile.
+/// Stores a report.
 ///
 /// # Errors
 /// [`Error::Conflict`] if the subject withdrew consent; errors of the database.
@@ -118,14 +118,10 @@ pub(super) async fn record(
     id: TrialId,
     asked: WalksAsked,
     report: ExecutionReport,
-    cancel: &CancelToken,
 ) -> Result<(), Error> {
     let mut writer = store.write().await?;
     let trial = trials::get(&mut writer, id).await?;
     consents::may_be_shown(&mut writer, trial.study_id).await?;
-    if cancel.is_cancelled() {
-        return Ok(());
-    }
     let WalksAsked { walks, seed } = asked;
     let actor = Actor::program();
     let program = actor.as_str().to_owned();

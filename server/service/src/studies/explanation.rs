@@ -94,7 +94,7 @@ pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: Effort
         ExplanationState::Waiting | ExplanationState::NotAsked => {
             explainable(writer, &trial).await?;
             explanations::request(writer, id, actor).await?;
-            audit::append(writer, actor, "trial.ask_explanation", &format!("trial {id}"), &json!({})).await?;
+            audit::append(writer, actor, explanations::REQUESTED, &format!("trial {id}"), &json!({})).await?;
             Ok(false)
         }
     }

@@ -6,7 +6,8 @@ use std::fmt;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of job.
+/// Kind of job: the `backup` of the record, the `solve` or `explanation` of a trial, or the `certificate` or
+/// `execution_report` of a gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobKind {
@@ -104,7 +105,8 @@ impl From<JobId> for String {
     }
 }
 
-/// State of a job.
+/// State of a job: `queued` and `running`; `done`, it ended with a result; `failed`, it ended without one; `cancelled`,
+/// by a user or a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {

@@ -13,7 +13,9 @@ use crate::error::Error;
 use gaitwright_store::audit;
 use gaitwright_store::jobs::{self, OpenSolve};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, StudyId, TrialId, Writer, certificates, explanations, members, trials};
+use gaitwright_store::{
+    Connection, StudyId, TrialId, Writer, cancelled_jobs, certificates, explanations, members, trials,
+};
 use serde_json::json;
 
 /// Status of a job.
@@ -87,8 +89,7 @@ async fn certificate(db: &mut Connection, scheduler: &Scheduler, trial: TrialId)
     if certificates::find(db, trial).await?.is_some() {
         return Ok(Some((JobState::Done, None)));
     }
-    let asked = scheduler.certifying().into_iter().find(|(asked, _)| *asked == trial);
-    Ok(asked.map(|(_, state)| (state, None)))
+    Ok(scheduler.certifying(trial))
 }
 
 async fn execution_report(db: &mut Connection, scheduler: &Scheduler, trial: TrialId) -> Result<Found, Error> {
@@ -139,25 +140,19 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
         .into_iter()
         .map(|id| status(JobId::Backup(id), None, JobState::Running, None))
         .collect();
-    for (trial, state) in runners.scheduler.certifying() {
+    for (id, trial, state) in runners.scheduler.jobs_after_solves() {
         let study = trials::get(db, trial).await?.study_id;
         if members::reaches(db, reach, study).await? {
-            all.push(status(JobId::Certificate(trial), Some(study), state, None));
-        }
-    }
-    for (trial, state) in runners.scheduler.all_simulating() {
-        let study = trials::get(db, trial).await?.study_id;
-        if members::reaches(db, reach, study).await? {
-            all.push(status(JobId::ExecutionReport(trial), Some(study), state, None));
+            all.push(status(id, Some(study), state, None));
         }
     }
     for (trial, study) in explanations::requested(db, reach).await? {
-        let state = match runners.scheduler.explaining(trial) {
-            Effort::Running(_) => JobState::Running,
-            Effort::Ready | Effort::None => JobState::Queued,
-            Effort::Cancelled | Effort::Refused(_) => continue,
-        };
-        all.push(status(JobId::Explanation(trial), Some(study), state, None));
+        let id = JobId::Explanation(trial);
+        let is_open = matches!(runners.scheduler.explaining(trial), Effort::Ready | Effort::None | Effort::Running(_));
+        if is_open && all.iter().all(|job| job.id != id) {
+            // Requests since the running explanation began.
+            all.push(status(id, Some(study), JobState::Queued, None));
+        }
     }
     for solve in jobs::open(db, reach).await? {
         let state = if solve.worker.is_some() { JobState::Running } else { JobState::Queued };
@@ -186,7 +181,7 @@ pub async fn cancel(writer: &mut Writer, caller: &Caller, runners: Runners<'_>, 
             command::cancel(writer, &caller.actor, trial, "Cancelled on request.").await?;
         }
         JobId::Certificate(_) | JobId::ExecutionReport(_) | JobId::Explanation(_) => {
-            audit::append(writer, &caller.actor, "job.cancel", &format!("job {id}"), &json!({})).await?;
+            audit::append(writer, &caller.actor, cancelled_jobs::CANCELLED, &format!("job {id}"), &json!({})).await?;
         }
     }
     Ok(JobStatus { state: JobState::Cancelled, progress: None, solve: None, ..job })

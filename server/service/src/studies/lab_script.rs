@@ -147,7 +147,8 @@ pub async fn give_out(
     Ok(Some(trials::get(writer, id).await?))
 }
 
-/// Outcome of a trial.
+/// Outcome of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result,
+/// too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {

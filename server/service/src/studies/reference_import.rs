@@ -20,7 +20,9 @@ const CAMARGO_FORCE_COLUMN: &str = "Treadmill_R_vy";
 /// Maximum length of the provenance, which includes the comments of the recording.
 const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 
-/// File format of a recording.
+/// File format of a recording of joint angles: `opensim`, a motion or storage file (.mot, .sto) of a gait model;
+/// `camargo`, the `data` table of an `ik` file from the data set Camargo 2021 as CSV; `csv`, a CSV file as
+/// `/help/data-files` describes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JointAngleFormat {

@@ -112,7 +112,7 @@ pub struct SafetyReports {
     pub in_force: Vec<ReportedGait>,
     /// Reports in force of every study of the subject, with their motions.
     motions: Vec<ReportedMotion>,
-    /// Reports after which staff decided that the gait may be walked again.
+    /// Reports after which staff cleared the gait for walking.
     pub cleared: Vec<ReportedGait>,
     /// Pairs with an answer "cannot tell".
     pub skipped: Vec<(TrialId, TrialId)>,

@@ -18,7 +18,8 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewSafetyReview)]
 pub struct Decision {
-    /// `walkable`: the gait may be walked again. `unsafe`: the gait remains marked as unsafe, and the review is complete.
+    /// `walkable`: the gait is cleared for walking. `unsafe`: the gait remains marked as unsafe, and the review is
+    /// complete.
     pub decision: SafetyDecision,
     /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
@@ -27,13 +28,13 @@ pub struct Decision {
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
-    /// The safety reports in force that the reviewer has seen. The decision is refused if one of them is missing. By
-    /// default, all of them count as seen.
+    /// The safety reports in force that the reviewer has seen. The decision is refused if a report in force is not
+    /// listed. By default, all of them count as seen.
     #[serde(default)]
     pub reports: Option<Vec<SafetyReportId>>,
 }
 
-/// Records a decision. If the gait may be walked again, retracts the preferences that the learner derived from the
+/// Records a decision. If the gait is cleared for walking, retracts the preferences that the learner derived from the
 /// reports.
 ///
 /// # Errors

@@ -29,7 +29,8 @@ pub struct StudySensitivities {
 /// A change of a bound by one step of the grid, and the changes of figures to first order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundStep {
-    /// The next stricter value, or the next less strict one if there is none.
+    /// The next stricter value of the search space, or the next looser one if the bound is already at its strictest
+    /// value.
     pub to: f64,
     /// Change of the mechanical cost of transport.
     pub cost_of_transport: f64,

@@ -31,11 +31,12 @@ pub struct Change {
     #[serde(default)]
     #[schema(max_items = 10)]
     pub tags: Option<Vec<String>>,
-    /// Notes of people.
+    /// Free-text notes.
     #[serde(default)]
     #[schema(max_length = 4000)]
     pub notes: Option<String>,
-    /// Whether the study is archived, so that lists do not show it. Possible before its start and after its end.
+    /// Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be
+    /// archived before its start and after its end.
     #[serde(default)]
     pub archived: Option<bool>,
 }

@@ -22,15 +22,15 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewStudy {
-    /// Subject of the study.
+    /// Identifier of the subject.
     pub subject_id: SubjectId,
     /// Name shown to users. Made from subject and variant by default.
     #[serde(default)]
     pub name: Option<String>,
-    /// Device. The built-in one by default.
+    /// Identifier of the device. The built-in one by default.
     #[serde(default)]
     pub device_id: Option<DeviceId>,
-    /// Reference gait for Gait RMSE. By default `falisse-2019`, whichever others are imported.
+    /// Reference gait for Gait RMSE. By default `falisse-2019`, even if others have been imported.
     #[serde(default)]
     pub reference_gait_id: Option<ReferenceGaitId>,
     /// Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
@@ -41,7 +41,7 @@ pub struct NewStudy {
     #[serde(default)]
     #[schema(value_type = study_plan_schemas::GaitSettings)]
     pub gait_settings: Box<GaitSettings>,
-    /// Limits of one solve.
+    /// Options of the solver: limits, tolerance, initial guesses and retries.
     #[serde(default)]
     #[schema(value_type = study_plan_schemas::SolveOptions)]
     pub solve_options: SolveOptions,
@@ -60,7 +60,7 @@ pub struct NewStudy {
     /// Who answers comparisons.
     #[serde(default = "automatic")]
     pub feedback_mode: FeedbackMode,
-    /// Who evaluates trials.
+    /// What evaluates trials.
     #[serde(default = "optimizer")]
     pub evaluation: Evaluation,
     /// Number of trials.

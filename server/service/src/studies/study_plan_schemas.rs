@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 #[derive(Debug, ToSchema)]
 pub struct GaitSettings(pub BTreeMap<String, Value>);
 
-/// Limits of one solve.
+/// Options of the solver: limits, tolerance, initial guesses and retries.
 #[derive(Debug, ToSchema)]
 pub struct SolveOptions(pub BTreeMap<String, Value>);
 

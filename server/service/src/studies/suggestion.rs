@@ -20,8 +20,8 @@ use utoipa::ToSchema;
 pub struct Suggestion {
     /// Trial whose gait could be better.
     pub over: TrialId,
-    /// Suggested values of tuned bounds, such as `{"a5": 0.026}`, each one of the values in the search space. Other
-    /// bounds keep the values of the trial.
+    /// Suggested values of tuned bounds, such as `{"a5": 0.026}`. Each must be a value of the search space. Other
+    /// bounds keep their values from the trial.
     pub bounds: BTreeMap<String, f64>,
     /// Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     #[serde(default)]

@@ -11,7 +11,7 @@ use serde::Serialize;
 /// Summary of a study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// State of the study.
     pub state: StudyState,

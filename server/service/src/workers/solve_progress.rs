@@ -10,9 +10,9 @@ use tokio::sync::broadcast;
 /// One iteration of a running solve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Progress {
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
-    /// The trial.
+    /// Identifier of the trial.
     pub trial_id: TrialId,
     /// Its number within the study.
     pub number: u32,

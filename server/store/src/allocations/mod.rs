@@ -66,7 +66,7 @@ pub struct ControllerFileDownload {
     pub to_device: bool,
     /// Who fetched it.
     pub actor: String,
-    /// Time.
+    /// Time of the download.
     pub at: Instant,
 }
 

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Source of an entry.
+/// Source of an entry: `convergence`, the end of a solve; `gait_rmse`, the lower Gait RMSE wins; `subject` and
+/// `clinician`, a person; `script`, a lab script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
@@ -50,7 +51,7 @@ impl FromStr for Source {
 pub enum FeedbackContent {
     /// Label of a trial.
     Label {
-        /// The trial.
+        /// Identifier of the trial.
         trial: TrialId,
         /// Category: 0 for not converged, 1 for converged.
         category: u32,

@@ -17,19 +17,19 @@ pub struct FeedbackRow {
     pub seq: i64,
     /// Identifier.
     pub id: FeedbackId,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Content of the entry.
     pub content: FeedbackContent,
     /// Who or what it came from.
     pub source: Source,
-    /// Author.
+    /// Name or pseudonym of the person who answered.
     pub author: String,
     /// Free text.
     pub note: String,
     /// Whether it comes from a rater's blind comparison.
     pub by_rater: bool,
-    /// Whether the rater could have known the allocation, so that the entry does not count as blind.
+    /// Whether the rater could have known the allocation. If so, the entry does not count as blind.
     pub could_have_known: bool,
     /// Time of recording.
     pub created_at: Instant,

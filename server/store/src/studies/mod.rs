@@ -11,22 +11,21 @@ pub use lists::{
 pub use plan::{Evaluation, FeedbackMode, StudyPlan};
 pub use state::StudyState;
 
-use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
-use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body};
-use serde_json::Value;
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, former_documents, json_columns, now};
+use gait_optimizer::Subject as Body;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-/// Study.
+/// A tuning run for one subject: its set-up and state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Study {
     /// Identifier.
     pub id: StudyId,
-    /// Set-up.
+    /// Set-up of the study.
     pub plan: StudyPlan,
     /// Parent, if the study is a fork.
     pub forked_from: Option<StudyId>,
-    /// State.
+    /// State of the study.
     pub state: StudyState,
     /// Reason for the state; may be empty.
     pub state_reason: String,
@@ -34,60 +33,15 @@ pub struct Study {
     pub revision: i64,
     /// Tags, by which people find the study.
     pub tags: Vec<String>,
-    /// Notes of people.
+    /// Free-text notes.
     pub notes: String,
-    /// Time at which it was archived. Lists do not show archived studies unless asked.
+    /// Time at which the study was archived. Lists leave out archived studies unless they are asked for; `GET
+    /// /studies?archived=true` lists them.
     pub archived_at: Option<Instant>,
     /// Time of creation.
     pub created_at: Instant,
     /// Time of the last change.
     pub updated_at: Instant,
-}
-
-/// Reads stored settings. Older settings without a weight on the curvature of activations mean 0, while new studies
-/// without it get the default.
-fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
-    let mut document: Value = json_columns::from_text("gait_settings", text)?;
-    if let Some(weights) = document.get_mut("regularisation").and_then(Value::as_object_mut) {
-        weights.entry("activation_bend").or_insert_with(|| 0.0.into());
-    }
-    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "gait_settings", reason: e.to_string() })
-}
-
-/// Solver settings of earlier versions whose value is now part of the method.
-const FORMER_SOLVER_SETTINGS: [&str; 23] = [
-    "dual_tolerance",
-    "divergence_limit",
-    "mu_warm",
-    "kappa_epsilon",
-    "kappa_mu",
-    "theta_mu",
-    "tau_min",
-    "bound_fraction",
-    "warm_bound_fraction",
-    "warm_multiplier_push",
-    "multiplier_limit",
-    "hessian_regularisation_min",
-    "hessian_regularisation_max",
-    "dual_regularisation",
-    "dual_regularisation_value",
-    "residual_target",
-    "residual_limit",
-    "max_refinements",
-    "watchdog_trigger",
-    "watchdog_trials",
-    "max_soft_steps",
-    "elastic_weight",
-    "max_restoration_phases",
-];
-
-/// Reads stored options of solves, without settings that the solver no longer has.
-fn recorded_options(text: &str) -> StoreResult<SolveOptions> {
-    let mut document: Value = json_columns::from_text("solve_options", text)?;
-    if let Some(solver) = document.get_mut("solver").and_then(Value::as_object_mut) {
-        solver.retain(|name, _| !FORMER_SOLVER_SETTINGS.contains(&name.as_str()));
-    }
-    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "solve_options", reason: e.to_string() })
 }
 
 /// Adds a study.
@@ -249,8 +203,8 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             device_id: row.try_get("device_id")?,
             reference_gait_id: row.try_get("reference_gait_id")?,
             muscles: row.try_get("muscles")?,
-            gait_settings: Box::new(recorded_settings(row.try_get("gait_settings")?)?),
-            solve_options: recorded_options(row.try_get("solve_options")?)?,
+            gait_settings: Box::new(former_documents::gait_settings(row.try_get("gait_settings")?)?),
+            solve_options: former_documents::solve_options(row.try_get("solve_options")?)?,
             base_bounds: json_columns::column(row, "base_bounds")?,
             search_space: json_columns::column(row, "search_space")?,
             learner: json_columns::column(row, "learner")?,
@@ -274,28 +228,4 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
         created_at: row.try_get("created_at")?,
         updated_at: row.try_get("updated_at")?,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn former_solver_settings_are_skipped_and_unknown_ones_are_damage() {
-        let with =
-            |solver: &str| recorded_options(&format!(r#"{{"solver": {{"required_reduction": 0.5, {solver}}}}}"#));
-        let mut kept = SolveOptions::default();
-        kept.solver.required_reduction = 0.5;
-        assert_eq!(with(r#""watchdog_trials": 4, "dual_regularisation": "adaptive""#).unwrap(), kept);
-        assert!(matches!(with(r#""watchdog": 4"#), Err(StoreError::Damaged { .. })));
-    }
-
-    #[test]
-    fn older_settings_without_curvature_weight_mean_zero() {
-        let old = r#"{"mesh": {"ds2": 4, "ds3": 4, "ss2": 6, "ss1": 6}, "regularisation": {"power_smoothing_w": 1,
-            "torque": 0.003, "acceleration": 0.0001, "contact_force": 0.0001, "activation": 0.003, "fibre_velocity": 0.01}}"#;
-        assert_eq!(recorded_settings(old).unwrap(), GaitSettings::reference_problem());
-        let new = serde_json::to_string(&GaitSettings::default()).unwrap();
-        assert_eq!(recorded_settings(&new).unwrap(), GaitSettings::default());
-    }
 }

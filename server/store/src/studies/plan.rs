@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Who answers comparisons.
+/// Who answers comparisons: `automatic`, Gait RMSE answers every comparison; `human`, people answer, and the study
+/// waits for them; `mixed`, Gait RMSE answers, and people can add answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FeedbackMode {
@@ -40,7 +41,7 @@ impl FromStr for FeedbackMode {
     }
 }
 
-/// Who evaluates trials.
+/// What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report outcomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Evaluation {
@@ -75,21 +76,21 @@ impl FromStr for Evaluation {
 pub struct StudyPlan {
     /// Name shown to users.
     pub name: String,
-    /// Subject of the study.
+    /// Identifier of the subject.
     pub subject_id: SubjectId,
     /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
     /// entered first.
     pub body: Option<Body>,
-    /// Device.
+    /// Identifier of the device.
     pub device_id: DeviceId,
-    /// Reference gait for Gait RMSE.
+    /// Identifier of the reference gait for Gait RMSE.
     pub reference_gait_id: ReferenceGaitId,
     /// Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
     /// C4).
     pub muscles: bool,
     /// Settings of the gait problem.
     pub gait_settings: Box<GaitSettings>,
-    /// Limits of one solve.
+    /// Options of the solver: limits, tolerance, initial guesses and retries.
     pub solve_options: SolveOptions,
     /// Values of bounds that are not tuned.
     pub base_bounds: TunedBounds,
@@ -99,7 +100,7 @@ pub struct StudyPlan {
     pub learner: LearnerSettings,
     /// Who answers comparisons.
     pub feedback_mode: FeedbackMode,
-    /// Who evaluates trials.
+    /// What evaluates trials.
     pub evaluation: Evaluation,
     /// Number of trials.
     pub trial_budget: u32,

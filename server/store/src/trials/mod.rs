@@ -18,7 +18,7 @@ use sqlx::sqlite::SqliteRow;
 pub struct Trial {
     /// Identifier.
     pub id: TrialId,
-    /// The study it belongs to.
+    /// Identifier of the study to which the trial belongs.
     pub study_id: StudyId,
     /// Number within the study, from 1, in the order of proposal.
     pub number: u32,
@@ -34,7 +34,7 @@ pub struct Trial {
     pub warm_started_from: Option<TrialId>,
     /// Script that evaluates the trial. Absent if the service does.
     pub asked_by: Option<String>,
-    /// State.
+    /// State of the trial.
     pub state: TrialState,
     /// How the solve ended.
     pub status: Option<SolveStatus>,
@@ -51,7 +51,7 @@ pub struct Trial {
     pub iterations: Option<u32>,
     /// Wall time of the solve, s.
     pub seconds_total: Option<f64>,
-    /// All figures of the solve.
+    /// All numerical results of the solve.
     pub report: Option<SolveReport>,
     /// Most violated rows, worst first.
     pub violations: Vec<Violation>,

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// State of a trial.
+/// State of a trial. `queued` and `running` trials are open. `converged` and `not_converged` are results; `failed`
+/// (error, crash or time limit), `lost` (the worker stopped responding) and `cancelled` are not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TrialState {

@@ -45,9 +45,8 @@ pub struct RaterAnswer {
     pub note: String,
 }
 
-/// Confirmation of a rater's answer. The response is stored, to be sent again if the request is repeated. It contains
-/// neither the gaits nor the answer, so that anybody who can read the study does not learn which gait was shown on
-/// which side.
+/// Confirmation of a rater's answer. The response is stored, and sent again if the request is repeated. It omits the
+/// gaits and the answer, because others who can read the study must not learn which gait was shown on which side.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Answered {
     /// Number of the pair for this rater.
@@ -331,7 +330,7 @@ fn unknown_pair() -> Error {
 pub struct UnblindedPair {
     /// Identifier.
     pub id: PresentationId,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
     pub rater: String,

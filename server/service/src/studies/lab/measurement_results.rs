@@ -21,8 +21,6 @@ pub struct WalkActivity {
     /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// Measurement file that it was computed from.
-    // Records can name the field `recording_id`.
-    #[serde(alias = "recording_id")]
     pub measurement_file_id: MeasurementFileId,
     /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
     /// the peak of walk 1.

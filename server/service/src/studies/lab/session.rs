@@ -33,7 +33,7 @@ pub struct NewLabSession {
     pub notes: String,
 }
 
-/// Condition of a walk.
+/// Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Condition {
@@ -45,7 +45,8 @@ pub enum Condition {
     GaitB,
 }
 
-/// State of a session.
+/// State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `closed`, the
+/// session accepts no more data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LabSessionState {
@@ -96,7 +97,7 @@ pub struct WalkView {
 pub struct LabSessionView {
     /// Identifier.
     pub id: LabSessionId,
-    /// The study.
+    /// Identifier of the study.
     pub study_id: StudyId,
     /// Number of the session in this study, from 1.
     pub number: u32,

@@ -20,7 +20,8 @@ use utoipa::ToSchema;
 /// Name of an uploaded file in errors.
 pub(super) const WHAT: &str = "recording";
 
-/// Format of a measurement file.
+/// Format of a measurement file: `csv`, comma-separated values with column names in the first line; `opensim`, a motion
+/// or storage file (.mot, .sto).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeasurementFormat {
@@ -36,8 +37,6 @@ pub enum MeasurementFormat {
 #[serde(deny_unknown_fields, default)]
 pub struct EmgReading {
     /// File format.
-    // Older records have the name `form`.
-    #[serde(alias = "form")]
     pub format: MeasurementFormat,
     /// Sampling rate of a CSV file without a `time_s` column, Hz.
     #[schema(minimum = 100, maximum = 20000)]
@@ -53,7 +52,7 @@ pub struct EmgReading {
     pub heel_strike_threshold: f64,
     /// Numbers of strides to leave out, from 1, in the order of the heel strikes.
     pub rejected_strides: Vec<u32>,
-    /// Name of the file, for people.
+    /// Name of the file, as it is shown.
     #[schema(max_length = 200)]
     pub file_name: Option<String>,
 }
@@ -184,14 +183,12 @@ pub struct NewEmg {
 pub struct MotionReading {
     /// File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     /// knee_R_rad, ankle_R_rad.
-    // Older records have the name `form`.
-    #[serde(alias = "form")]
     pub format: MeasurementFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     pub unit: Option<Unit>,
     /// Cut-off frequency of the low-pass filter before differentiation, Hz.
     pub cutoff_hz: f64,
-    /// Name of the file, for people.
+    /// Name of the file, as it is shown.
     #[schema(max_length = 200)]
     pub file_name: Option<String>,
 }
@@ -328,7 +325,6 @@ pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Uploa
     /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
     struct Reading {
-        #[serde(alias = "form")]
         format: MeasurementFormat,
     }
     let recording = measurement_files::get(db, id).await?;

@@ -10,14 +10,12 @@ mod planning_loop;
 mod prefetch_loop;
 
 use super::belief::Beliefs;
-use super::certifier::Certifier;
 use super::execution::{Simulation, WalksAsked};
-use super::explainer::Explainer;
 use super::explanation::Effort;
 use super::job::{JobId, JobState};
+use super::jobs_after_solves::JobsAfterSolves;
 use super::prefetch::Prefetches;
 use super::snapshot::StudySnapshot;
-use super::walk_simulator::WalkSimulator;
 use crate::error::Error;
 use crate::supervise::{Task, Tasks};
 use crate::workers::{AfterSolves, Board, Dispatch};
@@ -47,10 +45,8 @@ struct Inner {
     prefetches: Prefetches,
     /// Snapshots of the studies that wait for an answer, for prefetching.
     waiting: watch::Sender<Arc<[Arc<StudySnapshot>]>>,
-    /// The tasks that certify the best gaits of ended studies and explain their trials without a gait.
-    after_solves: Option<(Certifier, Explainer)>,
-    /// The task that simulates walks.
-    simulator: Option<WalkSimulator>,
+    /// Certificates, explanations and execution reports.
+    after_solves: Option<JobsAfterSolves>,
     beliefs: Arc<Beliefs>,
     /// Held from the search for a free worker until the engine has the job, so that a prefetch never takes the worker
     /// of a trial.
@@ -89,12 +85,8 @@ impl Scheduler {
         // A separate pool, so that requests cannot delay planning.
         let store = store.with_own_pool();
         let beliefs = Arc::<Beliefs>::default();
-        let over_record = |AfterSolves { certify, explain }| {
-            (Certifier::new(store.clone(), certify, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
-        };
         Self(Arc::new(Inner {
-            simulator: after_solves.is_some().then(|| WalkSimulator::new(store.clone())),
-            after_solves: after_solves.map(over_record),
+            after_solves: after_solves.map(|by| JobsAfterSolves::new(&store, by, &beliefs)),
             unpacking: store.with_own_pool(),
             store,
             beliefs,
@@ -149,68 +141,62 @@ impl Scheduler {
         self.0.wake.notify_one();
     }
 
-    /// Requests certificates of the best gaits of a study; `next` is the first one without. Returns `false` if this
-    /// process certifies gaits on request only.
+    /// Requests certificates of the best gaits of a study; `next` is the first one without. Returns `false` if that one
+    /// cannot be certified, its job was cancelled, or this process certifies gaits on request only.
     pub fn certify_best_of(&self, study: StudyId, next: TrialId) -> bool {
-        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.ask(study, next))
+        self.0.after_solves.as_ref().is_some_and(|jobs| jobs.certify_best_of(study, next))
     }
 
     /// Requests the certificate of one gait. Returns `false` if this process certifies none.
     pub fn certify(&self, trial: TrialId) -> bool {
-        self.0.after_solves.as_ref().map(|(certifier, _)| certifier.ask_for(trial)).is_some()
+        self.0.after_solves.as_ref().map(|jobs| jobs.certificates.ask(trial, ())).is_some()
     }
 
-    /// The gaits whose certificates were requested, each with the state of its job.
-    pub fn certifying(&self) -> Vec<(TrialId, JobState)> {
-        self.0.after_solves.as_ref().map(|(certifier, _)| certifier.jobs()).unwrap_or_default()
+    /// Whether a gait of a study is being certified or is queued.
+    pub fn is_certifying(&self, study: StudyId, gait: TrialId) -> bool {
+        self.0.after_solves.as_ref().is_some_and(|jobs| jobs.is_certifying(study, gait))
+    }
+
+    /// The state of the certificate of a gait in this process, and the reason if it failed.
+    pub(super) fn certifying(&self, trial: TrialId) -> Option<(JobState, Option<String>)> {
+        self.0.after_solves.as_ref().and_then(|jobs| jobs.certifying(trial))
     }
 
     /// Requests the execution report of one gait; `None` if it exists already. Returns `false` if this process simulates
     /// no walks.
     pub(super) fn simulate(&self, trial: TrialId, asked: Option<WalksAsked>) -> bool {
-        self.0.simulator.as_ref().map(|simulator| simulator.ask_for(trial, asked)).is_some()
+        self.0.after_solves.as_ref().map(|jobs| jobs.simulate(trial, asked)).is_some()
     }
 
     /// The state of the execution report of a gait in this process.
     pub fn simulating(&self, trial: TrialId) -> Simulation {
-        self.0.simulator.as_ref().map_or(Simulation::None, |simulator| simulator.state_of(trial))
+        self.0.after_solves.as_ref().map_or(Simulation::None, |jobs| jobs.simulating(trial))
     }
 
-    /// The gaits whose execution reports are queued or running, each with the state of its job.
-    pub fn all_simulating(&self) -> Vec<(TrialId, JobState)> {
-        self.0.simulator.as_ref().map(WalkSimulator::jobs).unwrap_or_default()
+    /// Resumes the explanation of a trial whose explanation was cancelled.
+    pub fn explain_again(&self, trial: TrialId) {
+        if let Some(jobs) = &self.0.after_solves {
+            jobs.explanations.again(trial);
+        }
+    }
+
+    /// The state of the explanation of a trial in this process.
+    pub fn explaining(&self, trial: TrialId) -> Effort {
+        self.0.after_solves.as_ref().map_or(Effort::None, |jobs| jobs.explaining(trial))
+    }
+
+    /// The certificates, explanations and execution reports that are queued or running, with their trials.
+    pub(super) fn jobs_after_solves(&self) -> Vec<(JobId, TrialId, JobState)> {
+        self.0.after_solves.as_ref().map(JobsAfterSolves::open).unwrap_or_default()
     }
 
     /// Stops the work of a job that was cancelled.
     pub async fn cancel_job(&self, id: JobId) {
         match (id, &self.0.after_solves) {
             (JobId::Solve(trial), _) => self.cancel_solve(trial).await,
-            (JobId::Certificate(trial), Some((certifier, _))) => certifier.cancel(trial),
-            (JobId::Explanation(trial), Some((_, explainer))) => explainer.cancel(trial),
-            (JobId::ExecutionReport(trial), _) => {
-                if let Some(simulator) = &self.0.simulator {
-                    simulator.cancel(trial);
-                }
-            }
-            (JobId::Certificate(_) | JobId::Explanation(_), None) | (JobId::Backup(_), _) => {}
+            (id, Some(jobs)) => jobs.cancel(id),
+            (_, None) => {}
         }
-    }
-
-    /// Resumes the explanation of a trial whose explanation was cancelled.
-    pub fn explain_again(&self, trial: TrialId) {
-        if let Some((_, explainer)) = &self.0.after_solves {
-            explainer.again(trial);
-        }
-    }
-
-    /// Whether a gait of a study is being certified or is queued.
-    pub fn is_certifying(&self, study: StudyId, gait: TrialId) -> bool {
-        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.is_at(study, gait))
-    }
-
-    /// The state of the explanation of a trial in this process.
-    pub fn explaining(&self, trial: TrialId) -> Effort {
-        self.0.after_solves.as_ref().map_or(Effort::None, |(_, explainer)| explainer.effort(trial))
     }
 
     /// Cancels the solve of a trial, which stops within one iteration.
@@ -267,27 +253,27 @@ impl Scheduler {
         self.0.health.trouble().or_else(|| self.0.engine.trouble())
     }
 
-    /// Certifies gaits forever.
+    /// Certifies gaits forever. The explanations of a study follow the certificates of its best gaits.
     async fn keep_certifying(&self, task: &Task) -> Result<(), Error> {
-        let Some((certifier, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        let Some(jobs) = &self.0.after_solves else { return std::future::pending().await };
         task.works();
-        certifier.run(self.pulse(), || self.changed(), |study| explainer.take_up(study)).await;
-        Ok(())
-    }
-
-    /// Simulates walks forever.
-    async fn keep_simulating(&self, task: &Task) -> Result<(), Error> {
-        let Some(simulator) = &self.0.simulator else { return std::future::pending().await };
-        task.works();
-        simulator.run(self.pulse(), || self.changed()).await;
+        jobs.certificates.run(self.pulse(), || self.changed(), |study| jobs.explanations.take_up(study)).await;
         Ok(())
     }
 
     /// Explains trials without a gait forever.
     async fn keep_explaining(&self, task: &Task) -> Result<(), Error> {
-        let Some((_, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        let Some(jobs) = &self.0.after_solves else { return std::future::pending().await };
         task.works();
-        explainer.run(self.pulse(), || self.changed()).await;
+        jobs.explanations.run(self.pulse(), || self.changed(), |_| {}).await;
+        Ok(())
+    }
+
+    /// Simulates walks forever.
+    async fn keep_simulating(&self, task: &Task) -> Result<(), Error> {
+        let Some(jobs) = &self.0.after_solves else { return std::future::pending().await };
+        task.works();
+        jobs.simulations.run(self.pulse(), || self.changed(), |_| {}).await;
         Ok(())
     }
 }

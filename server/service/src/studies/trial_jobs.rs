@@ -1,0 +1,271 @@
+//! Jobs of one kind for trials, of which one runs at a time, at lower priority than solves.
+//!
+//! Requested trials come first, then those of ended studies. Requests and cancellations are on record, so the jobs
+//! continue after a crash.
+
+use super::job::JobState;
+use super::trial_queue::{Order, Running, TrialJobState, TrialQueue};
+use crate::error::Error;
+use gait_optimizer::CancelToken;
+use gaitwright_compute::priority::behind_solves;
+use gaitwright_store::{Store, StoreResult, StudyId, TrialId, consents, trials};
+use std::collections::BTreeSet;
+use std::fmt;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+use tokio::sync::{Notify, watch};
+
+/// A kind of job: where its requests are on record, and what it does for one trial.
+pub(super) trait TrialJob: Send + Sync {
+    /// The name in the log.
+    const NAME: &'static str;
+    /// Which request is next.
+    const ORDER: Order = Order::OldestRequest;
+    /// Whether [`Self::requested`] is read with every change of the record. If not, it is read once, and
+    /// [`TrialJobs::ask`] announces later requests.
+    const READS_REQUESTS: bool = false;
+    /// What a request says besides the trial.
+    type Request: Clone + Send + Sync;
+
+    /// The requests on record that were neither carried out nor cancelled since, oldest first.
+    fn requested(&self) -> impl Future<Output = StoreResult<Vec<(TrialId, Self::Request)>>> + Send;
+
+    /// The trials whose jobs were cancelled and not requested since.
+    fn cancelled(&self) -> impl Future<Output = StoreResult<Vec<TrialId>>> + Send;
+
+    /// Studies that have ended since the last call.
+    fn ended(&self) -> impl Future<Output = StoreResult<Vec<StudyId>>> + Send {
+        async { Ok(Vec::new()) }
+    }
+
+    /// The next trial of an ended study, outside `skipped`.
+    fn next_of(
+        &self,
+        study: StudyId,
+        skipped: BTreeSet<TrialId>,
+    ) -> impl Future<Output = Result<Option<(TrialId, Self::Request)>, Error>> + Send {
+        let _ = (study, skipped);
+        async { Ok(None) }
+    }
+
+    /// Does the work for a trial and stores the result. Dropping the future stops the work.
+    fn carry_out(&self, trial: TrialId, request: Self::Request) -> impl Future<Output = Result<(), Error>> + Send;
+
+    /// Records that the work for a trial is impossible.
+    fn record_failure(&self, trial: TrialId, reason: &str) -> impl Future<Output = Result<(), Error>> + Send {
+        let _ = (trial, reason);
+        async { Ok(()) }
+    }
+}
+
+/// The jobs of one kind.
+pub(super) struct TrialJobs<J: TrialJob> {
+    store: Store,
+    job: J,
+    queue: Mutex<TrialQueue<J::Request>>,
+    wake: Notify,
+}
+
+impl<J: TrialJob> TrialJobs<J> {
+    /// Creates the queue; [`Self::run`] starts the jobs.
+    pub(super) fn new(store: Store, job: J) -> Self {
+        Self { store, job, queue: Mutex::default(), wake: Notify::new() }
+    }
+
+    /// What the jobs do.
+    pub(super) fn job(&self) -> &J {
+        &self.job
+    }
+
+    /// Queues the job of a trial, unless it is queued, is running or has failed.
+    pub(super) fn ask(&self, trial: TrialId, request: J::Request) {
+        self.queue().ask(trial, request);
+        self.wake.notify_one();
+    }
+
+    /// Forgets that the job of a trial was cancelled or failed.
+    pub(super) fn again(&self, trial: TrialId) {
+        self.queue().forget(trial);
+        self.wake.notify_one();
+    }
+
+    /// Queues an ended study behind requested trials.
+    pub(super) fn take_up(&self, study: StudyId) {
+        self.queue().take_up([study]);
+        self.wake.notify_one();
+    }
+
+    /// Whether an ended study is queued.
+    pub(super) fn has(&self, study: StudyId) -> bool {
+        self.queue().has(study)
+    }
+
+    /// The state of the job of a trial.
+    pub(super) fn state(&self, trial: TrialId) -> TrialJobState<J::Request> {
+        self.queue().state(trial)
+    }
+
+    /// The trials whose jobs are running or queued.
+    pub(super) fn open(&self) -> Vec<(TrialId, JobState)> {
+        self.queue().open()
+    }
+
+    /// Gives up the job of a trial until somebody asks for it again.
+    pub(super) fn cancel(&self, trial: TrialId) {
+        self.queue().cancel(trial);
+    }
+
+    /// Runs forever. `pulse` changes with every change of the record. Calls `changed` after every job, and `through`
+    /// when an ended study has no trial left to work on.
+    pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn(), through: impl Fn(StudyId)) {
+        let mut first = true;
+        // An earlier run may have ended within a job.
+        self.queue().end();
+        loop {
+            pulse.mark_unchanged();
+            match self.run_next(&mut pulse, &mut first, &through).await {
+                Ok(true) => {
+                    changed();
+                    continue;
+                }
+                Ok(false) => {}
+                Err(error) => tracing::error!(job = J::NAME, %error, "cannot run the next job"),
+            }
+            let retry = self.queue().next_retry();
+            tokio::select! {
+                _ = pulse.changed() => {}
+                () = self.wake.notified() => {}
+                () = tokio::time::sleep_until(retry.unwrap_or_else(Instant::now).into()), if retry.is_some() => {}
+            }
+        }
+    }
+
+    /// Runs the next job. Returns `false` if there is none.
+    async fn run_next(
+        &self,
+        pulse: &mut watch::Receiver<u64>,
+        first: &mut bool,
+        through: &impl Fn(StudyId),
+    ) -> Result<bool, Error> {
+        self.read_record(*first).await?;
+        *first = false;
+        let Some(running) = self.next(through).await? else { return Ok(false) };
+        let (trial, request) = (running.trial, running.request.clone());
+        let Err(error) = self.carry_out(running, pulse).await else {
+            self.queue().end();
+            return Ok(true);
+        };
+        if error.is_of_machine() {
+            tracing::error!(job = J::NAME, %trial, %error, "a job failed; it is tried again in a minute");
+            self.queue().postpone(trial, request);
+        } else {
+            tracing::warn!(job = J::NAME, %trial, %error, "a job failed");
+            let reason = error.to_string();
+            self.queue().fail(trial, reason.clone());
+            self.job.record_failure(trial, &reason).await?;
+        }
+        Ok(true)
+    }
+
+    /// Queues the requests on record and the studies that have ended.
+    async fn read_record(&self, first: bool) -> StoreResult<()> {
+        if first {
+            let cancelled = self.job.cancelled().await?;
+            self.queue().recall_cancelled(cancelled);
+        }
+        if first || J::READS_REQUESTS {
+            let requested = self.job.requested().await?;
+            self.queue().recall(requested);
+        }
+        let ended = self.job.ended().await?;
+        self.queue().take_up(ended);
+        Ok(())
+    }
+
+    /// The next job, which is running from now on. The newest study comes first, because somebody is likely to look at
+    /// it soon.
+    async fn next(&self, through: &impl Fn(StudyId)) -> Result<Option<Running<J::Request>>, Error> {
+        loop {
+            let (study, skipped) = {
+                let mut queue = self.queue();
+                if let Some(running) = queue.begin_requested(J::ORDER, Instant::now()) {
+                    return Ok(Some(running));
+                }
+                let Some(study) = queue.newest_study() else { return Ok(None) };
+                (study, queue.skipped())
+            };
+            match self.job.next_of(study, skipped).await {
+                Ok(Some((trial, request))) => {
+                    // The job may have been cancelled meanwhile.
+                    if let Some(running) = self.queue().begin(trial, request) {
+                        return Ok(Some(running));
+                    }
+                    continue;
+                }
+                Ok(None) => {}
+                Err(error) if error.is_of_machine() => return Err(error),
+                Err(error) => tracing::error!(job = J::NAME, %study, %error, "cannot choose the next trial of a study"),
+            }
+            self.queue().remove_study(study);
+            through(study);
+        }
+    }
+
+    /// Carries out a job until it is done, it is cancelled or the subject withdraws consent.
+    async fn carry_out(&self, running: Running<J::Request>, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
+        let Running { trial, request, cancelled, .. } = running;
+        let study = trials::get(&mut *self.store.read().await?, trial).await?.study_id;
+        let mut work = std::pin::pin!(self.job.carry_out(trial, request));
+        let result = loop {
+            if consents::is_withdrawn(&mut *self.store.read().await?, study).await? {
+                return Ok(());
+            }
+            tokio::select! {
+                biased;
+                () = cancelled.cancelled() => return Ok(()),
+                result = &mut work => break result,
+                Ok(()) = pulse.changed() => {}
+            }
+        };
+        match result {
+            // Work that fails after a withdrawal fails because of it.
+            Err(_) if consents::is_withdrawn(&mut *self.store.read().await?, study).await? => Ok(()),
+            result => result,
+        }
+    }
+
+    fn queue(&self) -> MutexGuard<'_, TrialQueue<J::Request>> {
+        // The queue is consistent between statements, so a poisoned lock is usable.
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<J: TrialJob> fmt::Debug for TrialJobs<J> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TrialJobs").field("job", &J::NAME).finish_non_exhaustive()
+    }
+}
+
+/// Runs work on a thread with lower priority than solves. Dropping the future cancels the token of the work.
+///
+/// # Errors
+/// [`Error::Internal`] if no thread can be started or the work panics.
+pub(super) async fn behind<T: Send + 'static>(
+    name: &'static str,
+    work: impl FnOnce(&CancelToken) -> T + Send + 'static,
+) -> Result<T, Error> {
+    let cancel = CancelToken::new();
+    let (_cancels, of_thread) = (CancelOnDrop(cancel.clone()), cancel);
+    let told = behind_solves(name, move || work(&of_thread))
+        .map_err(|error| Error::Internal(format!("cannot start a thread for the {name}: {error}")))?;
+    told.await.map_err(|_| Error::Internal(format!("the {name} panicked")))
+}
+
+/// Cancels work when the caller stops waiting for it.
+struct CancelOnDrop(CancelToken);
+
+impl Drop for CancelOnDrop {
+    fn drop(&mut self) {
+        self.0.cancel();
+    }
+}

@@ -1,0 +1,164 @@
+//! Reads stored documents of earlier versions: brings former names, which records and archives keep, to those of today.
+
+use super::{StoreError, StoreResult, json_columns};
+use gait_optimizer::explanation::Explanation;
+use gait_optimizer::{GaitSettings, IterationRecord, SolveOptions};
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+/// Solver settings of earlier versions whose value is now part of the method.
+const FORMER_SOLVER_SETTINGS: [&str; 23] = [
+    "dual_tolerance",
+    "divergence_limit",
+    "mu_warm",
+    "kappa_epsilon",
+    "kappa_mu",
+    "theta_mu",
+    "tau_min",
+    "bound_fraction",
+    "warm_bound_fraction",
+    "warm_multiplier_push",
+    "multiplier_limit",
+    "hessian_regularisation_min",
+    "hessian_regularisation_max",
+    "dual_regularisation",
+    "dual_regularisation_value",
+    "residual_target",
+    "residual_limit",
+    "max_refinements",
+    "watchdog_trigger",
+    "watchdog_trials",
+    "max_soft_steps",
+    "elastic_weight",
+    "max_restoration_phases",
+];
+
+/// Options of solves, without settings that the solver no longer has.
+pub(super) fn solve_options(text: &str) -> StoreResult<SolveOptions> {
+    read("solve_options", text, |options| {
+        rename(options, "cold_guesses", "initial_guesses");
+        if let Some(solver) = options.get_mut("solver").and_then(Value::as_object_mut) {
+            solver.retain(|name, _| !FORMER_SOLVER_SETTINGS.contains(&name.as_str()));
+        }
+    })
+}
+
+/// Settings of a gait problem. Without a weight on the curvature of activations they mean 0, while new studies without
+/// it get the default.
+pub(super) fn gait_settings(text: &str) -> StoreResult<GaitSettings> {
+    read("gait_settings", text, |settings| {
+        if let Some(weights) = settings.get_mut("regularisation").and_then(Value::as_object_mut) {
+            weights.entry("activation_bend").or_insert_with(|| 0.0.into());
+        }
+    })
+}
+
+/// Iterations of a solve.
+pub(super) fn iterations(what: &'static str, text: &str) -> StoreResult<Vec<IterationRecord>> {
+    read(what, text, |iterations| {
+        for phase in each(Some(iterations)).filter_map(|iteration| iteration.get_mut("phase")) {
+            if phase == "between_points" {
+                *phase = "inter_node".into();
+            }
+        }
+    })
+}
+
+/// How to read a measurement file.
+pub(super) fn reading<T: DeserializeOwned>(text: &str) -> StoreResult<T> {
+    read("reading", text, |reading| rename(reading, "form", "format"))
+}
+
+/// A result of EMG processing.
+pub(super) fn emg_result<T: DeserializeOwned>(text: &str) -> StoreResult<T> {
+    read("EMG result", text, |result| {
+        for walk in each(result.get_mut("walks")) {
+            rename(walk, "recording_id", "measurement_file_id");
+            if let Some(rmse) = walk.get_mut("emg_rmse") {
+                rename(rmse, "remarks", "warnings");
+            }
+        }
+    })
+}
+
+/// An infeasibility explanation.
+pub(super) fn explanation(text: &str) -> StoreResult<Explanation> {
+    read("explanation", text, |explanation| {
+        for conflict in each(explanation.get_mut("conflicts")) {
+            rename(conflict, "wishes", "naturalness_terms");
+        }
+    })
+}
+
+/// Parses a document after `bring` has changed it.
+fn read<T: DeserializeOwned>(what: &'static str, text: &str, bring: impl FnOnce(&mut Value)) -> StoreResult<T> {
+    let mut document: Value = json_columns::from_text(what, text)?;
+    bring(&mut document);
+    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
+}
+
+/// The elements of an array.
+fn each(array: Option<&mut Value>) -> impl Iterator<Item = &mut Value> {
+    array.and_then(Value::as_array_mut).into_iter().flatten()
+}
+
+/// Gives a field its name of today, unless the document has both.
+fn rename(document: &mut Value, former: &str, today: &str) {
+    if let Some(fields) = document.as_object_mut()
+        && !fields.contains_key(today)
+        && let Some(value) = fields.remove(former)
+    {
+        fields.insert(today.to_owned(), value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gait_optimizer::solve::SolvePhase;
+    use serde_json::json;
+
+    #[test]
+    fn former_solver_settings_are_skipped_and_unknown_ones_are_damage() {
+        let with = |solver: &str| solve_options(&format!(r#"{{"solver": {{"required_reduction": 0.5, {solver}}}}}"#));
+        let mut kept = SolveOptions::default();
+        kept.solver.required_reduction = 0.5;
+        assert_eq!(with(r#""watchdog_trials": 4, "dual_regularisation": "adaptive""#).unwrap(), kept);
+        assert!(matches!(with(r#""watchdog": 4"#), Err(StoreError::Damaged { .. })));
+    }
+
+    #[test]
+    fn older_settings_without_curvature_weight_mean_zero() {
+        let old = r#"{"mesh": {"ds2": 4, "ds3": 4, "ss2": 6, "ss1": 6}, "regularisation": {"power_smoothing_w": 1,
+            "torque": 0.003, "acceleration": 0.0001, "contact_force": 0.0001, "activation": 0.003, "fibre_velocity": 0.01}}"#;
+        assert_eq!(gait_settings(old).unwrap(), GaitSettings::reference_problem());
+        let new = serde_json::to_string(&GaitSettings::default()).unwrap();
+        assert_eq!(gait_settings(&new).unwrap(), GaitSettings::default());
+    }
+
+    #[test]
+    fn former_names_are_read_as_those_of_today() {
+        let options = solve_options(r#"{"cold_guesses": 3}"#).unwrap();
+        assert_eq!(options, SolveOptions { initial_guesses: 3, ..SolveOptions::default() });
+        assert!(solve_options(r#"{"cold_guesses": 3, "initial_guesses": 3}"#).is_err(), "not both");
+        let phase = |name: &str| {
+            let record = format!(
+                r#"[{{"guess": 0, "phase": "{name}", "iteration": 1, "objective": 0.5, "constraint_violation": 0.1,
+                "dual_infeasibility": 0.1, "barrier": 0.1, "step": 1.0}}]"#
+            );
+            iterations("iterations", &record).unwrap()[0].phase
+        };
+        assert_eq!((phase("between_points"), phase("cost")), (SolvePhase::InterNode, SolvePhase::Cost));
+        let reading: Value = reading(r#"{"form": "opensim", "rate_hz": 1000}"#).unwrap();
+        assert_eq!(reading, json!({"format": "opensim", "rate_hz": 1000}));
+        let result = json!({"walks": [{"recording_id": "r", "emg_rmse": {"total": 1.5, "remarks": ["weak"]}}, {"emg_rmse": null}]});
+        let today = json!({"walks": [{"measurement_file_id": "r", "emg_rmse": {"total": 1.5, "warnings": ["weak"]}}, {"emg_rmse": null}]});
+        assert_eq!(emg_result::<Value>(&result.to_string()).unwrap(), today);
+        assert_eq!(emg_result::<Value>(&today.to_string()).unwrap(), today);
+        let conflict =
+            json!({"bounds": [], "wishes": ["smooth torque"], "violations": [], "starts": 3, "undecided": false});
+        let explained = json!({"status": "infeasible", "violations": [], "conflicts": [conflict], "at_limit": [], "relaxations": []});
+        let found = explanation(&explained.to_string()).unwrap();
+        assert_eq!(found.conflicts[0].naturalness_terms, ["smooth torque"]);
+    }
+}
