@@ -86,6 +86,8 @@ pub(super) struct WayOut {
 pub(super) struct Attempt {
     /// The bounds with their values in the search space: `a7 = 35 °`.
     pub(super) bounds: String,
+    /// Whether these values are looser than those of the relaxation.
+    pub(super) is_looser: bool,
     /// Whether the study gets one more trial for it.
     pub(super) extends: bool,
 }
@@ -117,6 +119,7 @@ impl WayOut {
                 .map(|(bound, value)| with_unit(bound, *value))
                 .collect::<Vec<_>>()
                 .join(" and "),
+            is_looser: trial.bounds != *relaxation,
             extends: trial.extends,
         };
         Self {
