@@ -111,7 +111,7 @@ def by_script(client: Client, subject: UUID) -> None:
     new = NewStudy(subject_id=subject, name="python", evaluation=Evaluation.SCRIPT, trial_budget=BUDGET)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new))
     while True:
-        asked = ask_for_trial.sync_detailed(study.id, client=client, body=Ask(worker="treadmill"))
+        asked = ask_for_trial.sync_detailed(study.id, client=client, body=Ask(script="treadmill"))
         if asked.status_code == HTTPStatus.CONFLICT:
             break
         trial = given(Trial, asked.parsed)

@@ -155,7 +155,7 @@ impl Lab {
         service.wait_for(study, &[StudyState::Finished]).await;
         let trials = converged(service, study).await;
         let gaits = [trials[0].id, trials[1].id];
-        let plan = json!({"gait_one": gaits[0], "gait_two": gaits[1]});
+        let plan = json!({"trial_a": gaits[0], "trial_b": gaits[1]});
         let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await.json();
         Self { study, gaits, id: session["id"].as_str().unwrap().to_owned() }
     }

@@ -107,7 +107,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     let recommended = async || service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     let best = recommended().await["trial_id"].clone();
     let other = converged(&service, study).await.into_iter().find(|id| json!(id) != best).unwrap();
-    let remark = json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K1"});
+    let remark = json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K1"});
     let remarks = format!("/api/v1/studies/{study}/assessments");
     service.post(&remarks, &remark).await;
     assert_ne!(recommended().await["trial_id"], best);
@@ -116,7 +116,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
     assert!(for_the_device.text.contains("It must not be walked until"), "{}", for_the_device.text);
     let seen = safety_reports(&service, study).await[0]["id"].clone();
-    service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
+    service.post(&remarks, &json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K3"})).await;
     let late = decide(&service, best_id, &json!({"decision": "walkable", "reason": "r", "reports": [seen]})).await;
     assert_eq!(late.status, StatusCode::CONFLICT);
     assert!(late.text.contains("a safety report by K3 that is not among"), "{}", late.text);
@@ -153,7 +153,7 @@ async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
     let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
     let gaits = converged(&service, study).await;
     let sessions = format!("/api/v1/studies/{study}/lab-sessions");
-    let plan = json!({"gait_one": gaits[0], "gait_two": gaits[1]});
+    let plan = json!({"trial_a": gaits[0], "trial_b": gaits[1]});
     let id = service.post(&sessions, &plan).await.json()["id"].as_str().unwrap().to_owned();
     for walk in 1..=3 {
         service.post(&format!("/api/v1/lab-sessions/{id}/walks"), &json!({"walk": walk})).await;

@@ -12,7 +12,7 @@ const VELOCITY: Measured = Measured::new("C8 fibre velocity", "l_opt/s", 1e-4, S
 const LENGTH: Measured = Measured::new("C8 fibre lengths from their velocities", "l_opt", 1e-6, None);
 const TORQUE: Measured = Measured::new("C9-C12 joint torques of the muscles", "N m", 1e-4, None);
 const RANGE: Measured = Measured::new("C5-C8 activations, fibre lengths and velocities", "", 3e-6, Some(0.05));
-const RESET: Quantity = Quantity::judged("C8 continuity of fibre lengths", "l_opt", 1e-6);
+const RESET: Quantity = Quantity::judged("C2 continuity of fibre lengths", "l_opt", 1e-6);
 
 /// Measures a grid point.
 pub(super) fn note(

@@ -25,7 +25,7 @@ def main() -> None:
     study = client.create_study(subject_id=subject["id"], name="treadmill", evaluation="script", trial_budget=10)
     while True:
         try:
-            trial = client.ask_for_trial(study["id"], worker="treadmill")
+            trial = client.ask_for_trial(study["id"], script="treadmill")
         except Problem as problem:
             # All trials have been handed out, or the study has ended.
             if problem.status == 409:

@@ -28,10 +28,10 @@ const REFERENCE_FILE: &str = "A file in the format that `format` names, with its
 const RULES: [(&str, &str, &str); 27] = [
     ("NewPreference", "trial_a", GAIT),
     ("NewPreference", "trial_b", GAIT),
-    ("NewAssessment", "first", GAIT_OF_STUDY),
-    ("NewAssessment", "second", GAIT_OF_STUDY),
-    ("NewLabSession", "gait_one", GAIT),
-    ("NewLabSession", "gait_two", GAIT),
+    ("NewAssessment", "trial_a", GAIT_OF_STUDY),
+    ("NewAssessment", "trial_b", GAIT_OF_STUDY),
+    ("NewLabSession", "trial_a", GAIT),
+    ("NewLabSession", "trial_b", GAIT),
     ("Suggestion", "over", "A trial of this study with a walkable gait."),
     (
         "Suggestion",

@@ -31,7 +31,7 @@ async fn study() -> (TempDir, Service, StudyId, Vec<u8>) {
     for (path, body) in [
         ("preferences", json!({"trial_a": good[0], "trial_b": good[1], "answer": "b", "author": "K"})),
         ("preferences", json!({"trial_a": good[2], "trial_b": good[0], "answer": "no_difference", "author": "K"})),
-        ("assessments", json!({"first": good[1], "second": good[2], "answer": "unsafe_first", "author": "K"})),
+        ("assessments", json!({"trial_a": good[1], "trial_b": good[2], "answer": "unsafe_a", "author": "K"})),
     ] {
         let done = service.post(&format!("/api/v1/studies/{study}/{path}"), &body).await;
         assert!(done.status.is_success(), "{path}: {}", done.text);

@@ -31,12 +31,14 @@ use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::walkable;
+use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::idempotency::{self, Kept, fingerprint};
+use gaitwright_store::presentations::Judgement;
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
     AssessmentId, Connection, FeedbackId, Instant, StudyId, TrialId, assessments, commit, events, feedback, gaits,
-    presentations, reference_gaits, studies, trials,
+    reference_gaits, studies, trials,
 };
 use serde::Deserialize;
 use std::fmt;
@@ -335,7 +337,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 at: assessment.created_at,
                 retracted: assessment.retraction.is_some(),
                 is_safety_report: assessment.answer.is_about_safety(),
-                pair: Some((assessment.first, assessment.second)),
+                pair: Some(assessment.pair()),
                 other_answers: Vec::new(),
             })
         }
@@ -372,7 +374,7 @@ impl GivenAnswer {
     async fn still_closes(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
         match self {
             Self::Assessment(given) if self.is_about_safety() => {
-                let gaits = given.answer.unsafe_of((given.first, given.second));
+                let gaits = Judgement::from(given.answer).unsafe_of((given.trial_a, given.trial_b));
                 Ok(SafetyReports::read(db, study).await?.close_all(&gaits))
             }
             _ => Ok(true),
@@ -392,16 +394,16 @@ impl Submitted {
         };
         let assessment = |answer| {
             let (author, note) = (author.clone(), note.clone());
-            GivenAnswer::Assessment(NewAssessment { first: a, second: b, answer, source, author, note })
+            GivenAnswer::Assessment(NewAssessment { trial_a: a, trial_b: b, answer, source, author, note })
         };
         let judgement = match self.answer.as_str() {
             "a" => preference(PairAnswer::A),
             "b" => preference(PairAnswer::B),
             "no_difference" => preference(PairAnswer::NoDifference),
-            "cannot_tell" => assessment(presentations::Judgement::CannotTell),
-            "unsafe_a" => assessment(presentations::Judgement::UnsafeFirst),
-            "unsafe_b" => assessment(presentations::Judgement::UnsafeSecond),
-            "unsafe_both" => assessment(presentations::Judgement::UnsafeBoth),
+            "cannot_tell" => assessment(AssessmentAnswer::CannotTell),
+            "unsafe_a" => assessment(AssessmentAnswer::UnsafeA),
+            "unsafe_b" => assessment(AssessmentAnswer::UnsafeB),
+            "unsafe_both" => assessment(AssessmentAnswer::UnsafeBoth),
             other => {
                 return Err(Error::invalid("answer", other, "one of the answers on the form"));
             }

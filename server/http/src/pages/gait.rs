@@ -16,7 +16,7 @@ use crate::page_error::{Page, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
-use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
 use gaitwright_charts::{Figure, Ghost, WalkerFigure, gait_charts};
 use gaitwright_compute::OnPool;

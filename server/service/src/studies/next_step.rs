@@ -105,7 +105,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             author: String::new(),
             note: String::new(),
             by_rater: false,
-            unblinded: false,
+            could_have_known: false,
             created_at: now(),
             retraction: None,
         });

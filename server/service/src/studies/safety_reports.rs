@@ -171,7 +171,7 @@ impl SafetyReports {
         {
             let (by, at, source) =
                 (&assessment.author, assessment.created_at, SafetyReportSource::Staff(assessment.id));
-            found.hear(assessment.answer, assessment.pair(), |trial| Closed {
+            found.hear(assessment.answer.into(), assessment.pair(), |trial| Closed {
                 trial,
                 by: by.clone(),
                 at,
@@ -194,7 +194,7 @@ impl SafetyReports {
                     format!("the subject in lab session {} (blinded, so either gait may be meant)", session.number);
                 let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
                 let closed = |trial| Closed { trial, by: by.clone(), at, source, review: None };
-                found.closed.extend([session.gait_one, session.gait_two].map(closed));
+                found.closed.extend([session.trial_a, session.trial_b].map(closed));
             }
         }
         found.review(&safety_reviews::of_study(db, study).await?);

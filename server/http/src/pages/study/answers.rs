@@ -4,9 +4,8 @@ use crate::format;
 use gaitwright_service::studies::safety_reports::{Closed, SafetyReportSource};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::Instant;
-use gaitwright_store::assessments::Assessment;
+use gaitwright_store::assessments::{Assessment, AssessmentAnswer};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Retraction, Source};
-use gaitwright_store::presentations;
 use std::cmp::Reverse;
 
 /// An answer.
@@ -76,11 +75,11 @@ pub(crate) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Op
 /// `trial 3 is unsafe`.
 pub(crate) fn assessment_in_words(assessment: &Assessment, snapshot: &StudySnapshot) -> Option<String> {
     let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
-    let (first, second) = (name(assessment.first)?, name(assessment.second)?);
+    let (a, b) = (name(assessment.trial_a)?, name(assessment.trial_b)?);
     Some(match assessment.answer {
-        presentations::Judgement::UnsafeFirst => format!("{first} is unsafe (compared with {second})"),
-        presentations::Judgement::UnsafeSecond => format!("{second} is unsafe (compared with {first})"),
-        presentations::Judgement::UnsafeBoth => format!("{first} and {second} are unsafe"),
-        _ => format!("cannot tell whether {first} or {second} is better"),
+        AssessmentAnswer::UnsafeA => format!("{a} is unsafe (compared with {b})"),
+        AssessmentAnswer::UnsafeB => format!("{b} is unsafe (compared with {a})"),
+        AssessmentAnswer::UnsafeBoth => format!("{a} and {b} are unsafe"),
+        AssessmentAnswer::CannotTell => format!("cannot tell whether {a} or {b} is better"),
     })
 }

@@ -84,7 +84,7 @@ mod tests {
             one: drawn.pair.0,
             other: drawn.pair.1,
             repeats: drawn.repeats,
-            unblinded: false,
+            could_have_known: false,
             created_at: now(),
             answer: Some(Judgement::First),
             answered_at: Some(now()),

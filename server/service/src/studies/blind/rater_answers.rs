@@ -116,7 +116,7 @@ pub async fn next<'a>(
         kind: drawn.kind,
         pair: drawn.pair,
         repeats: drawn.repeats,
-        unblinded: could_have_known(&mut writer, caller, study).await?,
+        could_have_known: could_have_known(&mut writer, caller, study).await?,
     };
     let id = presentations::insert(&mut writer, &new).await?;
     allocations::of_pair(&mut writer, id, drawn.again, Lot::draw()?).await?;
@@ -155,7 +155,7 @@ async fn cancel(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
         response_ms: None,
         note: "",
         feedback: None,
-        could_have_known: open.unblinded,
+        could_have_known: open.could_have_known,
     };
     presentations::answer(writer, open.id, retracted).await?;
     Ok(())
@@ -339,7 +339,7 @@ pub struct UnblindedPair {
     /// Earlier presentation that it repeats.
     pub repeats: Option<PresentationId>,
     /// Whether the rater could have known the allocation.
-    pub unblinded: bool,
+    pub could_have_known: bool,
     /// Time at which the pair was drawn.
     pub created_at: Instant,
     /// Answer in terms of what was shown. Absent if there is none yet.
@@ -361,7 +361,7 @@ impl From<&Sided> for UnblindedPair {
             shown_first,
             shown_second,
             repeats: row.repeats,
-            unblinded: row.unblinded,
+            could_have_known: row.could_have_known,
             created_at: row.created_at,
             answer: sided.answer(),
             answered_at: row.answered_at,

@@ -104,7 +104,7 @@ async fn report_unsafe(
     let walked = session.walked();
     let (gaits, blinded) = match walked {
         Some(pair) => (new.answer.unsafe_of(pair), ""),
-        None => (vec![session.gait_one, session.gait_two], "; blinded, so either gait may be meant"),
+        None => (vec![session.trial_a, session.trial_b], "; blinded, so either gait may be meant"),
     };
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,

@@ -24,9 +24,9 @@ const LONGEST_NOTE: usize = 2000;
 #[serde(deny_unknown_fields)]
 pub struct NewLabSession {
     /// Converged trial with one of the two gaits.
-    pub gait_one: TrialId,
+    pub trial_a: TrialId,
     /// Converged trial with the other gait.
-    pub gait_two: TrialId,
+    pub trial_b: TrialId,
     /// Free text, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -39,10 +39,10 @@ pub struct NewLabSession {
 pub enum Condition {
     /// Without the device.
     Normal,
-    /// With gait one.
-    GaitOne,
-    /// With gait two.
-    GaitTwo,
+    /// With gait A.
+    GaitA,
+    /// With gait B.
+    GaitB,
 }
 
 /// State of a session.
@@ -103,9 +103,9 @@ pub struct LabSessionView {
     /// State of the session.
     pub state: LabSessionState,
     /// The trial with the first of the two gaits. Does not imply the order of the walks.
-    pub gait_one: TrialId,
+    pub trial_a: TrialId,
     /// The trial with the second of the two gaits.
-    pub gait_two: TrialId,
+    pub trial_b: TrialId,
     /// Free text.
     pub notes: String,
     /// The three walks.
@@ -148,8 +148,8 @@ impl From<&LabSession> for LabSessionView {
             study_id: session.study_id,
             number: session.number,
             state: LabSessionState::of(session),
-            gait_one: session.gait_one,
-            gait_two: session.gait_two,
+            trial_a: session.trial_a,
+            trial_b: session.trial_b,
             notes: session.notes.clone(),
             walks: (1..=WALKS).map(walk).collect(),
             answer: session.answer().map(|answer| AnswerView::of(session, answer)),
@@ -168,26 +168,26 @@ fn condition(session: &LabSession, walk: u8) -> Option<Condition> {
     if walk == 1 {
         return Some(Condition::Normal);
     }
-    let one_first = session.allocation.gait_one_first?;
-    Some(if one_first == (walk == 2) { Condition::GaitOne } else { Condition::GaitTwo })
+    let one_first = session.allocation.gait_a_first?;
+    Some(if one_first == (walk == 2) { Condition::GaitA } else { Condition::GaitB })
 }
 
 /// The gait of a walk; `None` without the device, and while the session is blinded.
 pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
     match condition(session, walk)? {
         Condition::Normal => None,
-        Condition::GaitOne => Some(session.gait_one),
-        Condition::GaitTwo => Some(session.gait_two),
+        Condition::GaitA => Some(session.trial_a),
+        Condition::GaitB => Some(session.trial_b),
     }
 }
 
 /// Which of a session's two gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GaitOfWalk {
-    /// Gait one.
-    One,
-    /// Gait two.
-    Two,
+    /// Gait A.
+    A,
+    /// Gait B.
+    B,
 }
 
 /// Releases the controller file of a walk and records who fetched it, because the file reveals the gait. Only the
@@ -208,7 +208,7 @@ pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, 
     let is_one = allocations::for_device(writer, id, walk, (&caller.actor, to_device)).await?;
     let detail = json!({ "walk": walk, "to_device": to_device });
     audit::append(writer, &caller.actor, "lab_session.controller_file", &format!("lab session {id}"), &detail).await?;
-    Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::One } else { GaitOfWalk::Two })
+    Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::A } else { GaitOfWalk::B })
 }
 
 /// Checks that a number is that of a walk with the device.
@@ -253,7 +253,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
     Ok(kept.into_iter().map(|(listed, _)| listed).collect())
 }
 
-/// The two gaits of a session for the next walk, gait one first.
+/// The two gaits of a session for the next walk, gait A first.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a walk without the device or an unknown walk, [`Error::Conflict`] if the session is closed or
@@ -273,8 +273,8 @@ pub async fn gaits_to_walk_with(
 /// Both gaits of a session. The error does not say which one is not walkable: to a user who knows which walk is next,
 /// that would reveal the allocation.
 async fn both_walkable(db: &mut Connection, session: &LabSession) -> Result<(WalkableGait, WalkableGait), Error> {
-    let one = walkable::admit(db, session.gait_one).await?;
-    let two = walkable::admit(db, session.gait_two).await?;
+    let one = walkable::admit(db, session.trial_a).await?;
+    let two = walkable::admit(db, session.trial_b).await?;
     one.and_then(|one| Ok((one, two?))).map_err(|reason| match reason {
         NotWalkable::Withdrawn => reason.into(),
         _ => Error::conflict(
@@ -303,18 +303,18 @@ pub async fn plan(
 ) -> Result<LabSession, Error> {
     studies::get(writer, study).await?;
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
-    walkable::admit_pair(writer, study, ("gait_one", "gait_two"), (new.gait_one, new.gait_two)).await?;
+    walkable::admit_pair(writer, study, ("trial_a", "trial_b"), (new.trial_a, new.trial_b)).await?;
     let before = lab_sessions::of_study(writer, study).await?.len();
     let row = lab_sessions::NewLabSession {
         study_id: study,
         number: u32::try_from(before).unwrap_or(u32::MAX).saturating_add(1),
-        gait_one: new.gait_one,
-        gait_two: new.gait_two,
+        trial_a: new.trial_a,
+        trial_b: new.trial_b,
         notes: &new.notes,
     };
     let id = lab_sessions::insert(writer, actor, &row).await?;
     allocations::of_session(writer, id, row.number, Lot::draw()?).await?;
-    let detail = json!({ "study": study, "number": row.number, "gait_one": row.gait_one, "gait_two": row.gait_two });
+    let detail = json!({ "study": study, "number": row.number, "trial_a": row.trial_a, "trial_b": row.trial_b });
     audit::append(writer, actor, "lab_session.plan", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)
 }
