@@ -25,8 +25,10 @@ pub(crate) fn preview(preview: &ReferencePreview) -> Vec<Chart> {
         let mut chart =
             Chart::new(trace.joint, "time, s", "angle, °").with("recorded", 0, Stroke::Solid, trace.points.clone());
         if !preview.strikes_s.is_empty() {
-            let highest = trace.points.iter().map(|(_, angle)| *angle).fold(f64::NEG_INFINITY, f64::max);
-            let marks = preview.strikes_s.iter().map(|time| (*time, highest)).collect();
+            // Above the curve, which would hide them.
+            let angles = || trace.points.iter().map(|(_, angle)| *angle);
+            let (low, high) = (angles().fold(f64::INFINITY, f64::min), angles().fold(f64::NEG_INFINITY, f64::max));
+            let marks = preview.strikes_s.iter().map(|time| (*time, high + 0.1 * (high - low))).collect();
             chart = chart.with("right heel strike", 1, Stroke::Points, marks);
         }
         chart.spans.clone_from(&spans);
