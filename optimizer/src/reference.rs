@@ -11,7 +11,7 @@ pub use crate::opensim::AngleUnit;
 pub use heel_strikes::HeelStrikes;
 pub(crate) use heel_strikes::{contacts, given};
 pub use matching::{distance, nearest};
-pub use mean_stride::STRIDE_RANGE_S;
+pub use mean_stride::{RecordedStride, STRIDE_RANGE_S};
 pub use motion_recording::{MotionRecording, VerticalForce};
 pub(crate) use reference_gait::LARGEST_ANGLE_RAD;
 pub use reference_gait::{DEVIATION_COLUMNS, REFERENCE_COLUMNS, REFERENCE_ROWS, ReferenceGait, Walker};

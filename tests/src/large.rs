@@ -38,10 +38,10 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
         .unwrap();
     sqlx::query(
         "with recursive n(i) as (select ?3 + 1 union all select i + 1 from n where i < ?1)
-         insert into trials (id, study_id, number, action_index, action, reason, best_before, state, status,
+         insert into trials (id, study_id, number, action_index, action, reason, best_before, warm_started_from, state, status,
              gait_rmse_rad, cost_of_transport, objective, max_violation, iterations, seconds_total, report, violations,
              created_at, started_at, finished_at)
-         select printf('01890000-0000-7000-8%s-%012d', substr(study_id, 34, 3), i), study_id, i, i % 11664, action, reason, id, state, status,
+         select printf('01890000-0000-7000-8%s-%012d', substr(study_id, 34, 3), i), study_id, i, i % 11664, action, reason, id, id, state, status,
              gait_rmse_rad + i / 1e6, cost_of_transport, objective, max_violation, iterations, seconds_total, report,
              violations, created_at, started_at, finished_at
          from n join trials on study_id = ?2 and number = 1",

@@ -74,7 +74,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
 }
 
 /// The pages, as in the router. A page that is not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 76] = [
+const PAGES: [(&str, Option<Right>); 78] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -108,11 +108,13 @@ const PAGES: [(&str, Option<Right>); 76] = [
     ("get /trials/{id}/running", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),
     ("post /trials/{id}/explain", Some(Right::Run)),
+    ("post /trials/{id}/relaxed-trial", Some(Right::Run)),
     ("post /trials/{id}/simulate", Some(Right::Run)),
     ("post /trials/{id}/safety-review", Some(Right::Answer)),
     ("get /reference-gaits", Some(Right::Read)),
     ("post /reference-gaits", Some(Right::Run)),
     ("get /reference-gaits/{id}", Some(Right::Read)),
+    ("post /units", Some(Right::Read)),
     ("get /rate", Some(Right::Rate)),
     ("post /rate/{id}", Some(Right::Rate)),
     ("get /rate/pair/{token}", Some(Right::Rate)),

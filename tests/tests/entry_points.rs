@@ -113,6 +113,7 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
             "/explain",
             "/explanation",
             "/execution-report",
+            "/relaxed-trial",
             "/simulate",
             "/cancel",
             "/retry",

@@ -246,6 +246,66 @@ async fn refused_explanation_states_its_reason_and_is_not_retried() {
     service.stop().await;
 }
 
+/// Presses the button that tries the first relaxation of a trial in its study.
+async fn try_relaxation(service: &Service, trial: TrialId, place: usize) -> Answer {
+    let (path, form) = (format!("/trials/{trial}/relaxed-trial"), format!("relaxation={place}"));
+    service.post_text(&path, "application/x-www-form-urlencoded", &form).await
+}
+
+#[tokio::test]
+async fn relaxation_within_the_search_space_is_tried_in_the_same_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let service =
+        Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), Clearance::default()).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (2, Some(with_few_gaits().into()))).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = without_gait(&service, study).await.remove(0);
+    explained(&service, trial.id).await;
+    let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    assert!(page.contains("Try a5 = 0.02 m in this study"), "{page}");
+    assert!(page.contains("The study gets one more trial for it."), "{page}");
+    assert_eq!(try_relaxation(&service, trial.id, 1).await.status, StatusCode::UNPROCESSABLE_ENTITY);
+
+    // Two people press the button at the same time.
+    let (one, other) = tokio::join!(try_relaxation(&service, trial.id, 0), try_relaxation(&service, trial.id, 0));
+    let (made, refused) = if one.status == StatusCode::SEE_OTHER { (one, other) } else { (other, one) };
+    assert_eq!((made.status, refused.status), (StatusCode::SEE_OTHER, StatusCode::CONFLICT), "{}", refused.text);
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    assert_eq!((trials.len(), service.get(study).await.plan.trial_budget), (3, 3));
+    let relaxed = &trials[2];
+    assert_eq!(made.headers["location"].to_str().unwrap(), format!("/trials/{}", relaxed.id));
+    let expected = TunedBounds { a5: 0.02, ..trial.action };
+    assert_eq!((relaxed.action, relaxed.state), (expected, TrialState::Converged));
+    assert_eq!(relaxed.reason, format!("requested by a person: trial {} with a5 relaxed", trial.number));
+    let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
+    let rows: Vec<_> = trail.iter().filter(|row| row.action == "trial.relax").collect();
+    assert_eq!(rows.iter().map(|row| row.object.clone()).collect::<Vec<_>>(), [format!("trial {}", relaxed.id)]);
+
+    let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    assert!(page.contains(">trial 3</a> has these bounds already") && !page.contains("/relaxed-trial"), "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn relaxation_outside_the_search_space_is_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let service =
+        Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), Clearance::default()).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (1, Some(without_gaits().into()))).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await.remove(0).id;
+    explained(&service, trial).await;
+    let page = service.fetch(&format!("/trials/{trial}")).await.text;
+    let reason = "The loosest a5 of this study is 0.032, which is not loose enough.";
+    assert!(page.contains(reason) && page.contains("New study with a5 = 0.03 m"), "{page}");
+    assert!(!page.contains("/relaxed-trial"), "{page}");
+    let refused = try_relaxation(&service, trial, 0).await;
+    assert!(refused.status == StatusCode::CONFLICT && refused.text.contains(reason), "{}", refused.text);
+    assert_eq!(service.trials(study).await.len(), 1);
+    service.stop().await;
+}
+
 /// The service and the command line give the same explanation, in the same words.
 #[tokio::test]
 async fn service_and_command_line_give_the_same_explanation() {

@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::{Method, StatusCode};
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode};
 use gaitwright_service::access::Role;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
@@ -536,8 +537,11 @@ async fn script_trial_without_a_gait_offers_no_gait() {
             assert!(!shown.contains(offered), "{page}: {offered}");
         }
         // Every offered link exists.
-        let links =
-            shown.split("href=\"").skip(1).map(|rest| rest.split(['"', '#']).next().unwrap().replace("&#38;", "&"));
+        let links = shown
+            .split("href=\"")
+            .skip(1)
+            .map(|rest| rest.replace("&#38;", "&").replace("&amp;", "&"))
+            .map(|rest| rest.split(['"', '#']).next().unwrap().to_owned());
         let is_text = |link: &String| ![".png", "/archive"].iter().any(|other| link.contains(other));
         let links: Vec<String> = links.filter(|link| link.starts_with('/') && is_text(link)).collect();
         assert!(links.len() > 5, "{page}: {links:?}");
@@ -716,6 +720,32 @@ async fn running_study_cannot_be_archived() {
     let refused = service.post_text(&format!("/studies/{study}/details"), FORM, "act=archive").await;
     is_page(&refused, StatusCode::CONFLICT, "A study that has not ended cannot be archived");
     assert!(service.get(study).await.archived_at.is_none());
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn heights_and_masses_have_the_units_that_the_browser_prefers() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    let chosen = service.post_text("/units", FORM, "units=customary").await;
+    assert_eq!((chosen.status, &chosen.headers["location"]), (StatusCode::SEE_OTHER, &"/subjects".parse().unwrap()));
+    let kept = callers::cookie_of(&chosen, "gaitwright_units");
+    let subject = service.subject().await;
+    for (path, si, customary) in [
+        ("/subjects".to_owned(), "<td class=\"number\">65.7</td>", "<td class=\"number\">145 lb</td>"),
+        (format!("/subjects/{subject}"), "65.7 kg (145 lb)", "145 lb (65.7 kg)"),
+        (format!("/studies/{study}"), "(1.727 m, 65.7 kg)", "(5 ft 8 in, 145 lb)"),
+        ("/studies/new".to_owned(), "paper-1 (1.727 m, 65.7 kg)", "paper-1 (5 ft 8 in, 145 lb)"),
+        ("/reference-gaits".to_owned(), "paper-1 (1.727 m, 65.7 kg)", "paper-1 (5 ft 8 in, 145 lb)"),
+    ] {
+        for (units, shown, other) in [("", si, customary), (kept.as_str(), customary, si)] {
+            let request = Request::builder().uri(&path).header("cookie", format!("gaitwright_units={units}"));
+            let page = service.send(request.body(Body::empty()).unwrap()).await.text;
+            assert!(page.contains(shown) && !page.contains(other), "{path} in {units}: {page}");
+        }
+    }
+    let refused = service.post_text("/units", FORM, "units=furlongs").await;
+    assert!(refused.status.is_client_error() && !refused.headers.contains_key("set-cookie"), "{}", refused.status);
     service.stop().await;
 }
 

@@ -123,6 +123,36 @@ async fn incomplete_archive_is_refused_with_the_place() {
 }
 
 #[tokio::test]
+async fn preview_shows_strikes_and_strides_of_a_recording_and_stores_nothing() {
+    let (_folder, service) = service().await;
+    let before = service.fetch("/api/v1/reference-gaits").await.items();
+    let kind = "application/x-www-form-urlencoded";
+    let previewed = async |name: &str, strikes: &str, recording: &str| {
+        let recording = recording.replace('\n', "%0D%0A").replace(',', "%2C");
+        let form = format!(
+            "act=preview&name={name}&format=csv&strikes=kinematics&heel_strikes_s={strikes}&recording={recording}"
+        );
+        service.post_text("/reference-gaits", kind, &form).await
+    };
+    let found = previewed("S03", "", &recording()).await;
+    assert_eq!(found.status, StatusCode::OK, "{}", found.text);
+    assert!(
+        found.text.contains("The recording can be imported.") && found.text.contains("Mean stride"),
+        "{}",
+        found.text
+    );
+    assert!(found.text.contains("right heel strike") && found.text.contains("<td>used</td>"), "{}", found.text);
+    // The second stride is too short, and the name is missing.
+    let left_out = previewed("", "1,2.1,2.3,3.4", &recording()).await;
+    assert_eq!(left_out.text.matches("<td>used</td>").count(), 2, "{}", left_out.text);
+    assert_eq!(left_out.text.matches("left out: too short, too long, or with a gap").count(), 1);
+    assert!(left_out.text.contains("Not ready for import") && !left_out.text.contains("Mean stride"));
+    let unreadable = previewed("S03", "", "time_s\nx").await;
+    assert_eq!(unreadable.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", unreadable.text);
+    assert_eq!(service.fetch("/api/v1/reference-gaits").await.items(), before);
+}
+
+#[tokio::test]
 async fn import_form_imports_and_keeps_the_input_after_an_error() {
     let (_folder, service) = service().await;
     let kind = "application/x-www-form-urlencoded";

@@ -14,6 +14,7 @@ use gaitwright_tests::large;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::skipped::skipped;
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -283,6 +284,35 @@ async fn study_page_with_7300_answers_stays_small_and_fast() {
     assert!(bytes < 100_000, "{bytes} bytes");
     // Four times the limit of a release build, because test builds are not optimised.
     assert!(fastest < Duration::from_millis(400), "{fastest:?}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn study_page_with_300_trials_weighs_less_than_150_kb() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    service.stop().await;
+    large::fill_to(&database, study, 300).await;
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(page.contains("Trials 1 to 50 of 300."), "{page}");
+    assert_eq!(page.matches("<th scope=\"row\" class=\"number\">").count(), 50);
+    println!("{} bytes", page.len());
+    assert!(page.len() < 150_000, "{} bytes", page.len());
+    // Every trial is on one of the pages that the links lead to.
+    let (mut listed, mut path) = (BTreeSet::new(), format!("/studies/{study}"));
+    loop {
+        let page = service.fetch(&path).await.text;
+        let numbers = page.split("<th scope=\"row\" class=\"number\">").skip(1);
+        listed.extend(numbers.map(|row| row.split(['>', '<']).nth(2).unwrap().parse::<u32>().unwrap()));
+        let next = page.split("<a href=\"").find(|link| link.contains(">Next page<"));
+        let Some(next) = next.and_then(|link| link.split("#trials").next()) else { break };
+        path = format!("/studies/{study}{}", next.replace("&amp;", "&").replace("&#38;", "&"));
+    }
+    assert_eq!(listed, (1..=300).collect());
     service.stop().await;
 }
 

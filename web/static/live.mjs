@@ -198,9 +198,10 @@ if (live) {
       // The browser reconnects by itself, except after an error status.
       if (source.readyState === EventSource.CLOSED) setTimeout(listen, AGAIN);
       if (!connection.hidden) return;
-      // In UTC, like every other time on these pages.
-      const since = new Date().toISOString().slice(11, 16);
-      connection.textContent = `No connection to the service since ${since} UTC. Retrying.`;
+      const since = document.createElement("time");
+      since.dateTime = new Date().toISOString();
+      connection.replaceChildren("No connection to the service since ", since, ". Retrying.");
+      showLocalTimes(connection);
       connection.hidden = false;
       live.classList.add("stale");
     });

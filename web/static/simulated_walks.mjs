@@ -1,6 +1,8 @@
 // @ts-check
 // Follows the simulation of walks with a gait, and shows the result. Without this script a reload shows it.
 
+import { showLocalTimes } from "./local_times.mjs";
+
 const section = document.getElementById("simulated-walks");
 const EVERY_MS = 1000;
 
@@ -9,6 +11,7 @@ const reload = async () => {
   const answer = await fetch(location.pathname).catch(() => null);
   if (!answer?.ok) return false;
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html").getElementById("simulated-walks");
+  if (fresh) showLocalTimes(fresh);
   if (fresh) section?.replaceChildren(...fresh.childNodes);
   return true;
 };

@@ -47,7 +47,28 @@ fn in_words(times: &[f64]) -> String {
     }
 }
 
+/// A stride of a recording, between two right heel strikes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RecordedStride {
+    /// Right heel strike at its start, s.
+    pub start_s: f64,
+    /// Right heel strike at its end, s.
+    pub end_s: f64,
+    /// Whether it is averaged: it lasts as long as strides do, and has no gaps.
+    pub is_used: bool,
+}
+
 impl MotionRecording {
+    /// The strides between heel strikes.
+    pub fn strides(&self, strikes: &[f64]) -> Vec<RecordedStride> {
+        let stride = |pair: &[f64]| {
+            let (start_s, end_s) = (pair[0], pair[1]);
+            let lasts = (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end_s - start_s));
+            RecordedStride { start_s, end_s, is_used: lasts && self.is_whole(start_s, end_s) }
+        };
+        strikes.windows(2).map(stride).collect()
+    }
+
     /// The angles at a time, interpolated linearly.
     fn at(&self, time: f64) -> [f64; 5] {
         let after = self.time_s.partition_point(|&t| t < time).clamp(1, self.time_s.len() - 1);
@@ -71,12 +92,8 @@ impl MotionRecording {
     pub fn reference(&self, name: &str, how: &HeelStrikes, walker: Walker) -> Result<ReferenceGait, ModelError> {
         walker.validate()?;
         let strikes = self.heel_strikes(how)?;
-        let strides: Vec<(f64, f64)> = strikes
-            .windows(2)
-            .map(|pair| (pair[0], pair[1]))
-            .filter(|(start, end)| (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start)))
-            .filter(|(start, end)| self.is_whole(*start, *end))
-            .collect();
+        let strides = self.strides(&strikes).into_iter().filter(|stride| stride.is_used);
+        let strides: Vec<(f64, f64)> = strides.map(|stride| (stride.start_s, stride.end_s)).collect();
         let kept = format!("{} to {} s, without gaps above {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
             let (shortest, longest) = STRIDE_RANGE_S;

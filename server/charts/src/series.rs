@@ -121,9 +121,13 @@ impl Series {
                 if Stroke::APART.contains(&self.stroke) {
                     places = simplified(&places);
                 }
-                for (place, (x, y)) in places.into_iter().enumerate() {
+                let last = places.len().saturating_sub(1);
+                for (place, (x, y)) in places.iter().enumerate() {
+                    // A step to the same height continues the line.
+                    let continues = place > 0 && place < last && *y == places[place - 1].1 && *y == places[place + 1].1;
                     match (place, steps) {
                         (0, _) => write!(svg, "M{x:.1} {y:.1}")?,
+                        (_, true) if continues => {}
                         (_, true) => write!(svg, "H{x:.1}V{y:.1}")?,
                         (_, false) => write!(svg, "L{x:.1} {y:.1}")?,
                     }

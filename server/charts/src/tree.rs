@@ -83,6 +83,8 @@ impl Tree {
 
     fn draw(&self, svg: &mut String, links: bool) -> std::fmt::Result {
         let places = places(&self.nodes);
+        // One path for all branches, because a study can have hundreds of them.
+        svg.push_str("<path class=\"branch\" d=\"");
         for (node, (x, y)) in self.nodes.iter().zip(&places) {
             let Some(parent) = node.parent else { continue };
             if let (Some((from_x, from_y)), Some(grown)) = (places.get(parent), self.nodes.get(parent)) {
@@ -90,9 +92,10 @@ impl Tree {
                 let name = LABEL + CHARACTER * grown.label.chars().count() as f64;
                 let start = (from_x + name).min(x - LABEL);
                 let bend = f64::midpoint(start, *x);
-                write!(svg, "<path class=\"branch\" d=\"M{start} {from_y}H{bend}V{y}H{x}\"/>")?;
+                write!(svg, "M{start:.1} {from_y}H{bend:.1}V{y}H{x}")?;
             }
         }
+        svg.push_str("\"/>");
         for (node, place) in self.nodes.iter().zip(&places) {
             if links {
                 write!(svg, "<a href=\"{}\">", escape(&node.link))?;

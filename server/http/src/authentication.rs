@@ -140,7 +140,8 @@ pub(super) fn browser_of(headers: &HeaderMap) -> Option<&str> {
     cookie_in(headers, BROWSER)
 }
 
-fn cookie_in<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
+/// The value of a cookie.
+pub(super) fn cookie_in<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
     let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
     let mut pairs = cookies.flat_map(|text| text.split(';')).filter_map(|pair| pair.trim().split_once('='));
     pairs.find_map(|(name, value)| (name == wanted && !value.is_empty()).then_some(value))

@@ -87,6 +87,11 @@ pub(crate) fn words(name: &str) -> String {
     name.replace('_', " ")
 }
 
+/// A name as part of the name of a file, in which only letters, digits, dots, hyphens and underscores are safe everywhere.
+pub(crate) fn file_name(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || matches!(c, '.' | '_') { c } else { '-' }).collect()
+}
+
 /// With or without muscles.
 pub(crate) fn variant(muscles: bool) -> &'static str {
     if muscles { "with muscles" } else { "without muscles" }

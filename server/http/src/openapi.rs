@@ -23,7 +23,8 @@ use utoipa_axum::router::OpenApiRouter;
                        Hybrid Zero Dynamics*, IEEE Robotics and Automation Letters, 2022.\n\nLengths are in metres, masses \
                        in kilograms and angles in radians, unless a name or a description says otherwise. Times are in UTC \
                        (RFC 3339). Whole numbers are written without a fraction: 10, not 10.0.\n\nLists are paginated: \
-                       `items` has the entries, and `next` is the `cursor` of the next page.",
+                       `items` has the entries, and `next` is the `cursor` of the next page.\n\nWith \
+                       `download=NAME.json` in the query of a GET request, a browser saves the response under this name.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/")),

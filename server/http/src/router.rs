@@ -2,7 +2,7 @@
 
 use super::{
     AppState, access_log, api, authentication, client_address, host_header, metrics, openapi, page_error, pages,
-    responses, same_origin, static_files,
+    responses, same_origin, saved_as, static_files,
 };
 use crate::problem_details::Refusal;
 use axum::Router;
@@ -44,6 +44,7 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
     };
     routes
+        .layer(middleware::from_fn(saved_as::name))
         .layer(middleware::from_fn(access_log::say_caller))
         .layer(middleware::from_fn_with_state(state.clone(), authentication::identify))
         .layer(middleware::from_fn_with_state(state.clone(), access_log::note))

@@ -14,6 +14,7 @@ use gaitwright_tests::explained::{explanation, without_gaits};
 use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::simulated;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Users and tokens in every state.
@@ -205,12 +206,12 @@ async fn browser_every_page_fits_and_is_accessible() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let pictures = std::env::var_os("GAITWRIGHT_PICTURES").map(PathBuf::from);
-    let mut wrong = Vec::new();
+    let (mut wrong, mut downloads) = (Vec::new(), BTreeSet::new());
     for (name, path) in pages(&site).await {
         let page = browser.open(&site.at(&path)).await;
         for scheme in ["light", "dark"] {
             page.prefer("prefers-color-scheme", scheme).await;
-            for complaint in own_checks(&page).await {
+            for complaint in own_checks(&page).await.into_iter().chain(bare_times(&page, name).await) {
                 wrong.push(format!("{name}, {scheme}: {complaint}"));
             }
             for width in WIDTHS {
@@ -228,6 +229,7 @@ async fn browser_every_page_fits_and_is_accessible() {
             }
             page.resize(1280, 900).await;
         }
+        downloads.extend(links_to_files(&page).await);
         page.be_paper().await;
         page.resize(PAPER, 1000).await;
         let beyond = page.beyond().await;
@@ -238,8 +240,53 @@ async fn browser_every_page_fits_and_is_accessible() {
             page.is_clean(&site.origin).await;
         }
     }
+    for (address, asks) in &downloads {
+        wrong.extend(not_a_file(&site, address, *asks).await);
+    }
+    assert!(downloads.len() > 20, "{downloads:?}");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     browser.close().await;
+}
+
+/// Guides, which may speak of times of day and of UTC.
+const PROSE: [&str; 3] = ["help", "guide", "glossary"];
+
+/// Times that are not in the time zone of the reader, or do not say so.
+async fn bare_times(page: &Tab, name: &str) -> Vec<String> {
+    if PROSE.contains(&name) {
+        return Vec::new();
+    }
+    let bare = r"JSON.stringify((() => {
+        const time = /\d{4}-\d\d-\d\d[T ]\d\d:\d\d|\bUTC\b/;
+        const found = [];
+        const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+        for (let node = words.nextNode(); node; node = words.nextNode()) {
+            if (time.test(node.textContent) && !node.parentElement.closest('time[datetime][title], script')) found.push(node.textContent.trim());
+        }
+        for (const element of document.querySelectorAll('[aria-label], [title]:not(time)')) {
+            for (const text of [element.ariaLabel, element.title]) if (time.test(text)) found.push(text);
+        }
+        return found.map(text => `the time is not local: ${text}`);
+    })())";
+    serde_json::from_str(&page.value(bare).await).unwrap()
+}
+
+/// Links of a page to files of the REST interface other than figures: the address, and whether the link asks the browser to
+/// save it.
+async fn links_to_files(page: &Tab) -> Vec<(String, bool)> {
+    let links = "JSON.stringify([...document.querySelectorAll('a[href^=\"/api/v1/\"]')].map(a => \
+        [a.getAttribute('href'), a.hasAttribute('download')]).filter(([address]) => !address.includes('/figures/')))";
+    serde_json::from_str(&page.value(links).await).unwrap()
+}
+
+/// What is wrong with a file: no header by which a browser saves it under a name that says what it is.
+async fn not_a_file(site: &Site, address: &str, asks: bool) -> Option<String> {
+    let file = site.service.fetch(address).await;
+    let header = file.headers.get("content-disposition").map_or("", |value| value.to_str().unwrap());
+    let name = header.strip_prefix("attachment; filename").unwrap_or_default().trim_matches(['=', '"']);
+    let is_named = name.len() > 8 && name.contains('.') && (!address.contains("download=") || address.ends_with(name));
+    let is_right = file.status == StatusCode::OK && asks && is_named;
+    (!is_right).then(|| format!("{address}: {}, {header:?}, download attribute: {asks}", file.status))
 }
 
 /// Text of maps and of strides that is smaller than 9 points of the screen: drawings are scaled with their place.

@@ -15,3 +15,4 @@ mod rater;
 mod sign_in;
 mod site;
 mod study;
+mod walks;

@@ -51,7 +51,8 @@ pub(super) fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
         of_legs(cycle, over("Torso lean", &[(Leg::Right, 0)]), torso, torso),
     ];
     let hint = format!(
-        "Flexion, dorsiflexion and forward lean are positive. {} The joints of the prosthesis have no reference.",
+        "Flexion, dorsiflexion and forward lean are positive. Reference gait: {}. {} The joints of the prosthesis have none.",
+        reference.name,
         band_in_words(reference)
     );
     Group::new("angles", "Joint angles", hint, charts)

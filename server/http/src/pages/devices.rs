@@ -65,6 +65,10 @@ impl DevicePage {
         Self { device, rows, name, carried_limb, may_run, refused: None }
     }
 
+    fn file_name(&self) -> String {
+        format::file_name(&self.device.name)
+    }
+
     /// The entries of a refused form.
     fn refusing(mut self, typed: &Typed, refused: FieldError) -> Self {
         for row in &mut self.rows {

@@ -1,19 +1,25 @@
-//! The explanation of a trial without a gait, on its page, the button that requests it, and the buttons that create a study
-//! with relaxed bounds.
+//! The explanation of a trial without a gait, on its page, the button that requests it, and the buttons that make a trial or
+//! a study with relaxed bounds.
 
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::extractors::Form;
 use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::Violation;
-use gait_optimizer::explanation::{Explanation, quantity, status_in_words};
+use gait_optimizer::explanation::{Explanation, quantity, status_in_words, unit_after_number};
 use gaitwright_service::access::Run;
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, Effort, Elapsed, ExplanationState};
+use gaitwright_service::studies::relaxed_trial::{self, NotPossible, Relaxation, RelaxedTrial};
+use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
-use gaitwright_store::{TrialId, commit};
+use gaitwright_store::{Connection, TrialId, commit};
+use serde::Deserialize;
+use std::sync::Arc;
 
 /// Why a trial has no gait.
 pub(super) struct NoGait {
@@ -23,15 +29,23 @@ pub(super) struct NoGait {
     pub(super) state: ExplanationState,
     /// How long the explanation has been running.
     pub(super) elapsed: Option<Elapsed>,
+    /// The relaxations that give a gait.
+    pub(super) ways: Vec<WayOut>,
     /// The last event of the study so far; the page loads the explanation when a later one announces it.
     pub(super) last_event: i64,
 }
 
 impl NoGait {
     /// `None` if the trial has a gait or was not solved by the service.
-    pub(super) fn new(trial: &Trial, state: ExplanationState, effort: &Effort, last_event: i64) -> Option<Self> {
+    pub(super) fn new(
+        trial: &Trial,
+        state: ExplanationState,
+        ways: Vec<WayOut>,
+        effort: &Effort,
+        last_event: i64,
+    ) -> Option<Self> {
         let elapsed = if let Effort::Running(elapsed) = effort { Some(*elapsed) } else { None };
-        Some(Self { outcome: trial.status.and_then(status_in_words)?, state, elapsed, last_event })
+        Some(Self { outcome: trial.status.and_then(status_in_words)?, state, elapsed, ways, last_event })
     }
 
     /// The progress of a running explanation, as a sentence.
@@ -43,16 +57,6 @@ impl NoGait {
             Some(usual) => format!("Earlier explanations took about {}; this one is taking longer.", time(usual)),
         };
         format!("Running for {}. {usual}", time(elapsed.seconds))
-    }
-
-    /// The relaxations that give a gait.
-    pub(super) fn ways_out(explanation: &Explanation) -> Vec<WayOut> {
-        let alone = explanation.relaxations.iter().filter_map(|one| Some(vec![(one.bound.as_str(), one.to?)]));
-        let together = explanation
-            .together
-            .iter()
-            .filter_map(|joint| joint.bounds.iter().map(|one| Some((one.bound.as_str(), one.to?))).collect());
-        alone.chain(together).map(|bounds: Vec<_>| WayOut::of(&bounds)).collect()
     }
 
     pub(super) fn is_coming(&self) -> bool {
@@ -74,17 +78,90 @@ pub(super) struct WayOut {
     pub(super) label: String,
     /// The bounds and their values as a parameter of the form for a new study: `a5=0.03,a7=20`.
     pub(super) relax: String,
+    /// The trial that the study can try.
+    pub(super) attempt: Result<Attempt, NotPossible>,
+}
+
+/// A trial that tries a relaxation in the same study.
+pub(super) struct Attempt {
+    /// The bounds with their values in the search space: `a7 = 35 °`.
+    pub(super) bounds: String,
+    /// Whether these values are looser than those of the relaxation.
+    pub(super) is_looser: bool,
+    /// Whether the study gets one more trial for it.
+    pub(super) extends: bool,
 }
 
 impl WayOut {
-    fn of(bounds: &[(&str, f64)]) -> Self {
-        let label = |(bound, value): &(&str, f64)| quantity(bound, format::meaning(bound), *value);
-        let relax = |(bound, value): &(&str, f64)| format!("{bound}={value}");
+    /// The relaxations of an explanation.
+    pub(super) async fn all(
+        db: &mut Connection,
+        study: &Study,
+        trial: &Trial,
+        explanation: &Explanation,
+    ) -> Result<Vec<Self>, Error> {
+        let mut ways = Vec::new();
+        for relaxation in relaxed_trial::relaxations(explanation) {
+            let possible = relaxed_trial::possible(db, study, trial, &relaxation).await?;
+            ways.push(Self::of(&relaxation, possible));
+        }
+        Ok(ways)
+    }
+
+    fn of(relaxation: &Relaxation, possible: Result<RelaxedTrial, NotPossible>) -> Self {
+        let label =
+            |(bound, value): &(String, f64)| quantity(bound, format::meaning(bound), *value);
+        let relax = |(bound, value): &(String, f64)| format!("{bound}={value}");
+        let attempt = |trial: RelaxedTrial| Attempt {
+            bounds: trial
+                .bounds
+                .iter()
+                .map(|(bound, value)| with_unit(bound, *value))
+                .collect::<Vec<_>>()
+                .join(" and "),
+            is_looser: trial.bounds != *relaxation,
+            extends: trial.extends,
+        };
         Self {
-            label: bounds.iter().map(label).collect::<Vec<_>>().join(" and "),
-            relax: bounds.iter().map(relax).collect::<Vec<_>>().join(","),
+            label: relaxation.iter().map(label).collect::<Vec<_>>().join(" and "),
+            relax: relaxation.iter().map(relax).collect::<Vec<_>>().join(","),
+            attempt: possible.map(attempt),
         }
     }
+}
+
+/// `a7 = 35°`.
+fn with_unit(bound: &str, value: f64) -> String {
+    format!("{bound} = {value}{}", unit_after_number(format::meaning(bound)))
+}
+
+/// The place of the relaxation in the explanation.
+#[derive(Debug, Deserialize)]
+pub(super) struct Chosen {
+    relaxation: usize,
+}
+
+/// How often a trial is chosen again because the study has changed in the meantime.
+const TRIES: usize = 20;
+
+/// `POST /trials/{id}/relaxed-trial`.
+pub(super) async fn try_relaxed(
+    authorized: Authorized<Run>,
+    State(mut app): State<AppState>,
+    Id(id, _): Id<TrialId, Run>,
+    Form(form): Form<Chosen>,
+) -> Result<Redirect, PageError> {
+    for _ in 0..TRIES {
+        let beliefs = Arc::clone(&app.beliefs);
+        let chosen = relaxed_trial::choose(app.store_mut(), id, form.relaxation, &beliefs).await?;
+        let mut writer = app.write().await?;
+        if let Some(trial) = relaxed_trial::queue(&mut writer, &authorized.caller.actor, &chosen).await? {
+            commit(writer).await?;
+            app.scheduler.changed();
+            return Ok(Redirect::to(&format!("/trials/{trial}")));
+        }
+    }
+    Err(Error::conflict("The study is changing too fast. Try again.").into())
 }
 
 /// `POST /trials/{id}/explain`.
@@ -118,8 +195,9 @@ mod tests {
 
     #[test]
     fn way_out_names_each_bound_with_its_unit() {
-        let way = WayOut::of(&[("a5", 0.03), ("a7", 20.0)]);
-        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20° (hip angle)");
+        let relaxation = vec![("a5".to_owned(), 0.03), ("a7".to_owned(), 20.0)];
+        let way = WayOut::of(&relaxation, Err(NotPossible::NotTuned("a7".to_owned())));
+        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20 ° (hip angle)");
         assert_eq!(way.relax, "a5=0.03,a7=20");
     }
 }

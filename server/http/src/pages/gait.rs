@@ -1,7 +1,7 @@
 //! The page of a trial and its gait.
 
 use super::certificate;
-use super::explanation::NoGait;
+use super::explanation::{NoGait, WayOut};
 use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
 use super::page_chart::{Drawn, shared_legend};
@@ -24,6 +24,7 @@ use gaitwright_service::access::{Answer, Permission, Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
+use gaitwright_service::studies::relaxed_trial::NotPossible;
 use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReports};
 use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
@@ -134,6 +135,10 @@ pub(super) async fn get(
     let last_event = events::last(&mut reader, study.id).await?;
     let effort = app.scheduler.explaining(id);
     let explained = explanation::state(&mut reader, &trial, effort.clone()).await?;
+    let ways = match &explained {
+        ExplanationState::Made(made) => WayOut::all(&mut reader, &study, &trial, &made.explanation).await?,
+        _ => Vec::new(),
+    };
     let may_run = authorized.caller.may(Run::NEEDED);
     let reviews = authorized.caller.may(Answer::NEEDED);
     // Without sign-in the name is unknown.
@@ -161,7 +166,7 @@ pub(super) async fn get(
         violation: format::optional_number(trial.max_violation),
         figures: figures(&trial),
         bounds: drawn.bounds,
-        no_gait: NoGait::new(&trial, explained, &effort, last_event),
+        no_gait: NoGait::new(&trial, explained, ways, &effort, last_event),
         from,
         reference: reference_name,
         has_gait,

@@ -38,6 +38,7 @@ mod study_details;
 mod subject;
 mod system;
 mod undo;
+mod units;
 mod unsent_form;
 mod users;
 mod walking_pair;
@@ -76,6 +77,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/trials/{id}/explain", post(explanation::post))
+        .route("/trials/{id}/relaxed-trial", post(explanation::try_relaxed))
         .route("/trials/{id}/simulate", post(simulated_walks::post))
         .route("/trials/{id}/safety-report", post(safety_review::report))
         .route("/trials/{id}/safety-review", post(safety_review::post))
@@ -96,6 +98,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/lab/{id}/answer", post(lab_walk::answer))
         .route("/lab/{id}/retract", post(lab_walk::retract))
+        .route("/units", post(units::post))
         .route("/users", get(users::get).post(users::post))
         .route("/audit", get(audit::get))
         .route("/access-log", get(access_log::get))

@@ -1,17 +1,21 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::page_chart::Drawn;
+use super::page_chart::{Drawn, shared_legend};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form as Submitted, Params};
 use crate::figures::reference;
 use crate::form_errors;
+use crate::format;
 use crate::page_error::{Page, PageError, page};
+use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::reference::RecordedStride;
+use gaitwright_charts::gait_charts;
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
@@ -36,6 +40,8 @@ pub(super) struct Fields {
     heel_strikes_s: String,
     height_m: String,
     body_mass_kg: String,
+    /// `preview`, or else an import.
+    act: String,
 }
 
 impl Fields {
@@ -72,6 +78,7 @@ fn number(field: &str, text: &str) -> Result<f64, Error> {
 #[derive(Template)]
 #[template(path = "reference_gaits.html")]
 struct ReferenceGaitsPage {
+    units: Units,
     matches: Vec<ReferenceGaitMatch>,
     subjects: Vec<Subject>,
     /// The subject from whom distances are measured.
@@ -79,10 +86,36 @@ struct ReferenceGaitsPage {
     may_run: bool,
     fields: Fields,
     refused: Option<FieldError>,
+    /// The preview of the recording in the form.
+    preview: Option<Preview>,
+}
+
+/// A preview of a recording, as the page shows it.
+struct Preview {
+    charts: Vec<Drawn>,
+    /// The legend of these charts.
+    legend: Vec<(String, String)>,
+    strides: Vec<RecordedStride>,
+    /// The mean stride.
+    mean: Vec<Drawn>,
+    /// Why the recording would be refused.
+    refused: Option<String>,
+}
+
+impl Preview {
+    fn of(new: &NewReferenceGait) -> Result<Self, Error> {
+        let preview = new.preview()?;
+        let mut charts: Vec<Drawn> = reference::preview(&preview).iter().map(Drawn::new).collect();
+        let (mean, refused) = match &preview.reference {
+            Ok(found) => (gait_charts::of_reference(found).iter().map(Drawn::new).collect(), None),
+            Err(error) => (Vec::new(), Some(form_errors::in_words(error))),
+        };
+        Ok(Self { legend: shared_legend(&mut charts), charts, strides: preview.strides, mean, refused })
+    }
 }
 
 impl ReferenceGaitsPage {
-    async fn read(db: &mut Connection, subject: Option<SubjectId>, may_run: bool) -> Result<Self, Error> {
+    async fn read(db: &mut Connection, units: Units, subject: Option<SubjectId>, may_run: bool) -> Result<Self, Error> {
         let nearest_to = match subject {
             Some(id) => Some(subjects::get(db, id).await?),
             None => None,
@@ -94,7 +127,16 @@ impl ReferenceGaitsPage {
             all.map(|reference_gait| ReferenceGaitMatch { reference_gait, distance: None }).collect()
         };
         let subjects = subjects::consenting(db).await?;
-        Ok(Self { matches, subjects, nearest_to, may_run, fields: Fields::default(), refused: None })
+        Ok(Self {
+            units,
+            matches,
+            subjects,
+            nearest_to,
+            may_run,
+            fields: Fields::default(),
+            refused: None,
+            preview: None,
+        })
     }
 
     fn refuses(&self, field: &str) -> bool {
@@ -114,17 +156,39 @@ pub(super) struct To {
 }
 
 /// `GET /reference-gaits`.
-pub(super) async fn list(authorized: Authorized<Read>, State(app): State<AppState>, Params(to): Params<To>) -> Page {
+pub(super) async fn list(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    units: Units,
+    Params(to): Params<To>,
+) -> Page {
     let may_run = authorized.caller.may(Run::NEEDED);
-    page(&ReferenceGaitsPage::read(&mut *app.read().await?, to.subject, may_run).await?)
+    page(&ReferenceGaitsPage::read(&mut *app.read().await?, units, to.subject, may_run).await?)
 }
 
 /// `POST /reference-gaits`.
 pub(super) async fn import(
     authorized: Authorized<Run>,
     State(mut app): State<AppState>,
+    units: Units,
     Submitted(fields): Submitted<Fields>,
 ) -> Result<Response, PageError> {
+    if fields.act == "preview" {
+        let preview = match fields.read() {
+            Ok(new) => app.compute(move |_| Preview::of(&new)).await.map_err(Error::from)?,
+            Err(error) => Err(error),
+        };
+        let (status, preview, refused) = match preview {
+            Ok(preview) => (StatusCode::OK, Some(preview), None),
+            Err(Error::Invalid(refused)) => {
+                (StatusCode::UNPROCESSABLE_ENTITY, None, Some(form_errors::with_label(*refused)))
+            }
+            Err(other) => return Err(other.into()),
+        };
+        let empty = ReferenceGaitsPage::read(&mut *app.read().await?, units, None, true).await?;
+        let form = page(&ReferenceGaitsPage { fields, refused, preview, ..empty })?;
+        return Ok((status, form).into_response());
+    }
     let definition = match fields.read() {
         Ok(new) => new.definition_aside(app.store_mut()).await,
         Err(error) => Err(error),
@@ -132,7 +196,7 @@ pub(super) async fn import(
     let definition = match definition {
         Ok(definition) => definition,
         Err(Error::Invalid(refused)) => {
-            let empty = ReferenceGaitsPage::read(&mut *app.read().await?, None, true).await?;
+            let empty = ReferenceGaitsPage::read(&mut *app.read().await?, units, None, true).await?;
             let form = page(&ReferenceGaitsPage { fields, refused: Some(form_errors::with_label(*refused)), ..empty })?;
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response());
         }
@@ -147,6 +211,7 @@ pub(super) async fn import(
 #[derive(Template)]
 #[template(path = "reference_gait.html")]
 struct ReferenceGaitPage {
+    units: Units,
     reference: ReferenceGait,
     /// Curves that differ from the built-in reference gait.
     warning: Option<String>,
@@ -154,14 +219,22 @@ struct ReferenceGaitPage {
     charts: Vec<Drawn>,
 }
 
+impl ReferenceGaitPage {
+    fn file_name(&self) -> String {
+        format::file_name(&self.reference.name)
+    }
+}
+
 /// `GET /reference-gaits/{id}`.
 pub(super) async fn get(
     _: Authorized<Read>,
     State(app): State<AppState>,
+    units: Units,
     Id(id, _): Id<ReferenceGaitId, Read>,
 ) -> Page {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
+        units,
         warning: reference.definition.warning().map_err(Error::from)?,
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
         charts: reference::of_reference(&reference.definition)

@@ -3,12 +3,13 @@
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
-use crate::body_measures::{self, feet_and_inches, pounds};
+use crate::body_measures;
 use crate::extractors::{Form, Params};
 use crate::form_errors;
 use crate::format::{variant, words};
 use crate::page_error::{Page, PageError, page};
 use crate::problem_details::Problem;
+use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -31,6 +32,7 @@ const PAGE: u32 = 100;
 #[derive(Template)]
 #[template(path = "subjects.html")]
 struct SubjectsPage {
+    units: Units,
     subjects: Vec<Row>,
     /// The last subject of this page, if more follow.
     next: Option<SubjectId>,
@@ -104,6 +106,7 @@ struct Row {
 #[derive(Template)]
 #[template(path = "subject.html")]
 struct SubjectPage {
+    units: Units,
     subject: Subject,
     consents: Vec<Consent>,
     withdrawn: bool,
@@ -126,12 +129,14 @@ struct SubjectPage {
 }
 
 impl SubjectPage {
-    fn feet(&self) -> String {
-        feet_and_inches(self.subject.height_m)
-    }
-
-    fn pounds(&self) -> String {
-        pounds(self.subject.body_mass_kg)
+    /// Height and body mass, with the other units in brackets.
+    fn body(&self) -> String {
+        let other = if self.units == Units::Si { Units::Customary } else { Units::Si };
+        let (height, mass) = (&self.subject.height_m, &self.subject.body_mass_kg);
+        let (units, both) = (self.units, |shown: String, other: String| format!("{shown} ({other})"));
+        let (height, mass) =
+            (both(units.height(height), other.height(height)), both(units.mass(mass), other.mass(mass)));
+        format!("{height} · {mass}")
     }
 }
 
@@ -185,15 +190,17 @@ pub(super) struct Before {
 pub(super) async fn list(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
+    units: Units,
     Params(Before { before }): Params<Before>,
 ) -> Page {
-    show_list(&app, before, authorized.caller.may(Run::NEEDED), Described::default(), Vec::new()).await
+    show_list(&app, units, before, authorized.caller.may(Run::NEEDED), Described::default(), Vec::new()).await
 }
 
 /// `POST /subjects`: adds one, before it has a study.
 pub(super) async fn add(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
+    units: Units,
     Form(fields): Form<Described>,
 ) -> Result<Response, PageError> {
     let added = async {
@@ -214,11 +221,12 @@ pub(super) async fn add(
         // The only possible conflict is a pseudonym that is taken.
         other => vec![FieldError::in_words("pseudonym", &other.to_string())],
     };
-    Ok((status, show_list(&app, None, true, fields, refused).await?).into_response())
+    Ok((status, show_list(&app, units, None, true, fields, refused).await?).into_response())
 }
 
 async fn show_list(
     app: &AppState,
+    units: Units,
     before: Option<SubjectId>,
     may_run: bool,
     fields: Described,
@@ -236,19 +244,27 @@ async fn show_list(
         let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
         rows.push(Row { subject, consent: last.map_or("not on record", |last| last.kind.as_str()), withdrawn });
     }
-    page(&SubjectsPage { subjects: rows, next, may_run, fields, refused })
+    page(&SubjectsPage { units, subjects: rows, next, may_run, fields, refused })
 }
 
 /// `GET /subjects/{id}`.
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
+    units: Units,
     Id(id, _): Id<SubjectId, Read>,
 ) -> Page {
-    show(&app, id, &authorized.caller, None, Typed::Nothing).await
+    show(&app, units, id, &authorized.caller, None, Typed::Nothing).await
 }
 
-async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>, typed: Typed) -> Page {
+async fn show(
+    app: &AppState,
+    units: Units,
+    id: SubjectId,
+    caller: &Caller,
+    refused: Option<String>,
+    typed: Typed,
+) -> Page {
     let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
@@ -271,6 +287,7 @@ async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<St
         Typed::Withdrawal(reason) => withdrawal_reason = reason,
     }
     page(&SubjectPage {
+        units,
         subject,
         consents,
         withdrawn,
@@ -323,11 +340,12 @@ pub(super) struct Signed {
 pub(super) async fn consent(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
+    units: Units,
     DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let done = give(&app, &authorized, id, form).await;
-    answer(&app, id, &authorized.caller, done, Typed::Nothing).await
+    answer(&app, units, id, &authorized.caller, done, Typed::Nothing).await
 }
 
 async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
@@ -344,6 +362,7 @@ async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form:
 pub(super) async fn withdraw(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
+    units: Units,
     DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     Form(form): Form<Withdrawing>,
 ) -> Result<Response, PageError> {
@@ -355,7 +374,7 @@ pub(super) async fn withdraw(
             "Nothing was changed. First tick the box to confirm that all studies of this subject stop.",
         ))
     };
-    answer(&app, id, &authorized.caller, done, Typed::Withdrawal(why.reason)).await
+    answer(&app, units, id, &authorized.caller, done, Typed::Withdrawal(why.reason)).await
 }
 
 /// The form of a withdrawal.
@@ -391,6 +410,7 @@ pub(super) struct Corrected {
 pub(super) async fn correct(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
+    units: Units,
     Id(id, _): Id<SubjectId, Run>,
     Form(form): Form<Corrected>,
 ) -> Result<Response, PageError> {
@@ -401,7 +421,7 @@ pub(super) async fn correct(
         refused: true,
     };
     let done = set_right(&app, &authorized, id, form).await;
-    answer(&app, id, &authorized.caller, done, Typed::Correction(typed)).await
+    answer(&app, units, id, &authorized.caller, done, Typed::Correction(typed)).await
 }
 
 async fn set_right(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
@@ -419,6 +439,7 @@ async fn set_right(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, 
 /// Shows the subject again after a change, with the reason if it was refused.
 async fn answer(
     app: &AppState,
+    units: Units,
     id: SubjectId,
     caller: &Caller,
     done: Result<(), Error>,
@@ -427,7 +448,7 @@ async fn answer(
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, Some(form_errors::in_words(&error)), typed).await?;
+            let shown = show(app, units, id, caller, Some(form_errors::in_words(&error)), typed).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

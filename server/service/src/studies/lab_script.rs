@@ -135,7 +135,7 @@ pub async fn give_out(
         SuggestedTrial::New(snapshot, new) => (snapshot, new),
     };
     let study = snapshot.study.id;
-    if !is_current(writer, snapshot).await? {
+    if !snapshot.is_unchanged(writer).await? {
         return Ok(None);
     }
     let Some(id) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
@@ -264,7 +264,7 @@ pub async fn record(
 ) -> Result<Option<Trial>, Error> {
     let study = checked.snapshot.study.id;
     let present = trials::get(writer, id).await?;
-    if present.state != TrialState::Running || !is_current(writer, &checked.snapshot).await? {
+    if present.state != TrialState::Running || !checked.snapshot.is_unchanged(writer).await? {
         return Ok(None);
     }
     trials::tell(writer, id, &checked.outcome).await?;
@@ -275,13 +275,4 @@ pub async fn record(
         json!({ "study": study, "state": checked.outcome.state, "gait_rmse_rad": checked.outcome.gait_rmse_rad });
     audit::append(writer, &caller.actor, "trial.tell", &format!("trial {id}"), &detail).await?;
     Ok(Some(trials::get(writer, id).await?))
-}
-
-/// Whether the study has received no answer and given out no trial since the snapshot.
-async fn is_current(writer: &mut Writer, snapshot: &StudySnapshot) -> Result<bool, Error> {
-    let study = snapshot.study.id;
-    let total = trials::counts(writer, study).await?.total;
-    Ok(snapshot.is_current(writer).await?
-        && total as usize == snapshot.trials.len()
-        && studies::get(writer, study).await?.revision == snapshot.study.revision)
 }

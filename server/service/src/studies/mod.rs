@@ -38,6 +38,8 @@ pub mod preference;
 mod prefetch;
 pub mod ranking;
 pub mod reference_import;
+pub mod reference_preview;
+pub mod relaxed_trial;
 pub mod retention;
 pub mod safety_report;
 pub mod safety_reports;

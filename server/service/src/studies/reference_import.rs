@@ -17,6 +17,9 @@ const LONGEST_NAME: usize = 200;
 const FORCE_COLUMN: &str = "ground_force_vy";
 /// Column of the vertical force under the right foot in the `fp` tables of Camargo 2021.
 const CAMARGO_FORCE_COLUMN: &str = "Treadmill_R_vy";
+/// Names of the two files of a form or a request.
+pub(super) const RECORDING: &str = "recording";
+pub(super) const FORCES: &str = "forces";
 /// Maximum length of the provenance, which includes the comments of the recording.
 const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 
@@ -112,7 +115,14 @@ impl NewReferenceGait {
     /// # Errors
     /// [`Error::Invalid`] with the field, or line and column, and the reason.
     pub fn definition(&self, what: &str, forces: &str) -> Result<Definition, Error> {
-        let name = printable::name("name", &self.name, LONGEST_NAME)?;
+        self.definition_of(&self.motion(what, forces)?)
+    }
+
+    /// Reads the recording, and its forces.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column.
+    pub(super) fn motion(&self, what: &str, forces: &str) -> Result<MotionRecording, Error> {
         let recording = match self.format {
             JointAngleFormat::Opensim => {
                 let unit = self.unit.map(AngleUnit::from);
@@ -122,7 +132,7 @@ impl NewReferenceGait {
             JointAngleFormat::Camargo => MotionRecording::from_camargo_csv(what, &self.recording)?,
             JointAngleFormat::Csv => MotionRecording::from_csv(what, &self.recording)?,
         };
-        let recording = match &self.forces {
+        Ok(match &self.forces {
             Some(text) => {
                 let column = self.force_column.as_deref();
                 match self.format {
@@ -135,15 +145,24 @@ impl NewReferenceGait {
                 }
             }
             None => recording,
-        };
-        let strikes = match self.strikes {
+        })
+    }
+
+    /// How the heel strikes are found.
+    pub(super) fn heel_strikes(&self) -> HeelStrikes {
+        match self.strikes {
             _ if !self.heel_strikes_s.is_empty() => HeelStrikes::Given(self.heel_strikes_s.clone()),
             Strikes::Force => HeelStrikes::Force,
             Strikes::Kinematics => HeelStrikes::Kinematics,
             Strikes::Ends => HeelStrikes::Ends,
-        };
+        }
+    }
+
+    /// Cuts a recording at heel strikes and averages the strides.
+    pub(super) fn definition_of(&self, recording: &MotionRecording) -> Result<Definition, Error> {
+        let name = printable::name("name", &self.name, LONGEST_NAME)?;
         let walker = Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
-        let definition = recording.reference(name, &strikes, walker)?;
+        let definition = recording.reference(name, &self.heel_strikes(), walker)?;
         if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
             let allowed = format!("a file with at most {LONGEST_PROVENANCE_BYTES} bytes of comments above its columns");
             let given = format!("a file with {} bytes of comments", definition.provenance.len());
@@ -157,7 +176,7 @@ impl NewReferenceGait {
     /// # Errors
     /// As [`Self::definition`].
     pub async fn definition_aside(self, store: &mut Store) -> Result<Definition, Error> {
-        store.compute(move |_| self.definition("recording", "forces")).await?
+        store.compute(move |_| self.definition(RECORDING, FORCES)).await?
     }
 }
 

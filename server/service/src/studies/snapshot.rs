@@ -7,7 +7,7 @@ use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Sourc
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
 use gaitwright_store::studies::{Evaluation, FeedbackMode, Study};
 use gaitwright_store::trials::{NewTrial, Trial, TrialState};
-use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, trials};
+use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, studies, trials};
 use std::collections::{HashMap, HashSet};
 
 /// Everything on which the next decision of a study depends, read at one instant.
@@ -52,13 +52,28 @@ impl StudySnapshot {
             && safety_reviews::version(writer, study).await? == self.safety)
     }
 
-    /// Writes a trial that was chosen from this snapshot: the one way to a new trial. `None` when an answer or a safety report
-    /// came since.
+    /// Whether, besides, the study itself has not changed, and no trial was added.
+    ///
+    /// # Errors
+    /// Errors of the database.
+    pub async fn is_unchanged(&self, writer: &mut Writer) -> StoreResult<bool> {
+        Ok(self.is_current(writer).await?
+            && self.has_every_trial(writer).await?
+            && studies::get(writer, self.study.id).await?.revision == self.study.revision)
+    }
+
+    /// People and the scheduler add trials at the same time.
+    async fn has_every_trial(&self, db: &mut Connection) -> StoreResult<bool> {
+        Ok(trials::counts(db, self.study.id).await?.total as usize == self.trials.len())
+    }
+
+    /// Writes a trial that was chosen from this snapshot: the one way to a new trial. `None` when an answer, a safety report or
+    /// another trial came since.
     ///
     /// # Errors
     /// A violated constraint or trigger, or errors of the database.
     pub async fn write_trial(&self, writer: &mut Writer, new: &NewTrial) -> StoreResult<Option<TrialId>> {
-        if !self.is_current(writer).await? {
+        if !self.is_current(writer).await? || !self.has_every_trial(writer).await? {
             return Ok(None);
         }
         trials::insert(writer, self.study.id, new).await.map(Some)

@@ -151,18 +151,33 @@ pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Exte
         ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, Act::Extend)?,
         other => other,
     };
+    raise_budget(writer, &study, more.trial_budget, state).await?;
+    let detail = json!({ "from": study.plan.trial_budget, "to": more.trial_budget, "state": state });
+    changed(writer, actor, "study.extend", &study, state, &detail).await
+}
+
+/// Sets the trial budget of a study, and the state in which it goes on. The caller writes event and audit trail.
+///
+/// # Errors
+/// [`Error::Invalid`] for too many trials, [`Error::Conflict`] if the study has changed; errors of the database.
+pub(super) async fn raise_budget(
+    writer: &mut Writer,
+    study: &Study,
+    trial_budget: u32,
+    state: StudyState,
+) -> Result<(), Error> {
+    study_plan::check_range("trial_budget", i64::from(trial_budget), 1, 10_000)?;
     let limits = StudyLimits {
         name: study.plan.name.clone(),
         priority: study.plan.priority,
         parallel_trials: study.plan.parallel_trials,
-        trial_budget: more.trial_budget,
+        trial_budget,
     };
-    studies::set_limits(writer, id, &limits).await?;
-    if state != study.state && !studies::set_state(writer, &study, state, "extended").await? {
+    studies::set_limits(writer, study.id, &limits).await?;
+    if state != study.state && !studies::set_state(writer, study, state, "extended").await? {
         return Err(Error::conflict("The study was changed at the same time. Try again."));
     }
-    let detail = json!({ "from": study.plan.trial_budget, "to": more.trial_budget, "state": state });
-    changed(writer, actor, "study.extend", &study, state, &detail).await
+    Ok(())
 }
 
 /// A new study with the set-up of another one. Absent fields are copied.

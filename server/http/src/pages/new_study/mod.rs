@@ -15,6 +15,7 @@ use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::format;
 use crate::page_error::{Page, PageError, page};
+use crate::units::Units;
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
@@ -57,6 +58,7 @@ impl Offered {
 #[derive(Template)]
 #[template(path = "study_new.html")]
 struct NewStudyPage {
+    units: Units,
     offered: Offered,
     learners: &'static [(&'static str, &'static str, &'static str)],
     fields: Fields,
@@ -153,6 +155,7 @@ pub(super) struct Preset {
 pub(super) async fn get(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
+    units: Units,
     Params(preset): Params<Preset>,
 ) -> Page {
     let mut reader = app.read().await?;
@@ -171,11 +174,12 @@ pub(super) async fn get(
         fields.relax(&preset.relax)?;
     }
     drop(reader);
-    show(&app, &authorized, fields, Vec::new(), None).await
+    show(&app, units, &authorized, fields, Vec::new(), None).await
 }
 
 async fn show(
     app: &AppState,
+    units: Units,
     authorized: &Authorized<Run>,
     fields: Fields,
     refused: Vec<FieldError>,
@@ -190,13 +194,14 @@ async fn show(
     };
     drop(reader);
     let editor = SpaceEditor::typed(&fields.space)?;
-    page(&NewStudyPage { offered, learners: &LEARNERS, fields, editor, refused, cloned, reference })
+    page(&NewStudyPage { units, offered, learners: &LEARNERS, fields, editor, refused, cloned, reference })
 }
 
 /// `POST /studies/new`.
 pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
+    units: Units,
     Form(fields): Form<Fields>,
 ) -> Result<Response, PageError> {
     let editor = SpaceEditor::typed(&fields.space)?;
@@ -214,7 +219,7 @@ pub(super) async fn post(
     if refused.is_empty() {
         refused.push(first);
     }
-    let form = show(&app, &authorized, fields, refused, plan).await?;
+    let form = show(&app, units, &authorized, fields, refused, plan).await?;
     Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
 }
 

@@ -21,6 +21,7 @@ use crate::extractors::{Form, Params};
 use crate::figures::{COURSE, Outcome, course, utility, warm_starts};
 use crate::format::{self, Bound};
 use crate::page_error::{Page, PageError, page};
+use crate::units::Units;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -60,11 +61,14 @@ use std::sync::Arc;
 #[derive(Template)]
 #[template(path = "study.html")]
 struct StudyPage {
+    units: Units,
     study: Study,
     subject: Subject,
     device: Device,
     reference: String,
     live: String,
+    /// Number of trials.
+    trials: u32,
     /// Whether a recommended gait walks, or will.
     walks: bool,
     /// The lab sessions, by number.
@@ -220,6 +224,7 @@ const SHOWN: u32 = 200;
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
+    units: Units,
     Id(id, _): Id<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
@@ -238,16 +243,18 @@ pub(super) async fn get(
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
     drop(reader);
     let live = read_live(&mut app, &authorized.caller, id, choice).await?;
-    let walks = live.walker.has_place();
+    let (walks, trials) = (live.walker.has_place(), live.counts.total);
     let live = live.render().map_err(|e| Error::Internal(e.to_string()))?;
     let may_administer = authorized.caller.may(Administer::NEEDED);
     let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
     page(&StudyPage {
+        units,
         study,
         subject,
         device,
         reference,
         live,
+        trials,
         walks,
         sessions: sessions.iter().map(|session| (session.id, session.number)).collect(),
         last_event,

@@ -10,7 +10,7 @@ use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 
 /// Trials per page; the downloads have all of them.
-const PAGE: u32 = 200;
+const PAGE: u32 = 50;
 const DESCENDING: &str = "descending";
 
 /// The query string of the table.

@@ -94,7 +94,7 @@ impl NewEmg {
 }
 
 /// The smallest and the largest sample of each interval, in order of time.
-fn extremes(samples: &[f64]) -> Vec<(usize, f64)> {
+pub(in crate::studies) fn extremes(samples: &[f64]) -> Vec<(usize, f64)> {
     let length = samples.len().div_ceil(INTERVALS).max(1);
     let mut points = Vec::new();
     for (interval, part) in samples.chunks(length).enumerate() {

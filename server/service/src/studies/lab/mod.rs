@@ -14,6 +14,7 @@ mod unblinding;
 mod upload;
 
 pub use answer::{NewAnswer, give as answer, retract};
+pub(super) use emg_preview::extremes;
 pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,

@@ -1,0 +1,110 @@
+//! `?download=NAME` of a GET request of the REST interface: a browser saves the response as a file of this name. For the
+//! access log, the response is then an export.
+
+use super::query_string;
+use crate::problem_details::Refusal;
+use axum::extract::Request;
+use axum::http::{HeaderValue, Method, Uri, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use gaitwright_service::error::Error;
+use std::fmt::Write as _;
+
+const PARAMETER: &str = "download";
+/// Maximum length of a name, characters.
+const LONGEST: usize = 200;
+
+/// Takes the name out of the query, which handlers read strictly, and gives it to a JSON response. Other files name
+/// themselves.
+pub(super) async fn name(mut request: Request, next: Next) -> Result<Response, Refusal> {
+    let reads = matches!(*request.method(), Method::GET | Method::HEAD);
+    if !reads || !request.uri().path().starts_with("/api/v1/") {
+        return Ok(next.run(request).await);
+    }
+    let Some((name, rest)) = taken_from(request.uri())? else { return Ok(next.run(request).await) };
+    *request.uri_mut() = rest;
+    let mut response = next.run(request).await;
+    let is_json = response.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == "application/json");
+    if response.status().is_success() && is_json && !response.headers().contains_key(header::CONTENT_DISPOSITION) {
+        response.headers_mut().insert(header::CONTENT_DISPOSITION, disposition(&name)?);
+    }
+    Ok(response)
+}
+
+/// The name in a query, and the address without it.
+fn taken_from(uri: &Uri) -> Result<Option<(String, Uri)>, Error> {
+    let is_name = |part: &&str| part.split('=').next() == Some(PARAMETER);
+    let (names, others): (Vec<&str>, Vec<&str>) = uri.query().unwrap_or_default().split('&').partition(is_name);
+    let name = match names[..] {
+        [] => return Ok(None),
+        [name] => query_string::pairs(name)?.into_iter().map(|(_, value)| value).next().unwrap_or_default(),
+        _ => return Err(Error::Malformed(query_string::occurs_twice(PARAMETER))),
+    };
+    if !is_allowed(&name) {
+        return Err(Error::Malformed(format!(
+            "The query parameter {PARAMETER} is {name:?}; it must be the name of a .json file: at most {LONGEST} letters, \
+             digits, dots, hyphens and underscores."
+        )));
+    }
+    let path = uri.path();
+    let rest = if others.is_empty() { path.to_owned() } else { format!("{path}?{}", others.join("&")) };
+    Ok(Some((name, rest.parse().map_err(|error| Error::Malformed(format!("The query cannot be read: {error}.")))?)))
+}
+
+/// Whether it names a JSON file, in whatever folder a browser saves it.
+fn is_allowed(name: &str) -> bool {
+    let known = |c: char| c.is_alphanumeric() || matches!(c, '-' | '.' | '_');
+    let stem = name.strip_suffix(".json").unwrap_or_default();
+    stem.starts_with(char::is_alphanumeric) && stem.chars().all(known) && name.chars().count() <= LONGEST
+}
+
+/// A header can hold ASCII only, so other names are percent-encoded (RFC 6266).
+fn disposition(name: &str) -> Result<HeaderValue, Error> {
+    let text = if name.is_ascii() {
+        format!("attachment; filename=\"{name}\"")
+    } else {
+        let mut encoded = String::new();
+        for byte in name.bytes() {
+            if byte.is_ascii_alphanumeric() || b"-._".contains(&byte) {
+                encoded.push(char::from(byte));
+            } else {
+                // Writing to a string cannot fail.
+                let _ = write!(encoded, "%{byte:02X}");
+            }
+        }
+        format!("attachment; filename*=UTF-8''{encoded}")
+    };
+    HeaderValue::from_str(&text).map_err(|error| Error::Internal(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn name_is_taken_out_of_the_query() {
+        let taken = |query: &str| {
+            let uri: Uri = format!("/api/v1/trials/1{query}").parse().unwrap();
+            taken_from(&uri).map(|taken| taken.map(|(name, rest)| (name, rest.to_string())))
+        };
+        let found = |name: &str, rest: &str| Some((name.to_owned(), format!("/api/v1/trials/1{rest}")));
+        assert_eq!(taken("").unwrap(), None);
+        assert_eq!(taken("?limit=2").unwrap(), None);
+        assert_eq!(taken("?download=trial-1.json").unwrap(), found("trial-1.json", ""));
+        assert_eq!(taken("?limit=2&download=a.json&sort=-a1").unwrap(), found("a.json", "?limit=2&sort=-a1"));
+        assert_eq!(taken("?download=F%C3%BC%C3%9Fe.json").unwrap(), found("Füße.json", ""));
+        for refused in
+            ["", "=", "=a", "=.json", "=..json", "=../a.json", "=a%22.json", "=a%0D%0A.json", "=a.json&download=b.json"]
+        {
+            assert!(taken(&format!("?download{refused}")).is_err(), "{refused}");
+        }
+        assert!(taken(&format!("?download={}.json", "a".repeat(LONGEST))).is_err());
+    }
+
+    #[test]
+    fn header_encodes_names_that_are_not_ascii() {
+        assert_eq!(disposition("gait-trial-3.json").unwrap(), "attachment; filename=\"gait-trial-3.json\"");
+        assert_eq!(disposition("Fuß.json").unwrap(), "attachment; filename*=UTF-8''Fu%C3%9F.json");
+    }
+}

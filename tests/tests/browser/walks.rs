@@ -1,0 +1,132 @@
+//! The questions of visitors, each from the home page to its answer: how many presses it takes, and that the answer is in view.
+
+use crate::chromium::{Chromium, Tab};
+use crate::site::Site;
+use gaitwright_store::StudyId;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::explained::{Clearance, without_gaits};
+use gaitwright_tests::measured::electromyogram;
+use serde_json::json;
+use std::time::{Duration, Instant};
+
+/// A walk of a visitor from the home page.
+struct Walk<'a> {
+    question: &'a str,
+    page: Tab,
+    presses: u32,
+    begun: Instant,
+}
+
+impl<'a> Walk<'a> {
+    async fn begin(browser: &Chromium, site: &Site, question: &'a str) -> Self {
+        let page = browser.open(&site.origin).await;
+        page.resize(1280, 800).await;
+        Self { question, page, presses: 0, begun: Instant::now() }
+    }
+
+    async fn press(&mut self, selector: &str) {
+        self.page.click(selector).await;
+        self.presses += 1;
+    }
+
+    /// The page answers the question: an element with these words, in view without scrolling. The time is printed, not tested.
+    async fn is_answered_by(self, selector: &str, words: &str, presses: u32) {
+        self.page.wait_for(selector).await;
+        let seconds = self.begun.elapsed().as_secs_f64();
+        let text = self.page.text(selector).await;
+        assert!(text.contains(words), "{}: {text}", self.question);
+        let top = format!("String(document.querySelector(`{selector}`).getBoundingClientRect().top)");
+        let top: f64 = self.page.value(&top).await.parse().unwrap();
+        assert!((0.0..800.0).contains(&top), "{}: the answer is at {top} px", self.question);
+        println!("{}: {} presses, {seconds:.1} s", self.question, self.presses);
+        assert_eq!(self.presses, presses, "{}", self.question);
+    }
+}
+
+/// The link to a study on the home page.
+fn link(study: StudyId) -> String {
+    format!("table.studies a[href='/studies/{study}']")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_presses() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let finished = site.service.study(|new| new.trial_budget = 6).await;
+    site.service.wait_for(finished, &[StudyState::Finished]).await;
+    let other = site.service.study(|new| new.trial_budget = 4).await;
+    site.service.wait_for(other, &[StudyState::Finished]).await;
+
+    let mut walk = Walk::begin(&browser, &site, "which gait is best, and how sure is that").await;
+    walk.press(&link(finished)).await;
+    walk.is_answered_by("[data-part=best]", "Gait RMSE", 1).await;
+
+    let mut walk = Walk::begin(&browser, &site, "how do two studies compare").await;
+    walk.press(".heading a[href='/studies/compare']").await;
+    walk.press("form.filter button").await;
+    walk.is_answered_by("main h2", "The best gaits", 2).await;
+
+    let trials = site.service.trials(finished).await;
+    let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
+    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
+    let session = site.service.post(&format!("/api/v1/studies/{finished}/lab-sessions"), &gaits).await.json();
+    let session = format!("/api/v1/lab-sessions/{}", session["id"].as_str().unwrap());
+    for walk in 1..=2 {
+        site.service.post(&format!("{session}/walks"), &json!({"walk": walk})).await;
+        let reading = json!({"heel_strike_column": "heel"});
+        let emg = json!({"walk": walk, "recording": electromyogram(f64::from(walk)), "reading": reading});
+        site.service.post(&format!("{session}/measurement-files/emg"), &emg).await;
+    }
+    site.service.post(&format!("{session}/emg-results"), &json!({})).await;
+    let mut walk = Walk::begin(&browser, &site, "what was the muscle activity of a visit").await;
+    walk.press(&link(finished)).await;
+    walk.press("#lab a[href^='/lab-sessions/']").await;
+    walk.page.wait_for("h1").await;
+    let emg = walk.page.text("main").await;
+    assert!(emg.contains("EMG, left rectus femoris"), "{emg}");
+    assert_eq!(walk.presses, 2);
+    println!("{}: 2 presses, {:.1} s", walk.question, walk.begun.elapsed().as_secs_f64());
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_reaches_a_running_study_and_its_comparison_in_few_presses() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::slow(Duration::from_millis(300))).await;
+    let running = site.service.study(|new| new.trial_budget = 400).await;
+    site.service.wait_for(running, &[StudyState::Running]).await;
+    let mut walk = Walk::begin(&browser, &site, "how far is a running study").await;
+    walk.press(&link(running)).await;
+    walk.is_answered_by("[data-part=state]", "of 400 trials", 1).await;
+    site.service.post(&format!("/api/v1/studies/{running}/stop"), &json!({})).await;
+
+    let asking = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    site.service.wait_for(asking, &[StudyState::Waiting]).await;
+    // Who answers is asked once.
+    let mut walk = Walk::begin(&browser, &site, "answer the comparison that waits").await;
+    walk.press("[aria-labelledby=waits] a").await;
+    walk.page.fill("#author", "K1").await;
+    let better = walk.page.answer("b").await;
+    walk.press(&better).await;
+    walk.is_answered_by(".notice.good", "is better than", 2).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_reaches_the_conflict_of_a_trial_without_a_gait_in_two_presses() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start_explaining(Analytic::default(), Clearance::default()).await;
+    let study =
+        site.service.study(|new| (new.trial_budget, new.search_space) = (2, Some(without_gaits().into()))).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let mut walk = Walk::begin(&browser, &site, "why is there no gait").await;
+    walk.press(&link(study)).await;
+    walk.page
+        .wait_until("document.body.innerText.includes('relaxing a5 (swing-foot clearance) alone gives a gait')")
+        .await;
+    walk.press("[data-part=state] a[href$='#explanation']").await;
+    walk.is_answered_by("#explanation .headline", "swing-foot clearance", 2).await;
+    browser.close().await;
+}
