@@ -14,7 +14,7 @@ use gait_optimizer::explanation::{Explanation, quantity, status_in_words, unit_a
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, Effort, Elapsed, ExplanationState};
-use gaitwright_service::studies::relaxed_trial::{self, NotPossible, Relaxation, RelaxedTrial};
+use gaitwright_service::studies::relaxed_trial::{self, NoRelaxedTrial, Relaxation, RelaxedTrial};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{Connection, TrialId, commit};
@@ -79,12 +79,12 @@ pub(super) struct WayOut {
     /// The bounds and their values as a parameter of the form for a new study: `a5=0.03,a7=20`.
     pub(super) relax: String,
     /// The trial that the study can try.
-    pub(super) attempt: Result<Attempt, NotPossible>,
+    pub(super) attempt: Result<Attempt, NoRelaxedTrial>,
 }
 
 /// A trial that tries a relaxation in the same study.
 pub(super) struct Attempt {
-    /// The bounds with their values in the search space: `a7 = 35 °`.
+    /// The bounds with their values in the search space: `a7 = 35°`.
     pub(super) bounds: String,
     /// Whether these values are looser than those of the relaxation.
     pub(super) is_looser: bool,
@@ -108,9 +108,8 @@ impl WayOut {
         Ok(ways)
     }
 
-    fn of(relaxation: &Relaxation, possible: Result<RelaxedTrial, NotPossible>) -> Self {
-        let label =
-            |(bound, value): &(String, f64)| quantity(bound, format::meaning(bound), *value);
+    fn of(relaxation: &Relaxation, possible: Result<RelaxedTrial, NoRelaxedTrial>) -> Self {
+        let label = |(bound, value): &(String, f64)| quantity(bound, format::meaning(bound), *value);
         let relax = |(bound, value): &(String, f64)| format!("{bound}={value}");
         let attempt = |trial: RelaxedTrial| Attempt {
             bounds: trial
@@ -196,8 +195,8 @@ mod tests {
     #[test]
     fn way_out_names_each_bound_with_its_unit() {
         let relaxation = vec![("a5".to_owned(), 0.03), ("a7".to_owned(), 20.0)];
-        let way = WayOut::of(&relaxation, Err(NotPossible::NotTuned("a7".to_owned())));
-        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20 ° (hip angle)");
+        let way = WayOut::of(&relaxation, Err(NoRelaxedTrial::NotTuned("a7".to_owned())));
+        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20° (hip angle)");
         assert_eq!(way.relax, "a5=0.03,a7=20");
     }
 }

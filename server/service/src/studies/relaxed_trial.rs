@@ -38,7 +38,7 @@ pub fn relaxations(explanation: &Explanation) -> Vec<Relaxation> {
 
 /// Why a study cannot try a relaxation.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum NotPossible {
+pub enum NoRelaxedTrial {
     /// The study does not tune the bound.
     #[error("This study does not tune {0}.")]
     NotTuned(String),
@@ -63,8 +63,8 @@ pub enum NotPossible {
     State(&'static str),
 }
 
-impl From<NotPossible> for Error {
-    fn from(error: NotPossible) -> Self {
+impl From<NoRelaxedTrial> for Error {
+    fn from(error: NoRelaxedTrial) -> Self {
         Self::conflict(error.to_string())
     }
 }
@@ -88,7 +88,7 @@ pub async fn possible(
     study: &Study,
     trial: &Trial,
     relaxation: &Relaxation,
-) -> Result<Result<RelaxedTrial, NotPossible>, Error> {
+) -> Result<Result<RelaxedTrial, NoRelaxedTrial>, Error> {
     if let Err(refused) = may_take_a_trial(study) {
         return Ok(Err(refused));
     }
@@ -98,13 +98,13 @@ pub async fn possible(
             Err(refused) => return Ok(Err(refused)),
         };
     if let Some(known) = trials::of_action(db, study.id, action).await?.first() {
-        return Ok(Err(NotPossible::Tried { trial: known.id, number: known.number }));
+        return Ok(Err(NoRelaxedTrial::Tried { trial: known.id, number: known.number }));
     }
     let extends = trials::counts(db, study.id).await?.total >= study.plan.trial_budget;
     Ok(Ok(RelaxedTrial { bounds, extends, action }))
 }
 
-fn may_take_a_trial(study: &Study) -> Result<(), NotPossible> {
+fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
     let refused = match study.state {
         _ if study.plan.evaluation == Evaluation::Script => "A lab script evaluates the trials of this study.",
         _ if study.archived_at.is_some() => "The study is archived. Show it in the list of studies first.",
@@ -114,7 +114,7 @@ fn may_take_a_trial(study: &Study) -> Result<(), NotPossible> {
         StudyState::Paused => "The study is paused. Resume it first.",
         StudyState::Stopped => "The study was stopped. Extend it first.",
     };
-    Err(NotPossible::State(refused))
+    Err(NoRelaxedTrial::State(refused))
 }
 
 /// The nearest action that is as loose as a relaxation, with the values of the relaxed bounds.
@@ -122,12 +122,12 @@ fn relaxed(
     space: &SearchSpace,
     from: ActionIndex,
     relaxation: &Relaxation,
-) -> Result<Result<(ActionIndex, Relaxation), NotPossible>, LearnerError> {
+) -> Result<Result<(ActionIndex, Relaxation), NoRelaxedTrial>, LearnerError> {
     let mut levels = space.levels(space.check(from)?);
     let mut bounds = Relaxation::new();
     for (bound, needed) in relaxation {
         let tuned = space.dimensions().iter().zip(&mut levels).find(|(dimension, _)| dimension.name == *bound);
-        let Some((dimension, level)) = tuned else { return Ok(Err(NotPossible::NotTuned(bound.clone()))) };
+        let Some((dimension, level)) = tuned else { return Ok(Err(NoRelaxedTrial::NotTuned(bound.clone()))) };
         let values = &dimension.values;
         let is_lower = TunedBounds::NAMES.iter().zip(TunedBounds::IS_LOWER).any(|(name, lower)| name == bound && lower);
         let (found, loosest) = if is_lower {
@@ -137,7 +137,7 @@ fn relaxed(
         };
         let Some(found) = found else {
             let loosest = loosest.copied().unwrap_or(*needed);
-            return Ok(Err(NotPossible::OutsideSearchSpace { bound: bound.clone(), loosest }));
+            return Ok(Err(NoRelaxedTrial::OutsideSearchSpace { bound: bound.clone(), loosest }));
         };
         *level = found;
         bounds.push((bound.clone(), values[found]));
@@ -249,7 +249,7 @@ mod tests {
         SearchSpace::new(vec![dimension("a5", &[0.0, 0.02, 0.04]), dimension("a7", &[20.0, 35.0, 50.0])]).unwrap()
     }
 
-    fn found(relaxation: &[(&str, f64)]) -> Result<(Vec<f64>, Relaxation), NotPossible> {
+    fn found(relaxation: &[(&str, f64)]) -> Result<(Vec<f64>, Relaxation), NoRelaxedTrial> {
         let (space, relaxation) = (space(), relaxation.iter().map(|(name, to)| ((*name).to_owned(), *to)).collect());
         // The tightest action: a5 is a lower bound.
         let from = space.index_of_values(&[0.04, 20.0]).unwrap();
@@ -267,9 +267,9 @@ mod tests {
 
     #[test]
     fn bound_that_is_not_tuned_or_not_loose_enough_is_refused() {
-        assert_eq!(found(&[("a6", 0.2)]), Err(NotPossible::NotTuned("a6".to_owned())));
+        assert_eq!(found(&[("a6", 0.2)]), Err(NoRelaxedTrial::NotTuned("a6".to_owned())));
         let refused = found(&[("a7", 51.0)]).unwrap_err();
-        assert_eq!(refused, NotPossible::OutsideSearchSpace { bound: "a7".to_owned(), loosest: 50.0 });
+        assert_eq!(refused, NoRelaxedTrial::OutsideSearchSpace { bound: "a7".to_owned(), loosest: 50.0 });
         assert_eq!(refused.to_string(), "The loosest a7 of this study is 50, which is not loose enough.");
     }
 }
