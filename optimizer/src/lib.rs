@@ -46,7 +46,7 @@ pub use model_error::ModelError;
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
-    BasinChoice, CancelToken, GaitFigures, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, MuscleRoute,
+    BasinChoice, CancelToken, GaitResults, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, MuscleRoute,
     OtherBasin, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus,
     StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
 };

@@ -6,12 +6,12 @@
 //! predicts to first order.
 
 mod active;
-mod figures;
 mod parameter;
+mod result_derivatives;
 mod words;
 
 pub use active::ActiveConstraint;
-pub use figures::FigureDerivatives;
+pub use result_derivatives::ResultDerivatives;
 
 use crate::gait_problem::GaitProblem;
 use crate::solve::{SolveError, SolveOptions, WarmStart, final_settings};
@@ -39,7 +39,7 @@ pub struct BoundSensitivity {
     /// The constraints that it sets and that are active. Empty: small changes of the bound change nothing.
     pub active: Vec<ActiveConstraint>,
     /// Derivatives of the results of the gait.
-    pub derivatives: FigureDerivatives,
+    pub derivatives: ResultDerivatives,
     /// Values of the bound between which the active constraints stay the same, to first order; `None` if they do for every
     /// value in that direction.
     pub interval: (Option<f64>, Option<f64>),

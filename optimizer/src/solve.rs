@@ -6,7 +6,7 @@ use std::time::Instant;
 
 mod attempts;
 mod error;
-mod figures;
+mod gait_results;
 mod multi_start;
 mod options;
 mod outcome;
@@ -19,7 +19,7 @@ mod warm_start;
 pub use crate::cancel_token::CancelToken;
 use attempts::{Tried, choose, enforce_between_nodes, number_basins, try_guesses, try_multi_start, try_warm};
 pub use error::SolveError;
-pub use figures::GaitFigures;
+pub use gait_results::GaitResults;
 pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use options::{BasinChoice, SolveOptions};
 use outcome::{SolveTally, other_basin, outcome};

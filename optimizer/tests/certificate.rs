@@ -6,7 +6,7 @@ mod golden_gaits;
 
 use gait_optimizer::body::WalkerModel;
 use gait_optimizer::certificate::{Certificate, CertifiedGait, Difference, STRIDES, certify};
-use gait_optimizer::{DomainTrajectory, Gait, GaitFigures, ModelError, ReferenceGait};
+use gait_optimizer::{DomainTrajectory, Gait, GaitResults, ModelError, ReferenceGait};
 use golden_gaits::golden_gait;
 
 fn certificate(gait: &Gait) -> Certificate {
@@ -194,7 +194,7 @@ fn unsmoothed_cost_of_transport_has_the_magnitudes_of_the_joint_powers() {
         // Simpson's rule over the nodes misses the kinks of the magnitudes between them.
         assert!((unsmoothed - at_nodes).abs() < 0.05 * at_nodes, "{unsmoothed} {at_nodes}");
         // |P| - eps <= sqrt(P^2 + eps^2) - eps <= |P| for each of six joints.
-        let smoothed = GaitFigures::of(&gait, &ReferenceGait::builtin().unwrap()).unwrap().cost_of_transport;
+        let smoothed = GaitResults::of(&gait, &ReferenceGait::builtin().unwrap()).unwrap().cost_of_transport;
         let most = 6.0 * gait.settings.regularisation.power_smoothing_w * gait.stride_time_s * per_joule;
         assert!(smoothed < at_nodes && at_nodes < smoothed + most, "{smoothed} {at_nodes} {most}");
     }

@@ -9,7 +9,7 @@ use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::settings::Naturalness;
 use gait_optimizer::solve::StartedFrom;
 use gait_optimizer::{
-    CancelToken, Gait, GaitFigures, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject,
+    CancelToken, Gait, GaitProblem, GaitResults, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject,
     TunedBounds, WarmStart, solve,
 };
 use std::io::Write;
@@ -56,11 +56,11 @@ fn warm_start_converges_after_a_cold_solve() {
 fn figures_of_a_gait_are_those_of_its_report_and_every_other_value_differs() {
     let reference = problem("").reference;
     for outcome in [&*COLD, &solved(&problem(""), None, 3)] {
-        let figures = GaitFigures::of(&outcome.gait, &reference).unwrap();
-        let stated = GaitFigures::stated_in(&outcome.report);
+        let figures = GaitResults::of(&outcome.gait, &reference).unwrap();
+        let stated = GaitResults::stated_in(&outcome.report);
         assert_eq!(figures, stated);
         let scaled = |figure: &mut f64| *figure *= 1.0 + 1e-6;
-        let changes: [fn(&mut GaitFigures) -> &mut f64; 7] = [
+        let changes: [fn(&mut GaitResults) -> &mut f64; 7] = [
             |f| &mut f.cost_of_transport,
             |f| &mut f.gait_rmse_rad,
             |f| &mut f.gait_rmse_parts_rad[4],

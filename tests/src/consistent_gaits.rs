@@ -4,7 +4,7 @@ use crate::analytic::Analytic;
 use gait_optimizer::body::WalkerModel;
 use gait_optimizer::gait::ContactRowName;
 use gait_optimizer::walking::{BEZIER_COEFFICIENTS, CYCLE, phase_gradient};
-use gait_optimizer::{CancelToken, DomainTrajectory, GaitFigures, IterationRecord, SolveOutcome};
+use gait_optimizer::{CancelToken, DomainTrajectory, GaitResults, IterationRecord, SolveOutcome};
 use gaitwright_service::workers::{Assignment, Evaluate};
 
 /// The analytic solver with complete gaits, from which the figures of the report are computed.
@@ -35,7 +35,7 @@ impl Evaluate for Consistent {
             trajectory.impulse = domain.opens_with_impact().then(|| vec![0.0; rows.len()]);
         }
         gait.speed_m_s = gait.stride_length_m / gait.stride_time_s;
-        let figures = GaitFigures::of(gait, &assignment.problem.reference).map_err(|e| e.to_string())?;
+        let figures = GaitResults::of(gait, &assignment.problem.reference).map_err(|e| e.to_string())?;
         let report = &mut outcome.report;
         report.gait_rmse_rad = figures.gait_rmse_rad;
         report.gait_rmse_parts_rad = figures.gait_rmse_parts_rad;

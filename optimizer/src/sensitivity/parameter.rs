@@ -1,11 +1,11 @@
 //! How the gait problem depends on a tuned bound, and how its solution follows.
 
 use super::active::{self, ActiveSet};
-use super::figures::FigureDerivatives;
+use super::result_derivatives::ResultDerivatives;
 use super::{BoundSensitivity, GaitSensitivityError};
 use crate::gait_problem::{GaitProblem, GaitProgram, gait_of};
 use crate::model_error::ModelError;
-use crate::solve::{GaitFigures, SolveError, WarmStart, check_shape};
+use crate::solve::{GaitResults, SolveError, WarmStart, check_shape};
 use crate::tuned_bounds::TunedBounds;
 use interior_point::{NlpSettings, NonlinearProgram, ParameterDerivative, Sensitivity};
 
@@ -42,7 +42,7 @@ impl PointSensitivities {
     /// Mechanical cost of transport of the solution.
     pub(super) fn cost_of_transport(&self, problem: &GaitProblem, solution: &WarmStart) -> f64 {
         let gait = gait_of(problem, &self.program, &solution.point.x);
-        GaitFigures::of_well_formed(&gait, &self.program.model, &problem.reference).cost_of_transport
+        GaitResults::of_well_formed(&gait, &self.program.model, &problem.reference).cost_of_transport
     }
 
     pub(super) fn of_bound(&self, problem: &GaitProblem, solution: &WarmStart, bound: usize) -> BoundSensitivity {
@@ -54,7 +54,7 @@ impl PointSensitivities {
             bound: TunedBounds::NAMES[bound],
             value,
             active: active::of_parameter(&self.program, &set, parameter),
-            derivatives: FigureDerivatives::along(problem, &self.program, &solution.point.x, sensitivity),
+            derivatives: ResultDerivatives::along(problem, &self.program, &solution.point.x, sensitivity),
             interval: (back.map(|step| value + step), forth.map(|step| value + step)),
             is_weakly_active: set.is_weak(parameter),
         }

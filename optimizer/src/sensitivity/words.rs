@@ -86,7 +86,7 @@ impl BoundSensitivity {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ActiveConstraint, FigureDerivatives};
+    use super::super::{ActiveConstraint, ResultDerivatives};
     use super::*;
 
     #[test]
@@ -95,7 +95,7 @@ mod tests {
             bound: "a6",
             value: 0.3,
             active: vec![ActiveConstraint { place: "SS1_R node 3, torso".to_owned(), multiplier: 1.0 }],
-            derivatives: FigureDerivatives {
+            derivatives: ResultDerivatives {
                 objective: 0.1,
                 cost_of_transport: 0.1,
                 gait_rmse_rad: 0.2,

@@ -1,7 +1,7 @@
 //! The outcome of a solve from its attempts.
 
 use super::attempts::Candidate;
-use super::figures::GaitFigures;
+use super::gait_results::GaitResults;
 use super::phases::SolveContext;
 use super::report::{
     LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
@@ -34,7 +34,7 @@ pub(super) fn outcome(
     let (problem, program) = (context.problem, context.program);
     let Candidate { result, gait, status, .. } = candidate;
     let x = &result.x;
-    let figures = GaitFigures::of_well_formed(&gait, &program.model, &problem.reference);
+    let figures = GaitResults::of_well_formed(&gait, &program.model, &problem.reference);
     let margins = margins.bearing_on(program, x);
     let violations = program.violations(x);
     let warm_start = warm_start(context, &result, margins);

@@ -160,7 +160,7 @@ pub(crate) fn role(role: &Role) -> &'static str {
 #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
 pub(crate) fn file_kind(kind: &MeasurementKind) -> &'static str {
     match kind {
-        MeasurementKind::Electromyogram => "EMG recording",
+        MeasurementKind::Emg => "EMG recording",
         MeasurementKind::Motion => "joint angles",
     }
 }

@@ -31,6 +31,7 @@ pub struct Backup {
     /// Size in bytes.
     pub bytes: u64,
     /// Time of completion.
+    #[serde(rename = "created_at")]
     pub at: Instant,
 }
 

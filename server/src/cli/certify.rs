@@ -5,7 +5,7 @@ use super::output::data;
 use super::problem_flags::reference_of;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, RECOVERY_STRIDES, STRIDES, certify};
-use gait_optimizer::{Gait, GaitFigures, ReferenceGait, SolveReport};
+use gait_optimizer::{Gait, GaitResults, ReferenceGait, SolveReport};
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
@@ -45,8 +45,8 @@ impl Certify {
 
 /// Checks the figures that a file states against those of its gait. The error is the reason.
 fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -> Result<(), String> {
-    let figures = GaitFigures::of(gait, reference).map_err(|e| e.to_string())?;
-    match figures.difference(&GaitFigures::stated_in(report)) {
+    let figures = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
+    match figures.difference(&GaitResults::stated_in(report)) {
         None => Ok(()),
         Some((name, computed, stated)) if name.starts_with("gait_rmse") => Err(format!(
             "it states {name} as {stated}; with the reference gait {:?} it is {computed}. If the solve used \

@@ -13,21 +13,21 @@ use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of measurement file: `electromyogram`, an EMG recording; `motion`, joint angles.
+/// Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeasurementKind {
     /// EMG recording.
-    Electromyogram,
+    Emg,
     /// Joint angles.
     Motion,
 }
 
 impl MeasurementKind {
-    /// The name in the record and in REST.
+    /// The name in the record.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Electromyogram => "electromyogram",
+            Self::Emg => "electromyogram",
             Self::Motion => "motion",
         }
     }
@@ -36,7 +36,7 @@ impl MeasurementKind {
 impl FromStr for MeasurementKind {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Electromyogram, Self::Motion]
+        [Self::Emg, Self::Motion]
             .into_iter()
             .find(|kind| kind.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("kind of a measurement file", text))

@@ -1,7 +1,7 @@
 //! Forged archives, each with the reason for which it is refused.
 
 use super::rows::{Rows, blob, definition, gait, text_of, within};
-use gait_optimizer::{Gait, GaitFigures, Mesh};
+use gait_optimizer::{Gait, GaitResults, Mesh};
 use serde_json::{Value, json};
 
 /// Changes the report of the first converged trial wherever it occurs.
@@ -43,7 +43,7 @@ fn lengthen(gait: &mut Value) {
 fn state_figures_of(rows: &mut Rows, gait: &Value) {
     let gait: Gait = serde_json::from_value(gait.clone()).unwrap();
     let reference = serde_json::from_str(rows.first("reference_gaits")["definition"].as_str().unwrap()).unwrap();
-    let figures = GaitFigures::of(&gait, &reference).unwrap();
+    let figures = GaitResults::of(&gait, &reference).unwrap();
     everywhere(rows, "gait_rmse_rad", figures.gait_rmse_rad);
     everywhere(rows, "cost_of_transport", figures.cost_of_transport);
     in_reports(rows, |report| {

@@ -13,7 +13,7 @@ use axum::extract::{Path, State};
 use axum::response::Response;
 use gaitwright_service::access::{Administer, Rate, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::blind::{self, Answered, RaterAnswer, RaterFigures, UnblindedPair};
+use gaitwright_service::studies::blind::{self, Answered, RaterAnswer, RaterReliability, UnblindedPair};
 use gaitwright_store::{StudyId, allocations, gaits, presentations, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -158,10 +158,10 @@ pub(super) async fn answer(
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",
-    operation_id = "list_rater_agreement",
+    operation_id = "list_raters",
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "One row for each rater", body = Page<RaterFigures>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "One row for each rater", body = Page<RaterReliability>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn raters(
@@ -169,7 +169,7 @@ pub(super) async fn raters(
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<usize>,
-) -> Result<Json<Page<RaterFigures>>, Refusal> {
+) -> Result<Json<Page<RaterReliability>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let shown = presentations::of_study(&mut reader, id).await?;

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::problem_details::Refusal;
-use crate::resources::sensitivities::{ActiveConstraint, FigureDerivatives};
+use crate::resources::sensitivities::{ActiveConstraint, ResultDerivatives};
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -37,7 +37,7 @@ struct SensitivityToBound {
     /// The active constraints that it sets. Empty if small changes of the bound change nothing.
     active: Vec<ActiveConstraint>,
     /// Derivatives of the results of the gait.
-    derivatives: FigureDerivatives,
+    derivatives: ResultDerivatives,
     /// Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
     /// is null if there is no limit in that direction.
     #[schema(value_type = Vec<Option<f64>>, min_items = 2, max_items = 2)]

@@ -284,7 +284,7 @@ pub(super) async fn show(
         may_run: caller.may(Run::NEEDED),
         may_unblind: caller.may(Administer::NEEDED),
         recorded: session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect(),
-        has_emg: recordings.iter().any(|recording| recording.kind == MeasurementKind::Electromyogram),
+        has_emg: recordings.iter().any(|recording| recording.kind == MeasurementKind::Emg),
         recordings,
         filters: forms
             .filters

@@ -12,11 +12,11 @@ pub(crate) struct AuditRow {
     /// Sequence number.
     seq: i64,
     /// Time of the change.
-    at: Instant,
+    created_at: Instant,
     /// Who made the change.
     actor: String,
     /// Kind of change, such as `subject.add` or `study.pause`.
-    action: String,
+    change: String,
     /// What was changed, such as `study 0190...`.
     object: String,
     /// Details of the change, with the reason if there is one.
@@ -31,6 +31,6 @@ pub(crate) struct AuditRow {
 impl From<audit::AuditRow> for AuditRow {
     fn from(row: audit::AuditRow) -> Self {
         let audit::AuditRow { seq, at, actor, action, object, detail, previous, hash } = row;
-        Self { seq, at, actor, action, object, detail, previous, hash }
+        Self { seq, created_at: at, actor, change: action, object, detail, previous, hash }
     }
 }

@@ -13,13 +13,13 @@ pub(crate) struct LabSessionStep {
     /// Who did it.
     actor: String,
     /// Time of the step.
-    at: Instant,
+    created_at: Instant,
 }
 
 impl From<lab_sessions::LabSessionStep> for LabSessionStep {
     fn from(row: lab_sessions::LabSessionStep) -> Self {
         let lab_sessions::LabSessionStep { note, actor, at } = row;
-        Self { note, actor, at }
+        Self { note, actor, created_at: at }
     }
 }
 
@@ -33,13 +33,13 @@ pub(crate) struct ControllerFileDownload {
     /// Who fetched it.
     actor: String,
     /// Time of the download.
-    at: Instant,
+    created_at: Instant,
 }
 
 impl From<allocations::ControllerFileDownload> for ControllerFileDownload {
     fn from(row: allocations::ControllerFileDownload) -> Self {
         let allocations::ControllerFileDownload { walk, to_device, actor, at } = row;
-        Self { walk, to_device, actor, at }
+        Self { walk, to_device, actor, created_at: at }
     }
 }
 

@@ -22,7 +22,7 @@ impl From<sensitivity::ActiveConstraint> for ActiveConstraint {
 
 /// Derivatives of the results with respect to a tuned bound.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct FigureDerivatives {
+pub(crate) struct ResultDerivatives {
     /// Derivative of the objective.
     objective: f64,
     /// Derivative of the mechanical cost of transport.
@@ -40,9 +40,9 @@ pub(crate) struct FigureDerivatives {
     smallest_angles_rad: [f64; 7],
 }
 
-impl From<sensitivity::FigureDerivatives> for FigureDerivatives {
-    fn from(derivatives: sensitivity::FigureDerivatives) -> Self {
-        let sensitivity::FigureDerivatives {
+impl From<sensitivity::ResultDerivatives> for ResultDerivatives {
+    fn from(derivatives: sensitivity::ResultDerivatives) -> Self {
+        let sensitivity::ResultDerivatives {
             objective,
             cost_of_transport,
             gait_rmse_rad,

@@ -109,10 +109,10 @@ pub fn refusal(error: GaitSensitivityError) -> Error {
 mod tests {
     use super::*;
     use crate::studies::search_space::table_i;
-    use gait_optimizer::sensitivity::FigureDerivatives;
+    use gait_optimizer::sensitivity::ResultDerivatives;
 
     fn bound(bound: &'static str, value: f64, interval: (Option<f64>, Option<f64>)) -> BoundSensitivity {
-        let derivatives = FigureDerivatives {
+        let derivatives = ResultDerivatives {
             objective: 1.0,
             cost_of_transport: 2.0,
             gait_rmse_rad: -3.0,

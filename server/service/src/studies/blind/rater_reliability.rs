@@ -38,7 +38,7 @@ impl Share {
 
 /// Reliability of a rater in a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct RaterFigures {
+pub struct RaterReliability {
     /// Name of the rater.
     pub rater: String,
     /// Number of presentations.
@@ -59,20 +59,20 @@ pub struct RaterFigures {
 }
 
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-pub fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterFigures> {
+pub fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterReliability> {
     let mut raters: Vec<&str> = presentations.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
     raters.into_iter().map(|rater| of_rater(rater, presentations, sides)).collect()
 }
 
-fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterFigures {
+fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterReliability {
     let own: Vec<&Presentation> = all.iter().filter(|shown| shown.rater == rater).collect();
     let count = |wanted: &dyn Fn(&Presentation) -> bool| {
         u32::try_from(own.iter().filter(|shown| wanted(shown)).count()).unwrap_or(u32::MAX)
     };
     let is_unsafe = |shown: &Presentation| shown.answer.is_some_and(Judgement::is_about_safety);
-    RaterFigures {
+    RaterReliability {
         rater: rater.to_owned(),
         shown: count(&|_| true),
         answered: count(&|shown| shown.answer.is_some_and(|judgement| judgement != Judgement::Retracted)),

@@ -55,7 +55,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     still_shown(&mut db, id).await?;
     let recordings = measurement_files::of_session(&mut db, id).await?;
     let mut files: Vec<(u8, MeasurementFileId, EmgReading, PackedText)> = Vec::new();
-    for recording in newest(&recordings, MeasurementKind::Electromyogram) {
+    for recording in newest(&recordings, MeasurementKind::Emg) {
         let (reading, file) = measurement_files::file(&mut db, recording.id).await?;
         files.push((recording.walk, recording.id, reading, file));
     }

@@ -25,6 +25,7 @@ pub struct AnswerView {
     /// Who recorded it.
     pub actor: String,
     /// Time of recording.
+    #[serde(rename = "created_at")]
     pub at: Instant,
     /// Whether the person who recorded the answer could have known the allocation: it was recorded after unblinding, or
     /// by a user who had fetched a controller file.

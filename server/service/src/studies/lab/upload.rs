@@ -265,7 +265,7 @@ impl NewEmg {
         let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
-            let packed = PackedFile::new(pool, MeasurementKind::Electromyogram, &self.reading, &self.recording)?;
+            let packed = PackedFile::new(pool, MeasurementKind::Emg, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
         };
         store.compute(check).await?
@@ -295,7 +295,7 @@ impl NewMotion {
 pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &MeasurementFile) -> Result<(), Error> {
     let id = kept.id;
     match kept.kind {
-        MeasurementKind::Electromyogram => {
+        MeasurementKind::Emg => {
             let (reading, file) = measurement_files::file::<EmgReading>(db, id).await?;
             pool.run(move |pool| reading.check(&file.text(pool)?)).await?
         }

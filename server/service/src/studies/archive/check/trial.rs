@@ -4,7 +4,7 @@ use super::Context;
 use crate::studies::{search_space, trial_state};
 use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::solve::CONVERGED_VIOLATION;
-use gait_optimizer::{Gait, GaitFigures, ReferenceGait, WarmStart};
+use gait_optimizer::{Gait, GaitResults, ReferenceGait, WarmStart};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::studies::StudyPlan;
 use gaitwright_store::trials::{Trial, TrialState};
@@ -125,8 +125,8 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
 /// Checks every stated figure that the gait determines. Safety reports recognise a motion by these figures.
 fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
     let Some(report) = &trial.report else { return Ok(()) };
-    let anew = GaitFigures::of(gait, reference).map_err(|e| e.to_string())?;
-    match GaitFigures::stated_in(report).difference(&anew) {
+    let anew = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
+    match GaitResults::stated_in(report).difference(&anew) {
         Some((name, stated, anew)) => Err(format!("its stated {name} is {stated}, but its gait gives {anew}")),
         None => Ok(()),
     }

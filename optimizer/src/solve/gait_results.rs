@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// The figures of a report that follow from the gait and the reference gait.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GaitFigures {
+pub struct GaitResults {
     /// Mechanical cost of transport, dimensionless.
     pub cost_of_transport: f64,
     /// Gait RMSE, rad.
@@ -31,7 +31,7 @@ pub struct GaitFigures {
     pub vhip_m_s: [f64; 4],
 }
 
-impl GaitFigures {
+impl GaitResults {
     /// The figures of a gait from a file.
     ///
     /// # Errors

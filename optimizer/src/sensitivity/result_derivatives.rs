@@ -2,7 +2,7 @@
 
 use crate::gait::Gait;
 use crate::gait_problem::{GaitProblem, GaitProgram, gait_of};
-use crate::solve::GaitFigures;
+use crate::solve::GaitResults;
 use interior_point::Sensitivity;
 use serde::Serialize;
 
@@ -12,7 +12,7 @@ const LARGEST_CHANGE: f64 = 1e-5;
 
 /// Derivatives of the results with respect to a tuned bound.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct FigureDerivatives {
+pub struct ResultDerivatives {
     /// Of the objective.
     pub objective: f64,
     /// Derivative of the mechanical cost of transport.
@@ -28,7 +28,7 @@ pub struct FigureDerivatives {
     pub smallest_angles_rad: [f64; 7],
 }
 
-impl FigureDerivatives {
+impl ResultDerivatives {
     /// The derivatives along a sensitivity of the point `x`.
     pub(super) fn along(problem: &GaitProblem, program: &GaitProgram, x: &[f64], sensitivity: &Sensitivity) -> Self {
         let direction = &sensitivity.point.x;
@@ -40,7 +40,7 @@ impl FigureDerivatives {
         let at = |step: f64| {
             let moved: Vec<f64> = x.iter().zip(direction).map(|(x, change)| x + step * change).collect();
             let gait = gait_of(problem, program, &moved);
-            (GaitFigures::of_well_formed(&gait, &program.model, &problem.reference), extreme_angles(&gait))
+            (GaitResults::of_well_formed(&gait, &program.model, &problem.reference), extreme_angles(&gait))
         };
         let ((more, more_angles), (less, less_angles)) = (at(step), at(-step));
         let rate = |more: f64, less: f64| (more - less) / (2.0 * step);
