@@ -67,6 +67,11 @@ impl ListQuery {
         self.state == state.as_str()
     }
 
+    #[allow(clippy::trivially_copy_pass_by_ref, clippy::unused_self)] // templates pass references
+    fn in_words(&self, state: &StudyState) -> &'static str {
+        lifecycle::in_words(*state)
+    }
+
     fn filter(&self, limit: u32) -> Result<StudyFilter, Error> {
         let state = match self.state.as_str() {
             "" => None,
