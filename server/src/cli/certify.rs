@@ -15,8 +15,8 @@ pub(super) struct Certify {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// Reference gait used in the solve: a name or file, as for `solve --reference`. Needed to check the Gait RMSE that a
-    /// file written by `solve --out` states.
+    /// Reference gait used in the solve: a name or file, as for `solve --reference` (default: falisse-2019). Needed to
+    /// check the Gait RMSE that a file written by `solve --out` states.
     #[arg(long, value_name = "NAME or FILE")]
     reference: Option<PathBuf>,
     /// Print the certificate as one JSON object.
