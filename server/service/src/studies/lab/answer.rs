@@ -104,7 +104,8 @@ async fn report_unsafe(
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,
         Some(stands)
-            if is_same(stands, new) && SafetyReports::read(writer, session.study_id).await?.close_all(&gaits) =>
+            if is_same(stands, new)
+                && SafetyReports::read(writer, session.study_id).await?.are_all_in_force(&gaits) =>
         {
             session_progress(writer, session.id).await
         }
@@ -138,7 +139,7 @@ async fn add(
     }
     let session = lab_sessions::get(writer, id).await?;
     if session.done(Act::Unblinded).is_some() {
-        hear(writer, &session).await?;
+        record_answer(writer, &session).await?;
     }
     let detail = json!({ "number": number, "answer": new.answer, "note": new.note });
     audit::append(writer, &caller.actor, "lab_session.answer", &format!("lab session {id}"), &detail).await?;
@@ -172,7 +173,7 @@ async fn retract_number(writer: &mut Writer, caller: &Caller, id: LabSessionId, 
 
 /// Passes the current answer, if any, to the learner with the subject as its author. If a gait has been reported as
 /// unsafe since the answer, the answer stays on record but does not reach the learner.
-pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
+pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
     let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
     let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
@@ -188,7 +189,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
     let heard = if given.judgement.is_assessment() {
         assessment::write(writer, statement).await.map(drop)
     } else {
-        heard_as_preference(writer, statement).await
+        record_preference(writer, statement).await
     };
     match heard {
         Err(reason @ (Error::Invalid(_) | Error::Conflict(_))) => {
@@ -200,7 +201,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
     }
 }
 
-async fn heard_as_preference(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<(), Error> {
-    let heard = preference::hear(writer, statement).await?;
+async fn record_preference(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<(), Error> {
+    let heard = preference::record(writer, statement).await?;
     Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": heard })).await?)
 }
