@@ -42,6 +42,13 @@ struct Home {
     may_run: bool,
 }
 
+impl Home {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn in_words(state: &StudyState) -> &'static str {
+        lifecycle::in_words(*state)
+    }
+}
+
 /// Which studies to show.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
