@@ -42,6 +42,13 @@ struct Home {
     may_run: bool,
 }
 
+impl Home {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn in_words(state: &StudyState) -> &'static str {
+        lifecycle::in_words(*state)
+    }
+}
+
 /// Which studies to show.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -65,11 +72,6 @@ impl ListQuery {
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn is_state(&self, state: &StudyState) -> bool {
         self.state == state.as_str()
-    }
-
-    #[allow(clippy::trivially_copy_pass_by_ref, clippy::unused_self)] // templates pass references
-    fn in_words(&self, state: &StudyState) -> &'static str {
-        lifecycle::in_words(*state)
     }
 
     fn filter(&self, limit: u32) -> Result<StudyFilter, Error> {

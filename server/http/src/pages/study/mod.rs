@@ -91,6 +91,12 @@ struct ClosedPage {
     may_administer: bool,
 }
 
+impl ClosedPage {
+    fn state_in_words(&self) -> &'static str {
+        lifecycle::in_words(self.study.state)
+    }
+}
+
 /// The part that changes while the study runs.
 #[derive(Template)]
 #[template(path = "study_live.html")]
