@@ -251,7 +251,7 @@ async fn browser_every_page_fits_and_is_accessible() {
 /// Guides, which may speak of times of day and of UTC.
 const PROSE: [&str; 3] = ["help", "guide", "glossary"];
 
-/// Times that are not in the time zone of the reader, or do not say so.
+/// Times that are not in the time zone of the reader. The details of the audit trail are JSON, as they stand in the record.
 async fn bare_times(page: &Tab, name: &str) -> Vec<String> {
     if PROSE.contains(&name) {
         return Vec::new();
@@ -261,7 +261,8 @@ async fn bare_times(page: &Tab, name: &str) -> Vec<String> {
         const found = [];
         const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
         for (let node = words.nextNode(); node; node = words.nextNode()) {
-            if (time.test(node.textContent) && !node.parentElement.closest('time[datetime][title], script')) found.push(node.textContent.trim());
+            const text = node.textContent.trim();
+            if (time.test(text) && !text.startsWith('{') && !node.parentElement.closest('time[datetime][title], script')) found.push(text);
         }
         for (const element of document.querySelectorAll('[aria-label], [title]:not(time)')) {
             for (const text of [element.ariaLabel, element.title]) if (time.test(text)) found.push(text);
@@ -271,11 +272,12 @@ async fn bare_times(page: &Tab, name: &str) -> Vec<String> {
     serde_json::from_str(&page.value(bare).await).unwrap()
 }
 
-/// Links of a page to files of the REST interface other than figures: the address, and whether the link asks the browser to
-/// save it.
+/// Links of a page to files of the REST interface: the address, and whether the link asks the browser to save it. Other tests
+/// download figures, and the motion and controller files, which the gaits of the analytic solver do not have.
 async fn links_to_files(page: &Tab) -> Vec<(String, bool)> {
     let links = "JSON.stringify([...document.querySelectorAll('a[href^=\"/api/v1/\"]')].map(a => \
-        [a.getAttribute('href'), a.hasAttribute('download')]).filter(([address]) => !address.includes('/figures/')))";
+        [a.getAttribute('href'), a.hasAttribute('download')]).filter(([address]) => \
+        !['/figures/', '/gait.mot', '/controller.json'].some(other => address.includes(other))))";
     serde_json::from_str(&page.value(links).await).unwrap()
 }
 

@@ -25,7 +25,7 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     assert!(!page.text("#trials").await.contains("No trials yet") && page.count("#trials form.filter").await == 1);
     assert_eq!(page.count("[data-part=history] svg.chart").await, 1);
     // The recommendation can be downloaded.
-    let bounds = "document.querySelector('[data-part=best] a[download$=\".json\"]').getAttribute('href')";
+    let bounds = "document.querySelector('[data-part=best] a[download][href*=\".json\"]').getAttribute('href')";
     let bounds = page.value(bounds).await;
     let told = site.service.fetch(&bounds).await.json();
     assert!(told["bounds"]["a1"].is_number() && told["gait_rmse_rad"].is_number(), "{told}");
@@ -446,7 +446,7 @@ async fn browser_opens_ten_thousand_trials_within_a_second() {
         fastest = fastest.min(page.value(took).await.parse().unwrap());
     }
     println!("{fastest:.0} ms until a study of 10,000 trials is loaded, sorted by Gait RMSE");
-    assert_eq!(page.count(".trials tbody tr").await, 200);
+    assert_eq!(page.count(".trials tbody tr").await, 50);
     // A second on a machine of one's own; where programs share its cores, as much longer as they have to wait.
     let load: f64 =
         std::fs::read_to_string("/proc/loadavg").ok().and_then(|t| t.split(' ').next()?.parse().ok()).unwrap_or(0.0);

@@ -70,7 +70,7 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
 
     let trials = site.service.trials(finished).await;
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
-    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
+    let gaits = json!({"trial_a": converged[0].id, "trial_b": converged[1].id});
     let session = site.service.post(&format!("/api/v1/studies/{finished}/lab-sessions"), &gaits).await.json();
     let session = format!("/api/v1/lab-sessions/{}", session["id"].as_str().unwrap());
     for walk in 1..=2 {

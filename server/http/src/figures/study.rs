@@ -102,7 +102,7 @@ pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<Stud
     let (shown, sections) = app.compute(draw).await?;
     let without_gait = shown.iter().filter(|best| best.gait.is_none()).map(|best| best.name().to_owned()).collect();
     let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
-    let tree = warm_starts(&first.results.snapshot, first.outcome.best);
+    let tree = warm_starts(&first.results.snapshot, first.outcome.best, usize::MAX);
     Ok(StudyFigures {
         best: first.trial,
         study: first.results.snapshot.study,

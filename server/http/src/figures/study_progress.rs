@@ -39,16 +39,17 @@ fn converged(snapshot: &StudySnapshot) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Warm-start tree; `None` before the first warm start.
-pub(crate) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>) -> Option<Figure> {
-    let places: HashMap<TrialId, usize> = snapshot.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
+/// Warm-start tree of the newest trials; `None` before the first warm start.
+pub(crate) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>, newest: usize) -> Option<Figure> {
+    let trials = &snapshot.trials[snapshot.trials.len().saturating_sub(newest)..];
+    let places: HashMap<TrialId, usize> = trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
     let node = |trial: &Trial| Node {
         parent: trial.warm_started_from.and_then(|from| places.get(&from).copied()),
         label: format!("trial {}", trial.number),
         link: format!("/trials/{}", trial.id),
         class: if best == Some(trial.id) { "best" } else { trial.state.as_str() },
     };
-    let nodes: Vec<Node> = snapshot.trials.iter().map(node).collect();
+    let nodes: Vec<Node> = trials.iter().map(node).collect();
     let title = format!("Warm starts of {}", snapshot.study.plan.name);
     nodes.iter().any(|node| node.parent.is_some()).then(|| Figure::tree(Tree { title, nodes }))
 }

@@ -144,6 +144,9 @@ struct Live {
 }
 
 impl Live {
+    /// How many of the newest trials the warm-start tree shows.
+    const BRANCHES: usize = 100;
+
     fn is_best(&self, row: &TrialRow) -> bool {
         self.best.as_ref().is_some_and(|best| best.id == row.id)
     }
@@ -155,7 +158,12 @@ impl Live {
 
     /// Whether answers are missing from the list.
     fn has_more_answers(&self) -> bool {
-        self.answers.len() >= SHOWN as usize
+        self.answers.len() >= ANSWERS
+    }
+
+    /// Whether the warm-start tree shows the newest trials only.
+    fn has_more_branches(&self) -> bool {
+        self.counts.total as usize > Self::BRANCHES
     }
 
     fn is_unsafe(&self, row: &TrialRow) -> bool {
@@ -223,8 +231,10 @@ struct UnsafeGait {
     reviewed: bool,
 }
 
-/// How many of the newest trials of a large study the chart shows, and how many of the newest answers the list shows.
+/// How many of the newest trials of a large study the chart shows.
 const SHOWN: u32 = 200;
+/// How many of the newest answers the list shows.
+const ANSWERS: usize = 50;
 
 /// `GET /studies/{id}`.
 pub(super) async fn get(
@@ -397,7 +407,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
         .map(|trial| running_row(trial, app.scheduler.board().track(trial.id).as_ref()))
         .collect();
     let mut answers = answers(&snapshot, &assessments);
-    answers.truncate(SHOWN as usize);
+    answers.truncate(ANSWERS);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
     let found = Found { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait };
     let pace = time_left(&snapshot, counts.results(), app.scheduler.workers());
@@ -519,7 +529,7 @@ fn view(
         utility: utility.map(|figure| Drawn::of(&figure, &files, "")),
         chart: course(&[(&snapshot, &outcome)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
-        tree: warm_starts(&snapshot, outcome.best).map(|figure| Drawn::of(&figure, &files, "")),
+        tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| Drawn::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
         question: outcome.question && snapshot.study.state != StudyState::Stopped,
