@@ -16,7 +16,7 @@ use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
-    self, Checked, EmgView, LimitCycles, MeasurementFormat, NewEmg, NewMotion, UploadedFile,
+    self, CheckedFile, EmgView, LimitCycles, MeasurementFormat, NewEmg, NewMotion, UploadedFile,
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile};
 use gaitwright_store::{LabSessionId, MeasurementFileId, openapi_schemas};
@@ -147,7 +147,7 @@ async fn keep(
     app: &AppState,
     id: LabSessionId,
     request: &Idempotent<Run>,
-    checked: &Checked,
+    checked: &CheckedFile,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,

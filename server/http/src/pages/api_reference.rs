@@ -4,7 +4,7 @@
 //! complete without scripts and loads nothing from other origins.
 
 use crate::openapi;
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use askama::Template;
 use gaitwright_service::error::Error;
 use serde_json::Value;
@@ -12,13 +12,13 @@ use serde_json::Value;
 #[derive(Template)]
 #[template(path = "api.html")]
 struct ReferencePage {
-    groups: Vec<Group>,
+    groups: Vec<OperationGroup>,
     /// The changes that refuse an Idempotency-Key.
     without_key: Vec<String>,
 }
 
 /// The operations with one tag.
-struct Group {
+struct OperationGroup {
     name: String,
     operations: Vec<Operation>,
 }
@@ -44,7 +44,7 @@ struct Parameter {
 }
 
 /// `GET /api`.
-pub(super) async fn get() -> Page {
+pub(super) async fn get() -> PageResult {
     let document = openapi::value().map_err(|e| Error::Internal(e.to_string()))?;
     let groups = groups(&document);
     let operations = groups.iter().flat_map(|group| &group.operations);
@@ -62,15 +62,15 @@ impl Operation {
     }
 }
 
-fn groups(document: &Value) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
+fn groups(document: &Value) -> Vec<OperationGroup> {
+    let mut groups: Vec<OperationGroup> = Vec::new();
     for (path, item) in document["paths"].as_object().into_iter().flatten() {
         for (method, operation) in item.as_object().into_iter().flatten() {
             let name = operation["tags"][0].as_str().unwrap_or("other").to_owned();
             let described = described(document, path, method, operation);
             match groups.iter_mut().find(|group| group.name == name) {
                 Some(group) => group.operations.push(described),
-                None => groups.push(Group { name, operations: vec![described] }),
+                None => groups.push(OperationGroup { name, operations: vec![described] }),
             }
         }
     }

@@ -11,7 +11,7 @@ use axum::response::Redirect;
 use gait_optimizer::Violation;
 use gait_optimizer::explanation::{Explanation, status_in_words};
 use gaitwright_service::access::Run;
-use gaitwright_service::studies::explanation::{self, Effort, Elapsed, ExplanationState};
+use gaitwright_service::studies::explanation::{self, Elapsed, ExplanationEffort, ExplanationState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{TrialId, commit};
 
@@ -29,8 +29,13 @@ pub(super) struct NoGait {
 
 impl NoGait {
     /// `None` if the trial has a gait or was not solved by the service.
-    pub(super) fn new(trial: &Trial, state: ExplanationState, effort: &Effort, last_event: i64) -> Option<Self> {
-        let elapsed = if let Effort::Running(elapsed) = effort { Some(*elapsed) } else { None };
+    pub(super) fn new(
+        trial: &Trial,
+        state: ExplanationState,
+        effort: &ExplanationEffort,
+        last_event: i64,
+    ) -> Option<Self> {
+        let elapsed = if let ExplanationEffort::Running(elapsed) = effort { Some(*elapsed) } else { None };
         Some(Self { outcome: trial.status.and_then(status_in_words)?, state, elapsed, last_event })
     }
 

@@ -1,13 +1,13 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::page_chart::Drawn;
+use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form as Submitted, Params};
 use crate::figures::reference;
 use crate::form_errors;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -25,7 +25,7 @@ use std::str::FromStr;
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Fields {
+pub(super) struct ReferenceGaitFields {
     name: String,
     format: JointAngleFormat,
     recording: String,
@@ -38,7 +38,7 @@ pub(super) struct Fields {
     body_mass_kg: String,
 }
 
-impl Fields {
+impl ReferenceGaitFields {
     fn read(&self) -> Result<NewReferenceGait, Error> {
         let given = |text: &str| Some(text.trim().to_owned()).filter(|text| !text.is_empty());
         let size = |field, text: &str| given(text).map(|text| number(field, &text)).transpose();
@@ -77,7 +77,7 @@ struct ReferenceGaitsPage {
     /// The subject from whom distances are measured.
     nearest_to: Option<Subject>,
     may_run: bool,
-    fields: Fields,
+    fields: ReferenceGaitFields,
     refused: Option<FieldError>,
 }
 
@@ -94,7 +94,7 @@ impl ReferenceGaitsPage {
             all.map(|reference_gait| ReferenceGaitMatch { reference_gait, distance: None }).collect()
         };
         let subjects = subjects::consenting(db).await?;
-        Ok(Self { matches, subjects, nearest_to, may_run, fields: Fields::default(), refused: None })
+        Ok(Self { matches, subjects, nearest_to, may_run, fields: ReferenceGaitFields::default(), refused: None })
     }
 
     fn refuses(&self, field: &str) -> bool {
@@ -114,7 +114,11 @@ pub(super) struct To {
 }
 
 /// `GET /reference-gaits`.
-pub(super) async fn list(authorized: Authorized<Read>, State(app): State<AppState>, Params(to): Params<To>) -> Page {
+pub(super) async fn list(
+    authorized: Authorized<Read>,
+    State(app): State<AppState>,
+    Params(to): Params<To>,
+) -> PageResult {
     let may_run = authorized.caller.may(Run::NEEDED);
     page(&ReferenceGaitsPage::read(&mut *app.read().await?, to.subject, may_run).await?)
 }
@@ -123,7 +127,7 @@ pub(super) async fn list(authorized: Authorized<Read>, State(app): State<AppStat
 pub(super) async fn import(
     authorized: Authorized<Run>,
     State(mut app): State<AppState>,
-    Submitted(fields): Submitted<Fields>,
+    Submitted(fields): Submitted<ReferenceGaitFields>,
 ) -> Result<Response, PageError> {
     let definition = match fields.read() {
         Ok(new) => new.definition_aside(app.store_mut()).await,
@@ -151,7 +155,7 @@ struct ReferenceGaitPage {
     /// Curves that differ from the built-in reference gait.
     warning: Option<String>,
     steps: Vec<String>,
-    charts: Vec<Drawn>,
+    charts: Vec<PageChart>,
 }
 
 /// `GET /reference-gaits/{id}`.
@@ -159,14 +163,14 @@ pub(super) async fn get(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<ReferenceGaitId, Read>,
-) -> Page {
+) -> PageResult {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
         warning: reference.definition.warning().map_err(Error::from)?,
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
         charts: reference::of_reference(&reference.definition)
             .iter()
-            .map(|figure| Drawn::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
+            .map(|figure| PageChart::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
             .collect(),
         reference,
     })

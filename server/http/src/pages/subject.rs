@@ -7,7 +7,7 @@ use crate::body_measures::{self, feet_and_inches, pounds};
 use crate::extractors::{Form, Params};
 use crate::form_errors;
 use crate::format::{variant, words};
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
@@ -30,11 +30,11 @@ const PAGE: u32 = 100;
 #[derive(Template)]
 #[template(path = "subjects.html")]
 struct SubjectsPage {
-    subjects: Vec<Row>,
+    subjects: Vec<SubjectRow>,
     /// The last subject of this page, if more follow.
     next: Option<SubjectId>,
     may_run: bool,
-    fields: Described,
+    fields: SubjectFields,
     /// Every refused field.
     refused: Vec<FieldError>,
 }
@@ -53,14 +53,14 @@ impl SubjectsPage {
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Described {
+pub(super) struct SubjectFields {
     pseudonym: String,
     height_m: String,
     body_mass_kg: String,
     notes: String,
 }
 
-impl Described {
+impl SubjectFields {
     fn read(&self) -> Result<NewSubject, Error> {
         let (height_m, body_mass_kg) = body_of(&self.height_m, &self.body_mass_kg)?;
         Ok(NewSubject { pseudonym: self.pseudonym.clone(), height_m, body_mass_kg, notes: self.notes.clone() })
@@ -73,7 +73,7 @@ fn body_of(height: &str, mass: &str) -> Result<(f64, f64), Error> {
 }
 
 /// Every field of a new subject that would be refused, in the order of the form.
-fn faults(fields: &Described) -> Vec<FieldError> {
+fn faults(fields: &SubjectFields) -> Vec<FieldError> {
     let mut repaired = fields.clone();
     let mut found: Vec<FieldError> = Vec::new();
     // Each field is refused once, and an acceptable value takes its place.
@@ -94,7 +94,7 @@ fn faults(fields: &Described) -> Vec<FieldError> {
     found
 }
 
-struct Row {
+struct SubjectRow {
     subject: Subject,
     consent: &'static str,
     withdrawn: bool,
@@ -152,7 +152,7 @@ impl Correcting {
 
 /// The entries of a refused form of the page.
 #[derive(Default)]
-enum Typed {
+enum RefusedForm {
     #[default]
     Nothing,
     Correction(Correcting),
@@ -176,7 +176,7 @@ struct SessionRow {
 
 /// Which subjects to show.
 #[derive(Debug, Deserialize)]
-pub(super) struct Before {
+pub(super) struct SubjectsBefore {
     before: Option<SubjectId>,
 }
 
@@ -184,16 +184,16 @@ pub(super) struct Before {
 pub(super) async fn list(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
-    Params(Before { before }): Params<Before>,
-) -> Page {
-    show_list(&app, before, authorized.caller.may(Run::NEEDED), Described::default(), Vec::new()).await
+    Params(SubjectsBefore { before }): Params<SubjectsBefore>,
+) -> PageResult {
+    show_list(&app, before, authorized.caller.may(Run::NEEDED), SubjectFields::default(), Vec::new()).await
 }
 
 /// `POST /subjects`: adds one, before it has a study.
 pub(super) async fn add(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
-    Form(fields): Form<Described>,
+    Form(fields): Form<SubjectFields>,
 ) -> Result<Response, PageError> {
     let added = async {
         let new = fields.read()?;
@@ -220,9 +220,9 @@ async fn show_list(
     app: &AppState,
     before: Option<SubjectId>,
     may_run: bool,
-    fields: Described,
+    fields: SubjectFields,
     refused: Vec<FieldError>,
-) -> Page {
+) -> PageResult {
     let mut reader = app.read().await?;
     let mut found = subjects::page(&mut reader, before, PAGE + 1).await?;
     let more = found.len() > PAGE as usize;
@@ -233,7 +233,7 @@ async fn show_list(
         let consents = consents::of_subject(&mut reader, subject.id).await?;
         let last = consents.last();
         let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
-        rows.push(Row { subject, consent: last.map_or("not on record", |last| last.kind.as_str()), withdrawn });
+        rows.push(SubjectRow { subject, consent: last.map_or("not on record", |last| last.kind.as_str()), withdrawn });
     }
     page(&SubjectsPage { subjects: rows, next, may_run, fields, refused })
 }
@@ -243,11 +243,17 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
-) -> Page {
-    show(&app, id, &authorized.caller, None, Typed::Nothing).await
+) -> PageResult {
+    show(&app, id, &authorized.caller, None, RefusedForm::Nothing).await
 }
 
-async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>, typed: Typed) -> Page {
+async fn show(
+    app: &AppState,
+    id: SubjectId,
+    caller: &Caller,
+    refused: Option<String>,
+    typed: RefusedForm,
+) -> PageResult {
     let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
@@ -265,9 +271,9 @@ async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<St
     let corrected = corrections.last().map_or(0, |last| last.seq);
     let (mut correction, mut withdrawal_reason) = (Correcting::of(&subject), String::new());
     match typed {
-        Typed::Nothing => {}
-        Typed::Correction(typed) => correction = typed,
-        Typed::Withdrawal(reason) => withdrawal_reason = reason,
+        RefusedForm::Nothing => {}
+        RefusedForm::Correction(typed) => correction = typed,
+        RefusedForm::Withdrawal(reason) => withdrawal_reason = reason,
     }
     page(&SubjectPage {
         subject,
@@ -321,7 +327,7 @@ pub(super) async fn consent(
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let done = give(&app, &authorized, id, form).await;
-    answer(&app, id, &authorized.caller, done, Typed::Nothing).await
+    answer(&app, id, &authorized.caller, done, RefusedForm::Nothing).await
 }
 
 async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
@@ -349,7 +355,7 @@ pub(super) async fn withdraw(
             "Nothing was changed. First tick the box to confirm that all studies of this subject stop.",
         ))
     };
-    answer(&app, id, &authorized.caller, done, Typed::Withdrawal(why.reason)).await
+    answer(&app, id, &authorized.caller, done, RefusedForm::Withdrawal(why.reason)).await
 }
 
 /// The form of a withdrawal.
@@ -395,7 +401,7 @@ pub(super) async fn correct(
         refused: true,
     };
     let done = set_right(&app, &authorized, id, form).await;
-    answer(&app, id, &authorized.caller, done, Typed::Correction(typed)).await
+    answer(&app, id, &authorized.caller, done, RefusedForm::Correction(typed)).await
 }
 
 async fn set_right(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
@@ -416,7 +422,7 @@ async fn answer(
     id: SubjectId,
     caller: &Caller,
     done: Result<(), Error>,
-    typed: Typed,
+    typed: RefusedForm,
 ) -> Result<Response, PageError> {
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),

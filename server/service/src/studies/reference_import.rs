@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::printable;
 use gait_optimizer::ReferenceGait as Definition;
-use gait_optimizer::reference::{AngleUnit, HeelStrikes, MotionRecording, Walker};
+use gait_optimizer::reference::{AngleUnit, HeelStrikes, MeasuredPerson, MotionRecording};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::{Store, Writer};
@@ -140,7 +140,7 @@ impl NewReferenceGait {
             Strikes::Kinematics => HeelStrikes::Kinematics,
             Strikes::Ends => HeelStrikes::Ends,
         };
-        let walker = Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
+        let walker = MeasuredPerson { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
         let definition = recording.reference(name, &strikes, walker)?;
         if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
             let allowed = format!("a file with at most {LONGEST_PROVENANCE_BYTES} bytes of comments above its columns");

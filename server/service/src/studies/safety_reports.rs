@@ -184,7 +184,7 @@ impl SafetyReports {
             found.closed.push(Closed { trial, by, at, source: SafetyReportSource::Alone(report.id), review: None });
         }
         for session in lab_sessions::of_study(db, study).await? {
-            if session.done(lab_sessions::Act::Unblinded).is_some() {
+            if session.done(lab_sessions::SessionStep::Unblinded).is_some() {
                 // After unblinding its answers are assessments or preferences.
                 continue;
             }
