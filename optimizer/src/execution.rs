@@ -38,7 +38,7 @@ use crate::gait::Gait;
 use crate::model_error::ModelError;
 use disturbance::{Disturbance, LADDER_N_S, MassChanges, Push, YIELD_LADDER_M};
 use serde::{Deserialize, Serialize};
-use simulated_walk::{End, WalkOutcome, Walker};
+use simulated_walk::{SimulatedWalker, WalkEnd, WalkOutcome};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Version of the layout of [`ExecutionReport`] and of the simulation.
@@ -108,7 +108,7 @@ pub fn simulate(
 ) -> Result<Option<ExecutionReport>, ModelError> {
     options.validate()?;
     let gait_sha256 = CertifiedGait::of(gait)?.gait_sha256;
-    let walker = Walker::new(gait)?;
+    let walker = SimulatedWalker::new(gait)?;
     let strides = options.strides;
     let undisturbed = walker.walk(&Disturbance::none(), strides)?;
     let pushed_within_s = 0.5 * f64::from(strides) * walker.stride_s();
@@ -135,7 +135,7 @@ pub fn simulate(
             Ok(StridesOnYield { yield_m, strides: outcome.strides })
         })
         .collect::<Result<_, ModelError>>()?;
-    let pushes = if undisturbed.end == End::Completed { Some(survived_pushes(&walker, strides)?) } else { None };
+    let pushes = if undisturbed.end == WalkEnd::Completed { Some(survived_pushes(&walker, strides)?) } else { None };
     Ok(Some(ExecutionReport {
         format_version: FORMAT_VERSION,
         gait_sha256,
@@ -149,12 +149,12 @@ pub fn simulate(
     }))
 }
 
-fn survived_pushes(walker: &Walker<'_>, strides: u32) -> Result<SurvivedPushes, ModelError> {
+fn survived_pushes(walker: &SimulatedWalker<'_>, strides: u32) -> Result<SurvivedPushes, ModelError> {
     let largest = |direction: f64| {
         let mut survived = 0.0;
         for impulse in LADDER_N_S {
             let push = Push { start_s: STRIDES_BEFORE_PUSH * walker.stride_s(), impulse_n_s: direction * impulse };
-            if walker.walk(&Disturbance::only(push), strides)?.end != End::Completed {
+            if walker.walk(&Disturbance::only(push), strides)?.end != WalkEnd::Completed {
                 break;
             }
             survived = impulse;

@@ -24,7 +24,7 @@ pub use given_bound::GivenBound;
 use relaxation::alone;
 pub use relaxation::{JointRelaxation, Relaxation, RelaxedBound};
 use search::Search;
-use solves::{Solves, Stop, Unmet};
+use solves::{SearchEnd, Solves, Unmet};
 pub use words::{quantity, status_in_words, unit_after_number};
 
 /// Largest number of bounds in a joint relaxation.
@@ -122,12 +122,12 @@ impl Search<'_> {
     }
 
     /// An irreducible conflict among the bounds, with those of `without` at their loosest values.
-    fn conflict(&mut self, without: BoundSet) -> Result<Option<BoundSet>, Stop> {
+    fn conflict(&mut self, without: BoundSet) -> Result<Option<BoundSet>, SearchEnd> {
         let order: Vec<usize> = self.order.iter().copied().filter(|bound| !without.contains(*bound)).collect();
         conflict(&order, |set| Ok(self.level(BoundSet::ALL.without(set))?.is_some()))
     }
 
-    fn described(&self, set: BoundSet, without: BoundSet) -> Result<Conflict, Stop> {
+    fn described(&self, set: BoundSet, without: BoundSet) -> Result<Conflict, SearchEnd> {
         let share = self.problem.settings.naturalness.trailing_load_share;
         let naturalness_terms = if set == BoundSet::EMPTY && share > 0.0 {
             vec![format!("at least {share} of the weight on the trailing foot at heel strike")]
@@ -149,7 +149,7 @@ impl Search<'_> {
     }
 
     /// The failed searches with a relaxed set at each level, the loosest last.
-    fn searched(&self, set: BoundSet) -> Result<Vec<&Unmet>, Stop> {
+    fn searched(&self, set: BoundSet) -> Result<Vec<&Unmet>, SearchEnd> {
         let mut known: Vec<&Unmet> = Vec::new();
         for level in [Level::Usual, Level::Loosest] {
             let unmet = self.solves.unmet(&loosened(&self.problem.bounds, set, level)?);
@@ -189,8 +189,8 @@ pub fn explain(
     }
     match found_out(problem, unsolved, options, progress, cancel) {
         Ok(explanation) => Ok(Some(explanation)),
-        Err(Stop::Cancelled) => Ok(None),
-        Err(Stop::Failed(error)) => Err(error),
+        Err(SearchEnd::Cancelled) => Ok(None),
+        Err(SearchEnd::Failed(error)) => Err(error),
     }
 }
 
@@ -200,7 +200,7 @@ fn found_out(
     options: &SolveOptions,
     progress: &mut dyn FnMut(&str),
     cancel: &CancelToken,
-) -> Result<Explanation, Stop> {
+) -> Result<Explanation, SearchEnd> {
     let Unsolved { status, violations, last } = unsolved;
     let program = problem.program(problem.muscles)?;
     let x = &last.point.x;
@@ -238,7 +238,7 @@ fn found_out(
     explanation.conflicts.push(search.described(first, BoundSet::EMPTY)?);
     let found = {
         let search = RefCell::new(&mut search);
-        let gives_a_gait = |set| Ok::<_, Stop>(search.borrow_mut().level(set)?.is_some());
+        let gives_a_gait = |set| Ok::<_, SearchEnd>(search.borrow_mut().level(set)?.is_some());
         remedies(first, MOST_TOGETHER, gives_a_gait, |without| search.borrow_mut().conflict(without))?
     };
     for (conflict, without) in found.conflicts {

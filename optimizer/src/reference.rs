@@ -14,4 +14,4 @@ pub use matching::{distance, nearest};
 pub use mean_stride::{RecordedStride, STRIDE_RANGE_S};
 pub use motion_recording::{MotionRecording, VerticalForce};
 pub(crate) use reference_gait::LARGEST_ANGLE_RAD;
-pub use reference_gait::{DEVIATION_COLUMNS, REFERENCE_COLUMNS, REFERENCE_ROWS, ReferenceGait, Walker};
+pub use reference_gait::{DEVIATION_COLUMNS, MeasuredPerson, REFERENCE_COLUMNS, REFERENCE_ROWS, ReferenceGait};

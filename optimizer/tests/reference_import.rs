@@ -7,7 +7,9 @@ mod noise;
 mod synthetic_recordings;
 
 use gait_optimizer::export::motion_file;
-use gait_optimizer::reference::{AngleUnit, HeelStrikes, MotionRecording, VerticalForce, Walker, distance, nearest};
+use gait_optimizer::reference::{
+    AngleUnit, HeelStrikes, MeasuredPerson, MotionRecording, VerticalForce, distance, nearest,
+};
 use gait_optimizer::{ModelError, ReferenceGait, Subject};
 use golden_gaits::golden_gait;
 use noise::noise;
@@ -125,7 +127,7 @@ fn forces_from_a_separate_file_have_their_own_rate() {
     for (k, strike) in strikes.iter().enumerate() {
         assert!((strike - 1.1 * k as f64).abs() < 2e-3 || (strike - 1.1 * (k + 1) as f64).abs() < 2e-3, "{strikes:?}");
     }
-    let reference = recording.reference("x", &HeelStrikes::Force, Walker::default()).unwrap();
+    let reference = recording.reference("x", &HeelStrikes::Force, MeasuredPerson::default()).unwrap();
     assert!(
         reference.provenance.contains("walk_grf.mot: 6001 rows, ground_force_vy is the force under the right foot")
     );
@@ -147,7 +149,7 @@ fn camargo_forces_segment_the_strides() {
     for (k, strike) in strikes.iter().enumerate() {
         assert!((strike - 1.1 * (k + 1) as f64).abs() < 2e-3, "{strikes:?}");
     }
-    let provenance = recording.reference("x", &HeelStrikes::Force, Walker::default()).unwrap().provenance;
+    let provenance = recording.reference("x", &HeelStrikes::Force, MeasuredPerson::default()).unwrap().provenance;
     assert!(provenance.contains("fp.csv: 5501 rows, Treadmill_R_vy"), "{provenance}");
 }
 
@@ -160,15 +162,15 @@ fn strides_with_gaps_are_dropped() {
     let header = header.replace("nRows=551", &format!("nRows={}", kept.len()));
     let text = format!("{header}lumbar_extension\tright_vy\n{}\n", kept.join("\n"));
     let given = HeelStrikes::Given(vec![0.0, 1.1, 2.2, 3.3, 4.4]);
-    let reference = read(&text).unwrap().reference("x", &given, Walker::default()).unwrap();
+    let reference = read(&text).unwrap().reference("x", &given, MeasuredPerson::default()).unwrap();
     assert!(reference.provenance.contains("mean of 3 strides of 0.8 to 1.6 s, without gaps above 0.1 s (1 dropped)"));
     assert!(reference.provenance.contains("5 right heel strikes given: 0.0000, 1.1000, 2.2000, 3.3000, 4.4000 s"));
-    let of_whole = read(&whole).unwrap().reference("x", &given, Walker::default()).unwrap();
+    let of_whole = read(&whole).unwrap().reference("x", &given, MeasuredPerson::default()).unwrap();
     for (ours, theirs) in reference.angles_rad.iter().flatten().zip(of_whole.angles_rad.iter().flatten()) {
         assert!((ours - theirs).abs() < 1e-9);
     }
     let only_that = HeelStrikes::Given(vec![2.2, 3.3]);
-    let refused = read(&text).unwrap().reference("x", &only_that, Walker::default()).unwrap_err().to_string();
+    let refused = read(&text).unwrap().reference("x", &only_that, MeasuredPerson::default()).unwrap_err().to_string();
     assert!(refused.contains("no stride without gaps above 0.1 s lasts 0.8 to 1.6 s"), "{refused}");
 }
 
@@ -198,7 +200,7 @@ fn implausible_reference_is_rejected_with_the_field() {
 #[test]
 fn strides_are_averaged_with_standard_deviation_and_provenance() {
     let recording = read(&opensim(5)).unwrap();
-    let walker = Walker { height_m: Some(1.75), body_mass_kg: Some(70.0) };
+    let walker = MeasuredPerson { height_m: Some(1.75), body_mass_kg: Some(70.0) };
     // The stride between the other two is too long.
     let strikes = HeelStrikes::Given(vec![0.0, 1.1, 3.3, 4.4]);
     let reference = recording.reference("synthetic", &strikes, walker).unwrap();
@@ -227,7 +229,7 @@ fn exported_gait_is_imported_with_the_same_curves() {
         // Linear interpolation has an error of h²/8 qdd = 3e-6 rad at 90 rad/s². An impact that changes a velocity by
         // 10 rad/s between two rows gives h/4 times that: 1.3e-3 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
-        let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
+        let reference = recording.reference("gait", &HeelStrikes::Ends, MeasuredPerson::default()).unwrap();
         assert!(
             reference
                 .provenance
@@ -296,7 +298,7 @@ fn exchanged_hips_are_rejected() {
     let refused = |change: fn(&mut [f64; 5]), how: &HeelStrikes| {
         let mut other = recording.clone();
         other.angles_rad.iter_mut().for_each(change);
-        other.reference("x", how, Walker::default()).unwrap_err().to_string()
+        other.reference("x", how, MeasuredPerson::default()).unwrap_err().to_string()
     };
     let behind = "at right heel strike the right thigh is 50° behind the left one";
     for change in [
@@ -307,7 +309,7 @@ fn exchanged_hips_are_rejected() {
         assert!(reason.contains(behind), "{reason}");
     }
     // Heel strikes of the left foot.
-    let left = recording.reference("x", &HeelStrikes::Given(vec![0.55, 1.65, 2.75]), Walker::default());
+    let left = recording.reference("x", &HeelStrikes::Given(vec![0.55, 1.65, 2.75]), MeasuredPerson::default());
     assert!(left.unwrap_err().to_string().contains(behind));
 }
 
@@ -361,7 +363,7 @@ fn nearest_reference_in_height_and_mass_is_chosen() {
 fn recordings_without_a_stride_are_rejected_with_the_reason() {
     let recording = read(&opensim(2)).unwrap();
     let refused = |strikes: Vec<f64>| {
-        recording.reference("x", &HeelStrikes::Given(strikes), Walker::default()).unwrap_err().to_string()
+        recording.reference("x", &HeelStrikes::Given(strikes), MeasuredPerson::default()).unwrap_err().to_string()
     };
     assert!(refused(vec![0.5]).contains("right heel strikes found: 1; a stride needs two"));
     assert!(refused(vec![0.5, 0.9]).contains("lasts 0.8 to 1.6 s"));
@@ -370,13 +372,13 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
     // Forces that end before the first stride.
     let force = VerticalForce { time_s: vec![0.0, 0.1, 0.2], force_n: vec![0.0; 3] };
     let early = MotionRecording { right_force: Some(force), ..recording.clone() };
-    let early = early.reference("x", &HeelStrikes::Force, Walker::default()).unwrap_err().to_string();
+    let early = early.reference("x", &HeelStrikes::Force, MeasuredPerson::default()).unwrap_err().to_string();
     let expected =
         "right heel strikes found: 0 (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s); a stride needs two";
     assert!(early.contains(expected), "{early}");
     let unforced = MotionRecording::from_opensim("x", &opensim(2), None, None).unwrap();
     assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));
-    let short = Walker { height_m: Some(0.5), ..Walker::default() };
+    let short = MeasuredPerson { height_m: Some(0.5), ..MeasuredPerson::default() };
     let error = recording.reference("x", &HeelStrikes::Given(vec![0.0, 1.1]), short).unwrap_err();
     assert!(error.to_string().contains("height_m is 0.5;"));
 }
@@ -401,7 +403,7 @@ fn of_fractions(angles_at: impl Fn(f64) -> [f64; 7]) -> MotionRecording {
 /// The error or the warning for a recording that is segmented at 0 s, 1.1 s, ...; empty if there is neither.
 fn said_of(recording: &MotionRecording) -> String {
     let given = HeelStrikes::Given((0..5).map(|k| 1.1 * f64::from(k)).collect());
-    match recording.reference("walk", &given, Walker::default()) {
+    match recording.reference("walk", &given, MeasuredPerson::default()) {
         Ok(reference) => remark(&reference),
         Err(refused) => format!("refused: {refused}"),
     }
@@ -419,7 +421,7 @@ fn impossible_mean_strides_are_rejected() {
     let unaltered = walk(0.0, |angles| angles);
     assert_eq!(said_of(&unaltered), "", "the walk as it is");
     // The right heel is farthest ahead slightly before heel strike.
-    let found = unaltered.reference("walk", &HeelStrikes::Kinematics, Walker::default()).unwrap();
+    let found = unaltered.reference("walk", &HeelStrikes::Kinematics, MeasuredPerson::default()).unwrap();
     assert_eq!(remark(&found), "", "{}", found.provenance);
     let cases: [(Angles, &str); 6] = [
         (
@@ -540,7 +542,7 @@ fn computed_gaits_can_become_reference_gaits() {
         let (_, gait) = golden_gait(subject, muscles);
         let recording =
             MotionRecording::from_opensim("gait.mot", &motion_file(&gait, 200.0).unwrap(), None, None).unwrap();
-        let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
+        let reference = recording.reference("gait", &HeelStrikes::Ends, MeasuredPerson::default()).unwrap();
         println!("| subject {subject}, muscles {muscles} | {} |", remark(&reference));
     }
 }

@@ -9,7 +9,7 @@ use gait_optimizer::{
 use gaitwright_service::access::Reach;
 use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
-use gaitwright_service::workers::nats::{Order, ResultMessage, pack};
+use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
 use gaitwright_service::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
 use gaitwright_store::studies::{FeedbackMode, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialState;
@@ -430,7 +430,7 @@ fn broker_delivers_a_result_with_muscles() {
     assert!(outcome.gait.domains.iter().all(|domain| domain.muscles.is_some()));
     let iterations: Vec<_> = iterations.iter().cycle().take(3000).copied().collect();
     order.warm_start = Some(outcome.warm_start.clone());
-    let order = pack(&Order { program: String::new(), assignment: order }).unwrap().len();
+    let order = pack(&SolveOrder { program: String::new(), assignment: order }).unwrap().len();
     let finding = Finding::Ended { outcome: Box::new(outcome), iterations };
     let result = pack(&ResultMessage { attempt, worker: "worker".to_owned(), finding }).unwrap().len();
     eprintln!("a job takes {order} bytes, a result {result}");

@@ -34,7 +34,7 @@ struct InformationGain<'a> {
 }
 
 /// Joint moments of the utilities of an action and its partner.
-struct Pair {
+struct JointMoments {
     mean: [f64; 2],
     variance: [f64; 2],
     covariance: f64,
@@ -72,7 +72,7 @@ impl<'a> InformationGain<'a> {
 
     /// Information of the label and the comparison of an action, in nats. With separate labels, `feasibility` is the
     /// mean and variance of its feasibility.
-    fn of(&self, utility: &Pair, feasibility: Option<(f64, f64)>) -> f64 {
+    fn of(&self, utility: &JointMoments, feasibility: Option<(f64, f64)>) -> f64 {
         let about_utility = self.about_utility(utility);
         let Some((mean, variance)) = feasibility else { return about_utility };
         let lowest = self.settings.feasibility_interval(0);
@@ -86,7 +86,7 @@ impl<'a> InformationGain<'a> {
     }
 
     /// Information of the preference and the grade, in nats.
-    fn about_utility(&self, Pair { mean, variance, covariance, compared }: &Pair) -> f64 {
+    fn about_utility(&self, JointMoments { mean, variance, covariance, compared }: &JointMoments) -> f64 {
         let sd = variance[0].max(1e-18).sqrt();
         let slope = covariance / sd;
         let rest = (variance[1] - slope * slope).max(0.0).sqrt();
@@ -135,7 +135,7 @@ pub(crate) fn over_candidates(
     for _ in 0..CANDIDATES {
         let action = taken.random_other(random)?;
         let view = utility.view(action, space.levels(action));
-        let pair = Pair {
+        let pair = JointMoments {
             mean: [view.mean, other.mean],
             variance: [utility.variance(&view), other_variance],
             covariance: utility.covariance(&view, &other),
@@ -165,7 +165,7 @@ mod tests {
     use crate::settings::Method;
 
     /// Mutual information of all feedback with both processes, by its definition and plain Monte Carlo.
-    fn by_definition(settings: &LearnerSettings, utility: &Pair, feasibility: (f64, f64)) -> f64 {
+    fn by_definition(settings: &LearnerSettings, utility: &JointMoments, feasibility: (f64, f64)) -> f64 {
         let mut random = Random::new(5, 0);
         let better = Interval { low: 0.0, high: f64::INFINITY, noise: settings.preference_noise };
         let count = 40_000;
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn information_with_separate_labels_matches_its_definition() {
-        let utility = |compared| Pair { mean: [0.3, 0.0], variance: [0.8, 0.5], covariance: 0.2, compared };
+        let utility = |compared| JointMoments { mean: [0.3, 0.0], variance: [0.8, 0.5], covariance: 0.2, compared };
         for ordinal_thresholds in [vec![0.0], vec![-0.2, 0.3, 0.9]] {
             let settings = LearnerSettings {
                 ordinal_thresholds,

@@ -10,7 +10,7 @@ use crate::observations::{ObservedPoints, Site};
 
 /// The normal factor of one site, in natural parameters.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Factor {
+pub(crate) struct SiteFactor {
     pub(crate) precision: f64,
     pub(crate) shift: f64,
 }
@@ -24,7 +24,7 @@ pub(crate) struct Approximation {
     /// `L^-1 mean`, length `n`.
     pub(crate) whitened: Vec<f64>,
     /// One for each site.
-    pub(crate) factors: Vec<Factor>,
+    pub(crate) factors: Vec<SiteFactor>,
     pub(crate) covariance: Square,
 }
 
@@ -56,7 +56,7 @@ impl Approximation {
 }
 
 /// Cholesky factor of `B = I + L' W L`, `W = sum_s precision_s a_s a_s'`, `a_s` the coefficients of site `s`.
-pub(crate) fn whitened_precision(prior: &Cholesky, sites: &[Site], factors: &[Factor]) -> Result<Cholesky> {
+pub(crate) fn whitened_precision(prior: &Cholesky, sites: &[Site], factors: &[SiteFactor]) -> Result<Cholesky> {
     let n = prior.order();
     // W L: each site has at most two non-zero coefficients.
     let mut product = Square::zeros(n);

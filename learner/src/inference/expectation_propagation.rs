@@ -3,7 +3,7 @@
 //! Each update chooses the normal factor that matches mean and variance of the site's functional under the exact
 //! likelihood of the site times its cavity.
 
-use super::approximation::{Approximate, Approximation, Factor, whitened_precision};
+use super::approximation::{Approximate, Approximation, SiteFactor, whitened_precision};
 use super::site_updates::{Cavity, WorkingApproximation, shifts};
 use crate::error::{LearnerError, Result};
 use crate::likelihood::Link;
@@ -42,7 +42,7 @@ const UNDAMPED: usize = 100;
 const REFRESH: usize = 10;
 
 /// The factor that matches the moments of the site's likelihood times its cavity.
-fn matching_factor(site: &Site, cavity: Cavity) -> Option<Factor> {
+fn matching_factor(site: &Site, cavity: Cavity) -> Option<SiteFactor> {
     let variance = 1.0 / cavity.precision;
     let at = mass(site, cavity);
     let mean = cavity.mean + variance * at.slope;
@@ -50,13 +50,13 @@ fn matching_factor(site: &Site, cavity: Cavity) -> Option<Factor> {
     let shrink = (variance * at.curvature).min(1.0 - 1e-12);
     let precision = at.curvature / (1.0 - shrink);
     let shift = mean * (cavity.precision + precision) - cavity.mean * cavity.precision;
-    (precision.is_finite() && shift.is_finite()).then_some(Factor { precision, shift })
+    (precision.is_finite() && shift.is_finite()).then_some(SiteFactor { precision, shift })
 }
 
 impl Approximate for ExpectationPropagation {
     fn approximate(&self, observed: &ObservedPoints, _link: Link) -> Result<Approximation> {
         let (prior, sites) = (&observed.prior, &observed.sites);
-        let mut working = WorkingApproximation::of(prior, sites, vec![Factor::default(); sites.len()])?;
+        let mut working = WorkingApproximation::of(prior, sites, vec![SiteFactor::default(); sites.len()])?;
         // Settled means that no site needs an update of a mean and a covariance that were just recomputed.
         let (mut recomputed, mut tolerance) = (true, self.tolerance);
         for sweep in 1..=self.sweeps {

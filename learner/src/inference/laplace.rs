@@ -4,7 +4,7 @@
 //! P` is `B = I + L' W L`, whose eigenvalues are at least 1, and `K` is never inverted (Rasmussen and Williams 2006,
 //! algorithm 3.1).
 
-use super::approximation::{Approximate, Approximation, Factor, covariance, whitened_precision};
+use super::approximation::{Approximate, Approximation, SiteFactor, covariance, whitened_precision};
 use crate::error::{LearnerError, Result};
 use crate::likelihood::Link;
 use crate::linalg::dot;
@@ -32,7 +32,7 @@ impl Approximate for Laplace {
         let mut at_mode = false;
         for _ in 0..MAX_STEPS {
             let mut slope = vec![0.0; n];
-            let factors: Vec<Factor> = sites
+            let factors: Vec<SiteFactor> = sites
                 .iter()
                 .map(|site| {
                     let d = site.of(&f);
@@ -41,7 +41,7 @@ impl Approximate for Laplace {
                     if let Some(minus) = site.minus {
                         slope[minus] -= at.slope;
                     }
-                    Factor { precision: at.curvature, shift: at.slope + at.curvature * d }
+                    SiteFactor { precision: at.curvature, shift: at.slope + at.curvature * d }
                 })
                 .collect();
             let precision = whitened_precision(prior, sites, &factors)?;

@@ -4,7 +4,7 @@
 //! that a site needs none costs `O(1)`. The new factor follows from the cavity of the site: the distribution of its
 //! functional under all other factors.
 
-use super::approximation::{Approximation, Factor, covariance, whitened_precision};
+use super::approximation::{Approximation, SiteFactor, covariance, whitened_precision};
 use crate::error::Result;
 use crate::linalg::{Cholesky, Square, add_scaled};
 use crate::observations::Site;
@@ -17,7 +17,7 @@ pub(super) struct Cavity {
 }
 
 /// The new factor of a site, given its cavity. `None` keeps the present factor.
-pub(super) type Rule<'a> = dyn Fn(&Site, Cavity) -> Option<Factor> + 'a;
+pub(super) type Rule<'a> = dyn Fn(&Site, Cavity) -> Option<SiteFactor> + 'a;
 
 /// Smallest precision of a usable cavity, as a share of the precision of the marginal.
 const MIN_CAVITY: f64 = 1e-10;
@@ -33,12 +33,12 @@ pub(super) struct WorkingApproximation {
     /// traffic.
     delayed: Vec<(f64, Vec<f64>)>,
     pub(super) mean: Vec<f64>,
-    pub(super) factors: Vec<Factor>,
+    pub(super) factors: Vec<SiteFactor>,
 }
 
 impl WorkingApproximation {
     /// The approximation of these factors.
-    pub(super) fn of(prior: &Cholesky, sites: &[Site], factors: Vec<Factor>) -> Result<Self> {
+    pub(super) fn of(prior: &Cholesky, sites: &[Site], factors: Vec<SiteFactor>) -> Result<Self> {
         let mut working =
             Self { covariance: Square::zeros(prior.order()), delayed: Vec::new(), mean: Vec::new(), factors };
         working.refresh(prior, sites)?;
@@ -74,7 +74,7 @@ impl WorkingApproximation {
     }
 
     /// The cavity of a site with this factor. `None` if it is improper.
-    pub(super) fn cavity(&self, site: &Site, factor: Factor) -> Option<Cavity> {
+    pub(super) fn cavity(&self, site: &Site, factor: SiteFactor) -> Option<Cavity> {
         let variance = self.variance(site);
         if variance.is_nan() || variance < 1e-14 {
             return None;
@@ -107,7 +107,7 @@ impl WorkingApproximation {
             self.apply_delayed();
         }
         self.factors[index] =
-            Factor { precision: old.precision + share * more_precision, shift: old.shift + share * more_shift };
+            SiteFactor { precision: old.precision + share * more_precision, shift: old.shift + share * more_shift };
         true
     }
 
@@ -147,7 +147,7 @@ impl WorkingApproximation {
 }
 
 /// `sum_s shift_s a_s`, `a_s` the coefficients of site `s`.
-pub(super) fn shifts(n: usize, sites: &[Site], factors: &[Factor]) -> Vec<f64> {
+pub(super) fn shifts(n: usize, sites: &[Site], factors: &[SiteFactor]) -> Vec<f64> {
     let mut h = vec![0.0; n];
     for (site, factor) in sites.iter().zip(factors) {
         h[site.plus] += factor.shift;

@@ -3,7 +3,7 @@
 use crate::barrier;
 use crate::iterate::{Iterate, SolveSession, StepRecord};
 use crate::line_search_filter::{GAMMA_PHI, GAMMA_THETA, not_above};
-use crate::line_search_state::{MeritReference, Watch};
+use crate::line_search_state::{MeritReference, Watchdog};
 
 /// Type of an accepted trial point.
 #[derive(Clone, Copy)]
@@ -57,7 +57,7 @@ impl Iterate<'_> {
             self.search.shortened = 0;
             self.search.watched_point.copy_from(&self.point);
             self.search.watched_direction.copy_from(&self.direction);
-            self.search.watch = Some(Watch { reference, alpha, trials: 0 });
+            self.search.watch = Some(Watchdog { reference, alpha, trials: 0 });
         }
         if let Some(mut watch) = self.search.watch.take() {
             let (theta, phi, finite) = self.try_step(alpha, false);

@@ -15,7 +15,7 @@ pub(crate) struct LineSearchState {
     /// Counts shortened steps: each adds two, each full step subtracts one, so that alternating steps trigger the
     /// watchdog too.
     pub shortened: usize,
-    pub watch: Option<Watch>,
+    pub watch: Option<Watchdog>,
     /// Point and direction that the watchdog returns to.
     pub watched_point: PrimalDual,
     pub watched_direction: PrimalDual,
@@ -23,7 +23,7 @@ pub(crate) struct LineSearchState {
 
 /// The watchdog: its reference, the length of its first step and the number of its trials.
 #[derive(Clone, Copy)]
-pub(crate) struct Watch {
+pub(crate) struct Watchdog {
     pub reference: MeritReference,
     pub alpha: f64,
     pub trials: usize,

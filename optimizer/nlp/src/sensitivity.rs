@@ -16,7 +16,7 @@ use crate::newton_system::NewtonSystem;
 use crate::nonlinear_program::NonlinearProgram;
 use crate::primal_dual::PrimalDual;
 use crate::settings::NlpSettings;
-use crate::solve::{Pushes, check_start, place};
+use crate::solve::{StartDistances, check_start, place};
 use crate::starting_point::{StartPoint, WarmPoint};
 use crate::status::NlpError;
 use thiserror::Error;
@@ -119,7 +119,7 @@ pub fn sensitivities(
         check_lengths(&form, parameter)?;
     }
     // The point is used as it is.
-    let pushes = Pushes { bound: 0.0, multiplier: f64::MIN_POSITIVE };
+    let pushes = StartDistances { bound: 0.0, multiplier: f64::MIN_POSITIVE };
     let at = place(&mut form, &start, settings, pushes);
     let mu = smallest_mu(settings, form.objective_scale);
     let mut iterate = Iterate::new(form, at, mu);

@@ -42,7 +42,7 @@ pub fn solve(
         StartPoint::Cold(_) => settings.bound_push,
         StartPoint::Warm(_) => settings.warm_bound_push,
     };
-    let point = place(&mut form, start, settings, Pushes { bound, multiplier });
+    let point = place(&mut form, start, settings, StartDistances { bound, multiplier });
     let mut run = Iterate::new(form, point, mu);
     run.evaluate();
     check_evaluations(&run)?;
@@ -86,7 +86,7 @@ pub fn solve(
 
 /// Least distances of a start from the boundary of the feasible set.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pushes {
+pub(crate) struct StartDistances {
     /// Distance from a bound, relative to its magnitude and to the distance between two bounds.
     pub bound: f64,
     /// Smallest bound multiplier of a warm point.
@@ -94,7 +94,12 @@ pub(crate) struct Pushes {
 }
 
 /// The point of a start within its bounds, in the scaling that it determines. Without multipliers for a cold start.
-pub(crate) fn place(form: &mut Formulation, start: &StartPoint, settings: &NlpSettings, pushes: Pushes) -> PrimalDual {
+pub(crate) fn place(
+    form: &mut Formulation,
+    start: &StartPoint,
+    settings: &NlpSettings,
+    pushes: StartDistances,
+) -> PrimalDual {
     let x = match start {
         StartPoint::Cold(x) => x,
         StartPoint::Warm(warm) => &warm.x,

@@ -1,19 +1,19 @@
 //! The findings of the residuals: the worst value of each quantity, at the nodes and between them.
 
 use super::check::{Check, CheckLocation, Quantity, Worst};
-use crate::gait::motion::Instant;
+use crate::gait::motion::GaitInstant;
 
 /// A quantity with two limits: at the nodes, where the gait problem imposes the constraint, and between them, where the
 /// error depends on the mesh. Quantities of torques and muscle states have no limit between nodes (`None`), because no
 /// device executes these parabolas; the closed loop checks the torques of the controller.
-pub(super) struct Measured {
+pub(super) struct MeasuredQuantity {
     name: &'static str,
     unit: &'static str,
     at_points: f64,
     between: Option<f64>,
 }
 
-impl Measured {
+impl MeasuredQuantity {
     pub(super) const fn new(name: &'static str, unit: &'static str, at_points: f64, between: Option<f64>) -> Self {
         Self { name, unit, at_points, between }
     }
@@ -21,7 +21,7 @@ impl Measured {
 
 /// A grid point.
 pub(super) struct GridPoint<'a> {
-    pub(super) instant: &'a Instant,
+    pub(super) instant: &'a GaitInstant,
     pub(super) place: CheckLocation<'a>,
     pub(super) on_mesh: bool,
 }
@@ -35,7 +35,7 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    pub(super) fn note(&mut self, point: &GridPoint<'_>, measured: &Measured, value: f64) {
+    pub(super) fn note(&mut self, point: &GridPoint<'_>, measured: &MeasuredQuantity, value: f64) {
         let (worst, limit) = if point.on_mesh {
             (&mut self.at_points, Some(measured.at_points))
         } else {

@@ -70,7 +70,7 @@ pub(super) const FINE: Tolerance = Tolerance { relative: 1e-10, absolute: 1e-11 
 pub(super) const COARSE: Tolerance = Tolerance { relative: 1e-6, absolute: 1e-7 };
 
 /// Observer of a simulation: domain, time in it (s), state.
-pub(super) type Watch<'a> = &'a mut dyn FnMut(usize, f64, &State);
+pub(super) type SimulationObserver<'a> = &'a mut dyn FnMut(usize, f64, &State);
 
 /// The closed loop of a gait.
 #[derive(Debug, Clone)]
@@ -105,7 +105,7 @@ impl<'a> HybridWalker<'a> {
     }
 
     /// Simulates a domain from a state to its guard and through the reset.
-    pub(super) fn passage(&self, d: usize, start: &State, watch: Watch<'_>) -> Result<Passage, Fall> {
+    pub(super) fn passage(&self, d: usize, start: &State, watch: SimulationObserver<'_>) -> Result<Passage, Fall> {
         let control = &self.controls[d];
         let (duration, before) = self.to_event(d, control, start, watch)?;
         self.after_event(d, duration, before)
@@ -119,7 +119,7 @@ impl<'a> HybridWalker<'a> {
     }
 
     /// Simulates a stride from the start of DS2_R.
-    pub(super) fn stride(&self, start: &State, watch: Watch<'_>) -> Result<Vec<Passage>, Fall> {
+    pub(super) fn stride(&self, start: &State, watch: SimulationObserver<'_>) -> Result<Vec<Passage>, Fall> {
         let mut passages: Vec<Passage> = Vec::with_capacity(CYCLE.len());
         for d in 0..CYCLE.len() {
             let from = passages.last().map_or(*start, |p| p.after);
@@ -165,7 +165,7 @@ impl<'a> HybridWalker<'a> {
         d: usize,
         system: &S,
         start: &SVector<f64, N>,
-        watch: Watch<'_>,
+        watch: SimulationObserver<'_>,
     ) -> Result<(f64, SVector<f64, N>), Fall> {
         let control = &self.controls[d];
         let name = control.domain.name();

@@ -2,13 +2,13 @@
 
 use super::check::{Check, CheckLocation, Quantity, Worst};
 use super::contact_kinematics::Contact;
-use super::findings::{Findings, GridPoint, Measured};
+use super::findings::{Findings, GridPoint, MeasuredQuantity};
 use super::limit_excess::{AllowedRanges, FRICTION_THRESHOLD_N, depth_below_ground};
 use super::muscle_residuals;
 use super::virtual_constraints::VirtualConstraints;
 use crate::body::{Axis, FootPoint, GRAVITY, InverseDynamics, PointState, Side, WalkerModel};
 use crate::gait::Gait;
-use crate::gait::motion::{Instant, instant};
+use crate::gait::motion::{GaitInstant, instant};
 use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 
 /// Number of grid points between adjacent nodes, in the middle of as many equal parts. The solve divides the same time
@@ -17,25 +17,26 @@ use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 const BETWEEN_NODES: usize = 24;
 
 // At nodes: 1e-6, the tolerance of a converged gait, times the scale of the row in the gait problem.
-const FORCE: Measured = Measured::new("C1 equations of motion, forces", "N", 1e-4, None);
-const MOMENT: Measured = Measured::new("C1 equations of motion, moments", "N m", 1e-4, None);
-const CONTACT_POSITION: Measured = Measured::new("C1 contact position", "m", 1e-6, Some(1e-3));
-const CONTACT_VELOCITY: Measured = Measured::new("C1 contact velocity", "m/s", 1e-6, Some(0.02));
-const CONTACT_ACCELERATION: Measured = Measured::new("C1 contact acceleration", "m/s²", 1e-5, Some(2.0));
-const OUTPUT: Measured = Measured::new("C2 virtual constraints", "rad", 1e-6, Some(1e-3));
-const OUTPUT_RATE: Measured = Measured::new("C2 virtual constraints, rate", "rad/s", 1e-6, Some(0.05));
-const HIP_POSITION: Measured = Measured::new("C2 hip position", "m", 1e-6, Some(1e-3));
-const HIP_VELOCITY: Measured = Measured::new("C2 hip velocity", "m/s", 1e-6, Some(0.02));
-const NORMAL_FORCE: Measured = Measured::new("C3 unilateral contact", "N", 1e-3, Some(5.0));
-const FRICTION: Measured = Measured::new("C3 friction cone", "N", 1e-3, Some(FRICTION_THRESHOLD_N));
-const KEPT_LOAD: Measured = Measured::new("C3 load of contacts before they lift off", "N", 1e-3, None);
-const PROGRESS: Measured = Measured::new("C3 forward hip velocity in SS1", "m/s", 1e-6, Some(0.02));
-const DEPTH: Measured = Measured::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
-const CLEARANCE: Measured = Measured::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
-const ANGLE: Measured = Measured::new("C4 joint angles beyond a6, a7, a8", "rad", 1e-6, Some(0.01));
-const SPEED: Measured = Measured::new("C4 velocities beyond a1", "rad/s", 3e-6, Some(0.1));
-const ACCELERATION: Measured = Measured::new("C4 accelerations beyond a2", "rad/s²", 3e-5, Some(5.0));
-const TORQUE: Measured = Measured::new("C4 torques beyond their limits", "N m", 1e-4, Some(2.0));
+const FORCE: MeasuredQuantity = MeasuredQuantity::new("C1 equations of motion, forces", "N", 1e-4, None);
+const MOMENT: MeasuredQuantity = MeasuredQuantity::new("C1 equations of motion, moments", "N m", 1e-4, None);
+const CONTACT_POSITION: MeasuredQuantity = MeasuredQuantity::new("C1 contact position", "m", 1e-6, Some(1e-3));
+const CONTACT_VELOCITY: MeasuredQuantity = MeasuredQuantity::new("C1 contact velocity", "m/s", 1e-6, Some(0.02));
+const CONTACT_ACCELERATION: MeasuredQuantity =
+    MeasuredQuantity::new("C1 contact acceleration", "m/s²", 1e-5, Some(2.0));
+const OUTPUT: MeasuredQuantity = MeasuredQuantity::new("C2 virtual constraints", "rad", 1e-6, Some(1e-3));
+const OUTPUT_RATE: MeasuredQuantity = MeasuredQuantity::new("C2 virtual constraints, rate", "rad/s", 1e-6, Some(0.05));
+const HIP_POSITION: MeasuredQuantity = MeasuredQuantity::new("C2 hip position", "m", 1e-6, Some(1e-3));
+const HIP_VELOCITY: MeasuredQuantity = MeasuredQuantity::new("C2 hip velocity", "m/s", 1e-6, Some(0.02));
+const NORMAL_FORCE: MeasuredQuantity = MeasuredQuantity::new("C3 unilateral contact", "N", 1e-3, Some(5.0));
+const FRICTION: MeasuredQuantity = MeasuredQuantity::new("C3 friction cone", "N", 1e-3, Some(FRICTION_THRESHOLD_N));
+const KEPT_LOAD: MeasuredQuantity = MeasuredQuantity::new("C3 load of contacts before they lift off", "N", 1e-3, None);
+const PROGRESS: MeasuredQuantity = MeasuredQuantity::new("C3 forward hip velocity in SS1", "m/s", 1e-6, Some(0.02));
+const DEPTH: MeasuredQuantity = MeasuredQuantity::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
+const CLEARANCE: MeasuredQuantity = MeasuredQuantity::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
+const ANGLE: MeasuredQuantity = MeasuredQuantity::new("C4 joint angles beyond a6, a7, a8", "rad", 1e-6, Some(0.01));
+const SPEED: MeasuredQuantity = MeasuredQuantity::new("C4 velocities beyond a1", "rad/s", 3e-6, Some(0.1));
+const ACCELERATION: MeasuredQuantity = MeasuredQuantity::new("C4 accelerations beyond a2", "rad/s²", 3e-5, Some(5.0));
+const TORQUE: MeasuredQuantity = MeasuredQuantity::new("C4 torques beyond their limits", "N m", 1e-4, Some(2.0));
 const IMPACT: Quantity = Quantity::judged("C2 velocities after impacts", "rad/s", 1e-5);
 const IMPULSE: Quantity = Quantity::judged("C2 impulses of the impacts", "N s", 1e-4);
 const IMPULSE_SIZE: Quantity = Quantity::judged("C3 impulses beyond their limit", "N s", 1e-4);
@@ -133,7 +134,7 @@ impl DomainResiduals<'_> {
     }
 
     fn mechanics(&self, point: &GridPoint<'_>, worst: &mut Findings) {
-        let Instant { q, qd, qdd, u, forces, .. } = point.instant;
+        let GaitInstant { q, qd, qdd, u, forces, .. } = point.instant;
         let state = PointState::new(q, qd, qdd);
         let mut rest = InverseDynamics::new(self.model).rows(&state);
         for i in 0..6 {
@@ -153,7 +154,7 @@ impl DomainResiduals<'_> {
     }
 
     fn outputs(&self, point: &GridPoint<'_>, share: f64, worst: &mut Findings) {
-        let Instant { q, qd, qdd, .. } = point.instant;
+        let GaitInstant { q, qd, qdd, .. } = point.instant;
         let phase = self.constraints.phase(q, qd, qdd);
         let errors = |order: usize| {
             let desired = self.constraints.desired(phase.s);
@@ -174,7 +175,7 @@ impl DomainResiduals<'_> {
     }
 
     fn limits(&self, point: &GridPoint<'_>, share: f64, worst: &mut Findings) {
-        let Instant { q, qd, qdd, u, forces, .. } = point.instant;
+        let GaitInstant { q, qd, qdd, u, forces, .. } = point.instant;
         let rows = self.domain.contact_rows();
         let state = PointState::new(q, qd, qdd);
         worst.note(point, &NORMAL_FORCE, self.limits.normal_force(&rows, forces));

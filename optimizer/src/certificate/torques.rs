@@ -22,7 +22,7 @@ const UNACTUATED: usize = 3;
 
 /// Torques of the controller and ground reaction forces.
 #[derive(Debug, Clone)]
-pub(super) struct Effort {
+pub(super) struct TorquesAndForces {
     pub(super) u: [f64; 6],
     pub(super) forces: Vec<f64>,
 }
@@ -31,14 +31,20 @@ pub(super) struct Effort {
 const EXCESS_PRICE: f64 = 1e4;
 
 /// Dense rows `a . (f, excess) <= bound` of the program; equations come first.
-struct Rows {
+struct ProgramRows {
     coefficients: Vec<Vec<f64>>,
     bounds: Vec<f64>,
 }
 
 impl Control<'_> {
     /// Torques and forces of an acceleration; `None` if no forces produce it. The caller checks the limits.
-    pub(super) fn effort(&self, x: &State, qdd: &[f64; 9], plan: &[f64; 6], limits: &AllowedRanges) -> Option<Effort> {
+    pub(super) fn effort(
+        &self,
+        x: &State,
+        qdd: &[f64; 9],
+        plan: &[f64; 6],
+        limits: &AllowedRanges,
+    ) -> Option<TorquesAndForces> {
         let (q, qd) = split(x);
         let state = PointState::new(&q, &qd, qdd);
         let wanted = InverseDynamics::new(self.model).rows(&state);
@@ -54,7 +60,7 @@ impl Control<'_> {
             let carried: f64 = gradients.iter().zip(&forces).map(|(gradient, force)| gradient[3 + i] * force).sum();
             *torque = wanted[3 + i] - carried;
         }
-        Some(Effort { u, forces })
+        Some(TorquesAndForces { u, forces })
     }
 
     /// Minimises `|u(f) - plan|^2 / 2 + penalty * excess` over the contact forces f.
@@ -79,7 +85,7 @@ impl Control<'_> {
         }
         linear[count] = EXCESS_PRICE;
         let of_forces = |value: &dyn Fn(usize) -> f64| (0..count).map(value).collect::<Vec<f64>>();
-        let mut rows = Rows { coefficients: Vec::new(), bounds: Vec::new() };
+        let mut rows = ProgramRows { coefficients: Vec::new(), bounds: Vec::new() };
         for i in 0..UNACTUATED {
             rows.push(of_forces(&|c| gradients[c][i]), 0.0, wanted[i] / FORCE_UNIT_N);
         }
@@ -115,7 +121,7 @@ impl Control<'_> {
     }
 }
 
-impl Rows {
+impl ProgramRows {
     fn push(&mut self, mut coefficients: Vec<f64>, by_excess: f64, bound: f64) {
         coefficients.push(by_excess);
         self.coefficients.push(coefficients);

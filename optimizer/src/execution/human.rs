@@ -11,7 +11,7 @@ use super::control_period::CONTROL_PERIOD_S;
 use super::foot_contact::FootContact;
 use super::gains::Gains;
 use super::planned_stride::PlannedStride;
-use super::plant::Motion;
+use super::plant::PlantMotion;
 use super::stride_clock::{PhaseVariable, StrideClock};
 use crate::body::{Side, WalkerModel};
 use crate::walking::phase_gradient;
@@ -46,7 +46,7 @@ const LEFT_STANCE: usize = 4;
 
 /// Heel strikes in a period of the controller.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct HeelStrikes {
+pub(super) struct StrikesInPeriod {
     pub(super) left: bool,
     pub(super) right: bool,
 }
@@ -82,14 +82,14 @@ impl<'a> Human<'a> {
     }
 
     /// Notices heel strikes, which start the steps of the plan.
-    fn heel_strikes(&mut self, motion: &Motion) -> HeelStrikes {
+    fn heel_strikes(&mut self, motion: &PlantMotion) -> StrikesInPeriod {
         let [left, right] = &mut self.feet;
         left.update(motion.foot_load(Side::Left));
         right.update(motion.foot_load(Side::Right));
         let (middle_s, end_s) = (self.plan.start_s(LEFT_STANCE), self.plan.duration_s);
         let late = |start_s: f64, end_s: f64| self.clock.time_s >= start_s + LANDING * (end_s - start_s);
         let in_left_stance = self.clock.time_s >= middle_s;
-        let strikes = HeelStrikes {
+        let strikes = StrikesInPeriod {
             left: !in_left_stance && late(0.0, middle_s) && left.take_heel_strike(),
             right: in_left_stance && late(middle_s, end_s) && right.take_heel_strike(),
         };
@@ -102,7 +102,7 @@ impl<'a> Human<'a> {
     }
 
     /// One period of the controller.
-    pub(super) fn control(&mut self, motion: &Motion) -> HeelStrikes {
+    pub(super) fn control(&mut self, motion: &PlantMotion) -> StrikesInPeriod {
         let strikes = self.heel_strikes(motion);
         let middle_s = self.plan.start_s(LEFT_STANCE);
         let in_left_stance = self.clock.time_s >= middle_s;
@@ -140,7 +140,7 @@ impl<'a> Human<'a> {
     }
 
     /// Torques of hip_L, knee_L, ankle_L and hip_R, N m.
-    pub(super) fn torques(&self, motion: &Motion) -> [f64; 4] {
+    pub(super) fn torques(&self, motion: &PlantMotion) -> [f64; 4] {
         let planned = self.plan.at(self.clock.time_s);
         let total = |joint: &LaggedJoint, c: usize| {
             joint.torque_n_m + PASSIVE_DAMPING_N_M_S_RAD * (planned.qd[c] - motion.qd[c])

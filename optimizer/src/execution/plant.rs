@@ -29,14 +29,14 @@ const STOP_DAMPING_N_M_S_RAD: f64 = 30.0;
 
 /// Positions and velocities, and the forces that the ground applied in the last step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Motion {
+pub(super) struct PlantMotion {
     pub(super) q: [f64; 9],
     pub(super) qd: [f64; 9],
     /// Normal force and friction of left heel, left toe, right heel and right toe, N.
     pub(super) ground: [[f64; 2]; 4],
 }
 
-impl Motion {
+impl PlantMotion {
     /// At rest in the air, or in contact without force yet.
     pub(super) fn new(q: [f64; 9], qd: [f64; 9]) -> Self {
         Self { q, qd, ground: [[0.0; 2]; 4] }
@@ -54,7 +54,7 @@ impl Motion {
 
 /// Torques and forces during a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Effort {
+pub(super) struct AppliedTorques {
     /// hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R, N m.
     pub(super) torques: [f64; 6],
     /// Forward force on the hip, N.
@@ -63,7 +63,7 @@ pub(super) struct Effort {
 
 /// A joint stop, which pushes back to one side.
 #[derive(Debug, Clone, Copy)]
-struct Stop {
+struct JointStop {
     coordinate: usize,
     /// 1 for a lower limit, -1 for an upper one.
     direction: f64,
@@ -84,14 +84,14 @@ pub(super) struct Plant<'a> {
     ground: Ground,
     terrain: &'a Terrain,
     points: [ContactPoint; 4],
-    stops: [Stop; 4],
+    stops: [JointStop; 4],
 }
 
 impl<'a> Plant<'a> {
     /// The prosthetic ankle has the given range. Knees do not extend beyond straight (assumption for the device).
     pub(super) fn new(model: &'a WalkerModel, terrain: &'a Terrain, yield_m: f64, ankle_range_rad: (f64, f64)) -> Self {
         let point = |point, side| model.contact_point(point, side);
-        let stop = |coordinate, direction, limit_rad| Stop { coordinate, direction, limit_rad };
+        let stop = |coordinate, direction, limit_rad| JointStop { coordinate, direction, limit_rad };
         Self {
             model,
             ground: Ground::under(model.total_mass, yield_m),
@@ -112,16 +112,22 @@ impl<'a> Plant<'a> {
     }
 
     /// Height of the ground under the hip, m.
-    pub(super) fn ground_height(&self, motion: &Motion) -> f64 {
+    pub(super) fn ground_height(&self, motion: &PlantMotion) -> f64 {
         self.terrain.at(motion.q[0]).0
     }
 
     /// The motion after a step of `duration_s`. `None` if it is not finite, or if no forces of the ground fit.
-    pub(super) fn step(&self, motion: &Motion, effort: &Effort, duration_s: f64) -> Option<Motion> {
+    pub(super) fn step(&self, motion: &PlantMotion, effort: &AppliedTorques, duration_s: f64) -> Option<PlantMotion> {
         self.step_or_halves(motion, effort, duration_s, HALVINGS)
     }
 
-    fn step_or_halves(&self, motion: &Motion, effort: &Effort, duration_s: f64, halvings: u32) -> Option<Motion> {
+    fn step_or_halves(
+        &self,
+        motion: &PlantMotion,
+        effort: &AppliedTorques,
+        duration_s: f64,
+        halvings: u32,
+    ) -> Option<PlantMotion> {
         if let Some(next) = self.whole_step(motion, effort, duration_s) {
             return Some(next);
         }
@@ -130,7 +136,7 @@ impl<'a> Plant<'a> {
         self.step_or_halves(&middle, effort, 0.5 * duration_s, rest)
     }
 
-    fn whole_step(&self, motion: &Motion, effort: &Effort, h: f64) -> Option<Motion> {
+    fn whole_step(&self, motion: &PlantMotion, effort: &AppliedTorques, h: f64) -> Option<PlantMotion> {
         let state = PointState::new(&motion.q, &motion.qd, &[0.0; 9]);
         let dynamics = InverseDynamics::new(self.model);
         let bias = dynamics.rows(&state);
@@ -190,7 +196,7 @@ impl<'a> Plant<'a> {
                     *ground = [force.normal, force.friction];
                 }
                 let qd: [f64; 9] = v.into();
-                return Some(Motion { q: std::array::from_fn(|i| motion.q[i] + h * qd[i]), qd, ground });
+                return Some(PlantMotion { q: std::array::from_fn(|i| motion.q[i] + h * qd[i]), qd, ground });
             }
         }
         None
@@ -221,7 +227,7 @@ impl<'a> Plant<'a> {
     }
 }
 
-impl Stop {
+impl JointStop {
     /// Torque away from the stop at the end of a step, and its derivative with respect to the velocity, both positive.
     fn torque(&self, q: &[f64; 9], v: &Vector, h: f64) -> (f64, f64) {
         let rate = self.direction * v[self.coordinate];

@@ -10,7 +10,7 @@ use super::control_period::CONTROL_PERIOD_S;
 use super::foot_contact::FootContact;
 use super::gains::Gains;
 use super::planned_stride::PlannedStride;
-use super::sensors::Measured;
+use super::sensors::SensorReadings;
 use super::stride_clock::{PhaseVariable, StrideClock};
 use crate::body::{LegGeometry, WalkerModel};
 use crate::device::Device;
@@ -63,7 +63,7 @@ impl<'a> Prosthesis<'a> {
     }
 
     /// One period of the controller.
-    pub(super) fn control(&mut self, measured: &Measured) {
+    pub(super) fn control(&mut self, measured: &SensorReadings) {
         self.foot.update(measured.load_n);
         let swing_s = self.plan.start_s(SWING_STARTS);
         let end_s = self.plan.duration_s;

@@ -1,6 +1,6 @@
 //! The result of simulated walks.
 
-use super::simulated_walk::{End, WalkOutcome};
+use super::simulated_walk::{WalkEnd, WalkOutcome};
 use crate::statistics::wilson_interval;
 use serde::{Deserialize, Serialize};
 
@@ -86,19 +86,19 @@ pub struct ExecutionReport {
 
 impl WalksOnGround {
     pub(super) fn of(ground_height_m: f64, outcomes: &[WalkOutcome]) -> Self {
-        let ended = |end: End| u32::try_from(outcomes.iter().filter(|o| o.end == end).count()).unwrap_or(u32::MAX);
+        let ended = |end: WalkEnd| u32::try_from(outcomes.iter().filter(|o| o.end == end).count()).unwrap_or(u32::MAX);
         let walks = u32::try_from(outcomes.len()).unwrap_or(u32::MAX);
         let periods = outcomes.iter().map(|o| o.periods).sum::<u64>().max(1);
         let share =
             |count: &dyn Fn(&WalkOutcome) -> u64| outcomes.iter().map(count).sum::<u64>() as f64 / periods as f64;
-        let completed = ended(End::Completed);
+        let completed = ended(WalkEnd::Completed);
         let (low, high) = wilson_interval(completed, walks);
         Self {
             ground_height_m,
             walks,
             completed,
-            fell: ended(End::Fell),
-            halted: ended(End::Halted),
+            fell: ended(WalkEnd::Fell),
+            halted: ended(WalkEnd::Halted),
             completed_share: f64::from(completed) / f64::from(walks.max(1)),
             completed_share_interval: [low, high],
             mean_strides: outcomes.iter().map(|o| f64::from(o.strides)).sum::<f64>() / f64::from(walks.max(1)),

@@ -5,7 +5,7 @@
 //! their rates come from the motors, through a gear of about 50. The other values are assumptions.
 
 use super::control_period::CONTROL_PERIOD_S;
-use super::plant::Motion;
+use super::plant::PlantMotion;
 use super::random::Random;
 use crate::body::Side;
 use std::collections::VecDeque;
@@ -26,7 +26,7 @@ pub(super) const THIGH_OFFSET_RAD: f64 = 8.7e-3;
 
 /// What the prosthesis measures.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Measured {
+pub(super) struct SensorReadings {
     /// Forward angle of the thigh from the vertical, rad.
     pub(super) thigh_rad: f64,
     /// Knee and ankle angles, rad.
@@ -37,9 +37,9 @@ pub(super) struct Measured {
     pub(super) load_n: f64,
 }
 
-impl Measured {
+impl SensorReadings {
     /// The true values of a motion.
-    pub(super) fn exactly(motion: &Motion) -> Self {
+    pub(super) fn exactly(motion: &PlantMotion) -> Self {
         let (q, qd) = (&motion.q, &motion.qd);
         Self {
             thigh_rad: q[6] - q[2],
@@ -53,7 +53,7 @@ impl Measured {
 /// The sensors of a simulated walk.
 #[derive(Debug, Clone)]
 pub(super) struct Sensors {
-    delayed: VecDeque<Measured>,
+    delayed: VecDeque<SensorReadings>,
     /// Constant error of the thigh angle, rad, and the source of noise; `None` for exact sensors.
     noise: Option<(f64, Random)>,
 }
@@ -64,13 +64,13 @@ fn rounded(value: f64, step: f64) -> f64 {
 
 impl Sensors {
     /// Sensors with a delay of whole periods of the controller, which see the motion `start` until then.
-    pub(super) fn new(delay_periods: usize, noise: Option<(f64, Random)>, start: &Motion) -> Self {
-        Self { delayed: vec![Measured::exactly(start); delay_periods].into(), noise }
+    pub(super) fn new(delay_periods: usize, noise: Option<(f64, Random)>, start: &PlantMotion) -> Self {
+        Self { delayed: vec![SensorReadings::exactly(start); delay_periods].into(), noise }
     }
 
     /// Takes a sample of the motion, and returns the one that arrives now.
-    pub(super) fn sample(&mut self, motion: &Motion) -> Measured {
-        let mut now = Measured::exactly(motion);
+    pub(super) fn sample(&mut self, motion: &PlantMotion) -> SensorReadings {
+        let mut now = SensorReadings::exactly(motion);
         if let Some((thigh_offset, random)) = &mut self.noise {
             now.thigh_rad += *thigh_offset + THIGH_NOISE_RAD * random.normal();
             for angle in &mut now.joints_rad {

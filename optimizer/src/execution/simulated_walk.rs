@@ -4,7 +4,7 @@ use super::control_period::CONTROL_PERIOD_S;
 use super::disturbance::{Disturbance, PUSH_DURATION_S};
 use super::human::Human;
 use super::planned_stride::PlannedStride;
-use super::plant::{Effort, Motion, Plant};
+use super::plant::{AppliedTorques, Plant, PlantMotion};
 use super::prosthesis::Prosthesis;
 use super::sensors::Sensors;
 use crate::body::WalkerModel;
@@ -24,7 +24,7 @@ const LONGEST_STEP: f64 = 1.5;
 
 /// How a simulated walk ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum WalkEnd {
     /// All strides are done.
     Completed,
     /// Hip too low, torso too far from upright, or no motion that the ground allows.
@@ -36,7 +36,7 @@ pub(super) enum End {
 /// The result of a simulated walk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WalkOutcome {
-    pub(super) end: End,
+    pub(super) end: WalkEnd,
     /// Completed strides.
     pub(super) strides: u32,
     /// Periods of the controller.
@@ -46,12 +46,12 @@ pub(super) struct WalkOutcome {
     /// Periods in which knee and ankle wanted to change their torque faster than they can.
     pub(super) rate_limited: [u64; 2],
     /// The motion at the end.
-    pub(super) motion: Motion,
+    pub(super) motion: PlantMotion,
 }
 
 /// A gait that simulated walks start from.
 #[derive(Debug, Clone)]
-pub(super) struct Walker<'a> {
+pub(super) struct SimulatedWalker<'a> {
     gait: &'a Gait,
     plan: PlannedStride,
     /// The walker that the controllers assume.
@@ -63,7 +63,7 @@ pub(super) struct Walker<'a> {
     pub(super) plant_steps: u32,
 }
 
-impl<'a> Walker<'a> {
+impl<'a> SimulatedWalker<'a> {
     /// The walker of a well-formed gait.
     pub(super) fn new(gait: &'a Gait) -> Result<Self, ModelError> {
         let model = WalkerModel::new(&gait.subject, &gait.device)?;
@@ -101,12 +101,12 @@ impl<'a> Walker<'a> {
             Plant::new(&model, &disturbance.terrain, disturbance.yield_m, (device.ankle_min_rad, device.ankle_max_rad));
         let mut start = domains[0].q[0];
         start[0] -= self.foothold_m;
-        let mut motion = Motion::new(start, domains[0].qd[0].map(|rate| rate * disturbance.speed_factor));
+        let mut motion = PlantMotion::new(start, domains[0].qd[0].map(|rate| rate * disturbance.speed_factor));
         let mut human = Human::new(&self.plan, &self.model, &settings.limits.joint_torques_n_m(device));
         let mut prosthesis = Prosthesis::new(&self.plan, &self.model, device);
         let mut sensors = Sensors::new(disturbance.delay_periods, disturbance.noise.clone(), &motion);
         let mut outcome = WalkOutcome {
-            end: End::Completed,
+            end: WalkEnd::Completed,
             strides: 0,
             periods: 0,
             saturated: [0; 2],
@@ -131,12 +131,12 @@ impl<'a> Walker<'a> {
             let moved = self.period(&plant, motion, &human, &prosthesis, push);
             elapsed_s += CONTROL_PERIOD_S;
             let Some(moved) = moved.filter(|moved| self.is_upright(&plant, moved)) else {
-                outcome.end = End::Fell;
+                outcome.end = WalkEnd::Fell;
                 break;
             };
             motion = moved;
             if elapsed_s - last_strike_s > LONGEST_STEP * self.plan.duration_s {
-                outcome.end = End::Halted;
+                outcome.end = WalkEnd::Halted;
                 break;
             }
         }
@@ -148,21 +148,21 @@ impl<'a> Walker<'a> {
     fn period(
         &self,
         plant: &Plant<'_>,
-        mut motion: Motion,
+        mut motion: PlantMotion,
         human: &Human<'_>,
         prosthesis: &Prosthesis<'_>,
         push: f64,
-    ) -> Option<Motion> {
+    ) -> Option<PlantMotion> {
         let [hip_l, knee_l, ankle_l, hip_r] = human.torques(&motion);
         let [knee_r, ankle_r] = prosthesis.drives.map(|drive| drive.torque_n_m);
-        let effort = Effort { torques: [hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r], push };
+        let effort = AppliedTorques { torques: [hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r], push };
         for _ in 0..self.plant_steps {
             motion = plant.step(&motion, &effort, CONTROL_PERIOD_S / f64::from(self.plant_steps))?;
         }
         Some(motion)
     }
 
-    fn is_upright(&self, plant: &Plant<'_>, motion: &Motion) -> bool {
+    fn is_upright(&self, plant: &Plant<'_>, motion: &PlantMotion) -> bool {
         let height = motion.q[1] - plant.ground_height(motion);
         height >= self.lowest_hip_m && motion.q[2].abs() <= LARGEST_LEAN_RAD
     }

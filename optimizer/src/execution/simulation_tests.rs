@@ -2,9 +2,9 @@
 
 use super::disturbance::{Disturbance, MassChanges, Push};
 use super::ground::YIELD_M;
-use super::plant::{Effort, Motion, Plant};
+use super::plant::{AppliedTorques, Plant, PlantMotion};
 use super::random::Random;
-use super::simulated_walk::{End, PLANT_STEPS, Walker};
+use super::simulated_walk::{PLANT_STEPS, SimulatedWalker, WalkEnd};
 use super::terrain::Terrain;
 use super::{ExecutionOptions, simulate};
 use crate::body::{FootPoint, GRAVITY, Side, WalkerModel};
@@ -27,7 +27,7 @@ fn walkable_gait() -> Gait {
     solve(&problem, None, &SolveOptions::default(), &mut |_| {}, &CancelToken::new()).unwrap().gait
 }
 
-fn energy(model: &WalkerModel, motion: &Motion) -> f64 {
+fn energy(model: &WalkerModel, motion: &PlantMotion) -> f64 {
     let heights: f64 = model.bodies.iter().map(|body| body.mass * body.com.position(&motion.q)[1]).sum();
     kinetic_energy(model, &motion.q, &motion.qd) + GRAVITY * heights
 }
@@ -36,11 +36,11 @@ fn energy(model: &WalkerModel, motion: &Motion) -> f64 {
 fn flight_without_torques_keeps_its_energy_up_to_the_order_of_the_step() {
     let (model, terrain) = (walker_model(), Terrain::level());
     let plant = Plant::new(&model, &terrain, YIELD_M, ANKLE_RANGE_RAD);
-    let start = Motion::new(POSTURE, [1.0, 3.0, 0.5, 1.0, 0.6, -0.3, -1.0, 0.5, 0.4]);
+    let start = PlantMotion::new(POSTURE, [1.0, 3.0, 0.5, 1.0, 0.6, -0.3, -1.0, 0.5, 0.4]);
     let change = |parts: u32| {
         let mut motion = start;
         for _ in 0..200 * parts {
-            motion = plant.step(&motion, &Effort::default(), 1e-3 / f64::from(parts)).unwrap();
+            motion = plant.step(&motion, &AppliedTorques::default(), 1e-3 / f64::from(parts)).unwrap();
         }
         assert_eq!(motion.ground, [[0.0; 2]; 4]);
         (energy(&model, &motion) - energy(&model, &start)).abs() / energy(&model, &start)
@@ -58,11 +58,11 @@ fn ground_carries_the_weight_of_a_standing_walker() {
     // are stiff.
     let posture = [0.0, 0.0, 0.2, 0.2, 0.0, 0.0, 0.2, 0.0, 0.0];
     let toe = model.contact_point(FootPoint::Toe, Side::Left).chain();
-    let mut motion = Motion::new(posture, [0.0; 9]);
+    let mut motion = PlantMotion::new(posture, [0.0; 9]);
     motion.q[1] = 0.002 - toe.position(&posture)[1];
     for _ in 0..80_000 {
         let torques = std::array::from_fn(|i| 3000.0 * (posture[3 + i] - motion.q[3 + i]) - 40.0 * motion.qd[3 + i]);
-        motion = plant.step(&motion, &Effort { torques, push: 0.0 }, 1e-4).unwrap();
+        motion = plant.step(&motion, &AppliedTorques { torques, push: 0.0 }, 1e-4).unwrap();
     }
     assert!(motion.qd.iter().all(|rate| rate.abs() < 1e-3), "{:?}", motion.qd);
     let carried: f64 = motion.ground.iter().map(|force| force[0]).sum();
@@ -76,11 +76,11 @@ fn ground_carries_the_weight_of_a_standing_walker() {
 fn forces_of_the_ground_stay_in_the_friction_cone_when_a_walker_drops_and_slides() {
     let (model, terrain) = (walker_model(), Terrain::random(0.7, 0.01, &mut Random::new(1, 1)));
     let plant = Plant::new(&model, &terrain, YIELD_M, ANKLE_RANGE_RAD);
-    let mut motion = Motion::new(POSTURE, [2.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut motion = PlantMotion::new(POSTURE, [2.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     motion.q[1] = 0.95;
     let mut largest = 0.0_f64;
     for _ in 0..600 {
-        motion = plant.step(&motion, &Effort::default(), 5e-4).unwrap();
+        motion = plant.step(&motion, &AppliedTorques::default(), 5e-4).unwrap();
         for [normal, friction] in motion.ground {
             assert!(normal >= 0.0 && friction.abs() <= 0.8 * normal, "{normal} {friction}");
             largest = largest.max(friction.abs());
@@ -92,10 +92,10 @@ fn forces_of_the_ground_stay_in_the_friction_cone_when_a_walker_drops_and_slides
 #[test]
 fn undisturbed_walk_repeats_itself_and_a_shorter_step_of_the_plant_hardly_changes_it() {
     let gait = walkable_gait();
-    let mut walker = Walker::new(&gait).unwrap();
-    let walk = |walker: &Walker<'_>| walker.walk(&Disturbance::none(), 2).unwrap();
+    let mut walker = SimulatedWalker::new(&gait).unwrap();
+    let walk = |walker: &SimulatedWalker<'_>| walker.walk(&Disturbance::none(), 2).unwrap();
     let first = walk(&walker);
-    assert_eq!(first.end, End::Completed);
+    assert_eq!(first.end, WalkEnd::Completed);
     assert_eq!(first, walk(&walker));
     walker.plant_steps = 2 * PLANT_STEPS;
     let finer = walk(&walker);
@@ -107,10 +107,10 @@ fn undisturbed_walk_repeats_itself_and_a_shorter_step_of_the_plant_hardly_change
 #[test]
 fn walk_with_a_push_beyond_every_remedy_is_a_fall() {
     let gait = walkable_gait();
-    let walker = Walker::new(&gait).unwrap();
+    let walker = SimulatedWalker::new(&gait).unwrap();
     for impulse_n_s in [-150.0, 150.0] {
         let outcome = walker.walk(&Disturbance::only(Push { start_s: 0.5, impulse_n_s }), 20).unwrap();
-        assert_eq!(outcome.end, End::Fell);
+        assert_eq!(outcome.end, WalkEnd::Fell);
         assert!(outcome.strides < 3);
     }
 }

@@ -4,7 +4,7 @@ use super::bound::{Level, least_move, loosened, step};
 use super::conflict::BoundSet;
 use super::given_bound::GivenBound;
 use super::search::Search;
-use super::solves::{Starts, Stop};
+use super::solves::{SearchEnd, Starts};
 use crate::solve::WarmStart;
 use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};
@@ -91,7 +91,7 @@ impl JointRelaxation {
 
 impl Search<'_> {
     /// The smallest relaxation of the bounds of a set that gives a gait, if there is one.
-    pub(super) fn level(&mut self, set: BoundSet) -> Result<Option<Level>, Stop> {
+    pub(super) fn level(&mut self, set: BoundSet) -> Result<Option<Level>, SearchEnd> {
         let before = self.solves.count;
         if self.solves.is_met(&loosened(&self.problem.bounds, set, Level::Usual)?, Starts::All)? {
             return Ok(Some(Level::Usual));
@@ -103,7 +103,7 @@ impl Search<'_> {
     }
 
     /// The smallest joint relaxation of the bounds of a set.
-    pub(super) fn relaxed(&mut self, set: BoundSet) -> Result<JointRelaxation, Stop> {
+    pub(super) fn relaxed(&mut self, set: BoundSet) -> Result<JointRelaxation, SearchEnd> {
         let given = self.problem.bounds;
         let before = self.solves.count;
         let (mut to, mut warm_start) = (None, None);
@@ -118,7 +118,7 @@ impl Search<'_> {
                     let gait = solves.solve(bounds, Starts::All)?;
                     let found = gait.is_some();
                     warm_start = gait.or(warm_start.take());
-                    Ok::<_, Stop>(found)
+                    Ok::<_, SearchEnd>(found)
                 })?;
                 to = Some(nearest.to_array());
                 (none, self.solves.unmet(&none).into_iter().filter(|_| none != given).collect())

@@ -18,14 +18,14 @@ const MAX_ITERATIONS_WARM: usize = 250;
 const FAR: f64 = 0.5;
 
 /// The reason for an early end of the search.
-pub(super) enum Stop {
+pub(super) enum SearchEnd {
     /// The explanation was cancelled.
     Cancelled,
     /// A solve could not start.
     Failed(SolveError),
 }
 
-impl<E: Into<SolveError>> From<E> for Stop {
+impl<E: Into<SolveError>> From<E> for SearchEnd {
     fn from(error: E) -> Self {
         Self::Failed(error.into())
     }
@@ -103,7 +103,7 @@ impl<'a> Solves<'a> {
 
     /// Whether these bounds have a gait. Earlier results answer without a solve: looser bounds than those of a gait have one, and
     /// tighter bounds than those of a failed search count as having none.
-    pub(super) fn is_met(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<bool, Stop> {
+    pub(super) fn is_met(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<bool, SearchEnd> {
         if self.met.iter().any(|(known, _)| is_as_loose(bounds, known)) {
             return Ok(true);
         }
@@ -127,7 +127,7 @@ impl<'a> Solves<'a> {
     }
 
     /// Searches a gait with these bounds: from the nearest known gait, in one or two steps, then from initial guesses.
-    pub(super) fn solve(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<Option<WarmStart>, Stop> {
+    pub(super) fn solve(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<Option<WarmStart>, SearchEnd> {
         let mut unmet = Unmet::new(bounds);
         let nearest = self.met.iter().min_by(|a, b| way(&a.0, bounds).total_cmp(&way(&b.0, bounds))).cloned();
         let cold = starts == Starts::All || nearest.is_none();
@@ -154,7 +154,7 @@ impl<'a> Solves<'a> {
         Ok(None)
     }
 
-    fn warm(&mut self, bounds: &TunedBounds, gait: &WarmStart, unmet: &mut Unmet) -> Result<bool, Stop> {
+    fn warm(&mut self, bounds: &TunedBounds, gait: &WarmStart, unmet: &mut Unmet) -> Result<bool, SearchEnd> {
         let max_iterations = self.options.max_iterations.min(MAX_ITERATIONS_WARM);
         let options = SolveOptions { max_iterations, ..self.options };
         let outcome = solve_from_warm_start(&self.with(bounds), gait, &options, self.cancel)?;
@@ -162,10 +162,10 @@ impl<'a> Solves<'a> {
     }
 
     /// Adds the result of a solve to a failed search.
-    fn is_gait(&mut self, bounds: &TunedBounds, outcome: SolveOutcome, unmet: &mut Unmet) -> Result<bool, Stop> {
+    fn is_gait(&mut self, bounds: &TunedBounds, outcome: SolveOutcome, unmet: &mut Unmet) -> Result<bool, SearchEnd> {
         self.count += outcome.report.attempts.len();
         if self.cancel.is_cancelled() {
-            return Err(Stop::Cancelled);
+            return Err(SearchEnd::Cancelled);
         }
         if outcome.report.status == SolveStatus::Converged {
             self.met.push((*bounds, outcome.warm_start));
@@ -181,7 +181,7 @@ impl<'a> Solves<'a> {
     }
 
     /// A gait with feasible bounds, by a solve if that converges.
-    pub(super) fn gait(&mut self, bounds: &TunedBounds) -> Result<Option<WarmStart>, Stop> {
+    pub(super) fn gait(&mut self, bounds: &TunedBounds) -> Result<Option<WarmStart>, SearchEnd> {
         if let Some((_, gait)) = self.met.iter().find(|(known, _)| known == bounds) {
             return Ok(Some(gait.clone()));
         }

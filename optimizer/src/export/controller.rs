@@ -199,7 +199,7 @@ impl ControllerFile {
             .collect();
         // Prosthetic knee and ankle are the last two coordinates and the last two torques.
         let column =
-            |value: &dyn Fn(&crate::gait::motion::Instant) -> f64| rows.iter().map(|(_, i)| value(i)).collect();
+            |value: &dyn Fn(&crate::gait::motion::GaitInstant) -> f64| rows.iter().map(|(_, i)| value(i)).collect();
         let trajectory = Trajectory {
             rate_hz,
             time_s: rows.iter().map(|(time, _)| *time).collect(),

@@ -1,7 +1,7 @@
 //! A stride sampled at a rate.
 
 use crate::gait::Gait;
-use crate::gait::motion::{Instant, instant};
+use crate::gait::motion::{GaitInstant, instant};
 use crate::model_error::ModelError;
 
 /// Allowed sampling rates, Hz.
@@ -9,7 +9,7 @@ pub const RATE_RANGE_HZ: (f64, f64) = (10.0, 5000.0);
 
 /// Samples of a stride at a rate, with their times in s from right heel strike. The last sample is the end of the
 /// stride, so the last interval may be shorter.
-pub(super) fn samples(gait: &Gait, rate_hz: f64) -> Result<Vec<(f64, Instant)>, ModelError> {
+pub(super) fn samples(gait: &Gait, rate_hz: f64) -> Result<Vec<(f64, GaitInstant)>, ModelError> {
     gait.validate()?;
     ModelError::check_range("rate_hz", rate_hz, RATE_RANGE_HZ.0, RATE_RANGE_HZ.1)?;
     let end: f64 = gait.domains.iter().map(|d| d.duration_s).sum();

@@ -8,7 +8,7 @@ use crate::gait::{DomainTrajectory, Gait, MuscleTrajectory};
 
 /// The gait at one instant of a domain.
 #[derive(Debug, Clone)]
-pub(crate) struct Instant {
+pub(crate) struct GaitInstant {
     pub(crate) q: [f64; 9],
     pub(crate) qd: [f64; 9],
     pub(crate) qdd: [f64; 9],
@@ -28,14 +28,14 @@ pub(crate) struct MuscleInstant {
 }
 
 /// The gait at a fraction (0 to 1) of the duration of a well-formed domain.
-pub(crate) fn instant(domain: &DomainTrajectory, share: f64) -> Instant {
+pub(crate) fn instant(domain: &DomainTrajectory, share: f64) -> GaitInstant {
     let gaps = domain.q.len() - 1;
     let gap_length = domain.duration_s / gaps as f64;
     let position = share.clamp(0.0, 1.0) * gaps as f64;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 <= position <= gaps
     let gap = (position.floor() as usize).min(gaps - 1);
     let within = position - gap as f64;
-    let mut result = Instant {
+    let mut result = GaitInstant {
         q: [0.0; 9],
         qd: [0.0; 9],
         qdd: [0.0; 9],
@@ -51,7 +51,7 @@ pub(crate) fn instant(domain: &DomainTrajectory, share: f64) -> Instant {
         result.qdd[i] = second / (gap_length * gap_length);
     }
     let interval =
-        Interval { first: gap - gap % 2, share: 0.5 * ((gap % 2) as f64 + within), length: 2.0 * gap_length };
+        MeshInterval { first: gap - gap % 2, share: 0.5 * ((gap % 2) as f64 + within), length: 2.0 * gap_length };
     for i in 0..6 {
         result.u[i] = interval.parabola(|k| domain.u[k][i]);
     }
@@ -82,7 +82,7 @@ fn refine(domain: &DomainTrajectory, parts: usize) -> DomainTrajectory {
     let linear = |value: &dyn Fn(usize) -> f64, (gap, part): (usize, usize)| {
         if part == 0 { value(gap) } else { value(gap) + share(part) * (value(gap + 1) - value(gap)) }
     };
-    let instants: Vec<Instant> =
+    let instants: Vec<GaitInstant> =
         places().map(|(gap, part)| instant(domain, (gap as f64 + share(part)) / gaps as f64)).collect();
     DomainTrajectory {
         time_s: places().map(|place| linear(&|k| domain.time_s[k], place)).collect(),
@@ -110,13 +110,13 @@ fn refine(domain: &DomainTrajectory, parts: usize) -> DomainTrajectory {
 }
 
 /// A mesh interval of three nodes, and a position in it.
-struct Interval {
+struct MeshInterval {
     first: usize,
     share: f64,
     length: f64,
 }
 
-impl Interval {
+impl MeshInterval {
     fn parabola(&self, value: impl Fn(usize) -> f64) -> f64 {
         let [a, b, c] = [value(self.first), value(self.first + 1), value(self.first + 2)];
         let s = self.share;
@@ -221,7 +221,7 @@ mod tests {
             for (found, wanted) in cubic(end(0.0), end(1.0), s).into_iter().zip(power(3, s)) {
                 assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
             }
-            let interval = Interval { first: 4, share: s, length: 2.0 };
+            let interval = MeshInterval { first: 4, share: s, length: 2.0 };
             let found = interval.parabola(|k| power(2, (k as f64 - 4.0) / 2.0)[0]);
             assert!((found - power(2, s)[0]).abs() < 1e-12);
         }

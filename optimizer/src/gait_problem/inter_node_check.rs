@@ -11,7 +11,7 @@ use super::program_data::GaitProgram;
 use super::rows::HeightRow;
 use crate::body::{Axis, COORDINATES, JOINTS, PointState};
 use crate::gait::Gait;
-use crate::gait::motion::{Instant, instant};
+use crate::gait::motion::{GaitInstant, instant};
 use crate::muscle::MUSCLE_COUNT;
 use interior_point::NonlinearProgram;
 
@@ -84,7 +84,7 @@ pub fn inter_node_excess(program: &GaitProgram, gait: &Gait, x: &[f64]) -> Inter
 }
 
 /// Calls `note` at the instants of the check, with domain, interval between adjacent nodes, and relative time in the domain.
-fn visit(program: &GaitProgram, gait: &Gait, mut note: impl FnMut(usize, usize, f64, &Instant)) {
+fn visit(program: &GaitProgram, gait: &Gait, mut note: impl FnMut(usize, usize, f64, &GaitInstant)) {
     for (d, layout) in program.layout.domains.iter().enumerate() {
         let gaps = layout.points - 1;
         for gap in 0..gaps {
@@ -143,7 +143,7 @@ fn visit_variables(
     program: &GaitProgram,
     layout: &DomainLayout,
     gap: usize,
-    now: &Instant,
+    now: &GaitInstant,
     note: &mut dyn FnMut([usize; 2], f64, f64),
 ) {
     let beside = |offset: usize| [layout.point(gap) + offset, layout.point(gap + 1) + offset];
@@ -172,7 +172,7 @@ fn visit_variables(
 fn visit_heights(
     program: &GaitProgram,
     (d, gap, share): (usize, usize, f64),
-    now: &Instant,
+    now: &GaitInstant,
     x: &[f64],
     note: &mut dyn FnMut(HeightRow, f64),
 ) {
@@ -187,7 +187,7 @@ fn visit_heights(
 fn note_forces(
     program: &GaitProgram,
     (d, gap, share): (usize, usize, f64),
-    now: &Instant,
+    now: &GaitInstant,
     values: &[f64],
     excess: &mut InterNodeExcess,
 ) {

@@ -168,13 +168,13 @@ impl<'a> Solution<'a> {
         let stays = |j: usize| {
             let x = point.x[j];
             let [least, most] = self.between.as_ref().map_or([f64::INFINITY, f64::NEG_INFINITY], |b| b.reach[j]);
-            let lower = Side {
+            let lower = MovingBound {
                 bound: moved.tightened.lower[j],
                 distance: x - own.tightened.lower[j],
                 moved: x - moved.tightened.lower[j],
                 multiplier: point.lower_multipliers[j],
             };
-            let upper = Side {
+            let upper = MovingBound {
                 bound: moved.tightened.upper[j],
                 distance: own.tightened.upper[j] - x,
                 moved: moved.tightened.upper[j] - x,
@@ -199,7 +199,7 @@ impl<'a> Solution<'a> {
             let bound = of.program.rows.lower[row] + of.margins.rows.get(&row).copied().unwrap_or(0.0);
             let moved = value - by * per_metre;
             let multiplier = of.point.slack_lower_multipliers[row];
-            let side = Side { bound, distance: value - bound, moved: moved - bound, multiplier };
+            let side = MovingBound { bound, distance: value - bound, moved: moved - bound, multiplier };
             moved == value || side.stays_inactive(of.tolerance)
         };
         let between = self.between.iter().flat_map(|between| &between.clearances);
@@ -208,14 +208,14 @@ impl<'a> Solution<'a> {
 }
 
 /// A bound that moves, with its distances from the gait before and after.
-struct Side {
+struct MovingBound {
     bound: f64,
     distance: f64,
     moved: f64,
     multiplier: f64,
 }
 
-impl Side {
+impl MovingBound {
     fn stays_inactive(&self, tolerance: f64) -> bool {
         let least = LEAST_DISTANCE * self.bound.abs().max(1.0);
         let was_inactive = self.distance >= least && self.multiplier <= self.distance;

@@ -27,21 +27,21 @@ const STEP_TOLERANCE: f64 = 0.05;
 const GUESS_TOLERANCE: f64 = 1e-4;
 
 /// An instant of the stride: the nodes that share it.
-struct Instant {
+struct StrideInstant {
     /// Domain and node.
     members: Vec<(usize, usize)>,
     fraction: f64,
 }
 
 /// The instants of the stride. The last node of a domain and the first node of the next one share an instant.
-fn instants(program: &GaitProgram) -> Vec<Instant> {
-    let mut result: Vec<Instant> = Vec::new();
+fn instants(program: &GaitProgram) -> Vec<StrideInstant> {
+    let mut result: Vec<StrideInstant> = Vec::new();
     for (d, domain) in program.layout.domains.iter().enumerate() {
         for k in 0..domain.points {
             let fraction = program.stride_fraction(d, domain.sigma(k));
             match result.last_mut() {
                 Some(last) if k == 0 && d > 0 => last.members.push((d, k)),
-                _ => result.push(Instant { members: vec![(d, k)], fraction }),
+                _ => result.push(StrideInstant { members: vec![(d, k)], fraction }),
             }
         }
     }
@@ -70,7 +70,7 @@ impl Triplets {
 
 /// Treatment of the rows of a QP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Rows {
+enum RowTreatment {
     /// Every row must hold.
     Hard,
     /// Slack variables with the penalty [`ROW_PRICE`] relax every row, so that the QP is feasible.
@@ -104,15 +104,15 @@ pub fn solve(program: &GaitProgram, guess: &GuessSettings, cancel: &dyn Fn() -> 
         .collect();
     let mut q = targets.clone();
     let torso = program.variable_range(program.layout.domains[0].point(0) + 2);
-    let mut rows = Rows::Hard;
+    let mut rows = RowTreatment::Hard;
     for pass in 0..PASSES {
         if cancel() {
             break;
         }
         let step_with = |rows| linearised_step(program, &instants, &targets, &q, right_step, stride, torso, rows);
         let mut step = step_with(rows);
-        if step.is_none() && rows == Rows::Hard {
-            rows = Rows::Soft;
+        if step.is_none() && rows == RowTreatment::Hard {
+            rows = RowTreatment::Soft;
             step = step_with(rows);
         }
         let Some(step) = step else { break };
@@ -153,13 +153,13 @@ fn joint_range(coordinate: usize, torso: (f64, f64), hip_ankle: [(f64, f64); 9])
 #[allow(clippy::too_many_arguments)] // one call
 fn linearised_step(
     program: &GaitProgram,
-    instants: &[Instant],
+    instants: &[StrideInstant],
     targets: &[[f64; 9]],
     q: &[[f64; 9]],
     right_step: f64,
     stride: f64,
     torso: (f64, f64),
-    rows_are: Rows,
+    rows_are: RowTreatment,
 ) -> Option<Vec<f64>> {
     let count = instants.len();
     let coordinates = 9 * count;
@@ -274,7 +274,7 @@ fn linearised_step(
     let mut rhs = equality_rhs;
     rhs.extend(inequality_rhs);
     let mut n = coordinates;
-    if rows_are == Rows::Soft {
+    if rows_are == RowTreatment::Soft {
         // One slack variable for each row.
         for row in 0..ne + ni {
             rows.push(row, n, -1.0);

@@ -3,7 +3,7 @@
 use super::heel_strikes::{HeelStrikes, ROUNDING_S};
 use super::motion_recording::MotionRecording;
 use super::plausibility::{no_walker, unlike_builtin};
-use super::reference_gait::{REFERENCE_ROWS, ReferenceGait, Walker};
+use super::reference_gait::{MeasuredPerson, REFERENCE_ROWS, ReferenceGait};
 use crate::model_error::ModelError;
 
 /// Durations of valid strides, s.
@@ -89,7 +89,12 @@ impl MotionRecording {
     ///
     /// # Errors
     /// [`ModelError`] if no stride is valid, or if the mean stride is implausible.
-    pub fn reference(&self, name: &str, how: &HeelStrikes, walker: Walker) -> Result<ReferenceGait, ModelError> {
+    pub fn reference(
+        &self,
+        name: &str,
+        how: &HeelStrikes,
+        walker: MeasuredPerson,
+    ) -> Result<ReferenceGait, ModelError> {
         walker.validate()?;
         let strikes = self.heel_strikes(how)?;
         let strides = self.strides(&strikes).into_iter().filter(|stride| stride.is_used);

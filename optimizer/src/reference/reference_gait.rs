@@ -150,7 +150,7 @@ impl ReferenceGait {
         if let Some(deviation) = &self.standard_deviation_rad {
             check_curves("standard_deviation_rad", deviation, 0.0)?;
         }
-        Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg }.validate()
+        MeasuredPerson { height_m: self.height_m, body_mass_kg: self.body_mass_kg }.validate()
     }
 
     /// The five angles at a fraction of the stride, rad; periodic, interpolated linearly.
@@ -175,14 +175,14 @@ impl ReferenceGait {
 
 /// Height and mass of the measured person, if known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Walker {
+pub struct MeasuredPerson {
     /// Body height, m.
     pub height_m: Option<f64>,
     /// Body mass, kg.
     pub body_mass_kg: Option<f64>,
 }
 
-impl Walker {
+impl MeasuredPerson {
     pub(super) fn validate(&self) -> Result<(), ModelError> {
         for (field, value, (low, high)) in [
             ("height_m", self.height_m, Subject::HEIGHT_RANGE_M),

@@ -18,7 +18,7 @@ pub struct ActiveConstraint {
 
 /// One side of a variable or of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Side {
+struct ConstraintSide {
     of_row: bool,
     index: usize,
     is_upper: bool,
@@ -27,7 +27,7 @@ struct Side {
 /// Distances and multipliers of every finite bound at a solution.
 pub(super) struct ActiveSet {
     /// Side, distance from the bound, multiplier.
-    sides: Vec<(Side, f64, f64)>,
+    sides: Vec<(ConstraintSide, f64, f64)>,
 }
 
 impl ActiveSet {
@@ -38,21 +38,29 @@ impl ActiveSet {
         let (mut row_lower, mut row_upper) = (vec![0.0; m], vec![0.0; m]);
         program.row_bounds(&mut row_lower, &mut row_upper);
         let mut sides = Vec::new();
-        let mut note = |side: Side, distance: f64, multiplier: f64| {
+        let mut note = |side: ConstraintSide, distance: f64, multiplier: f64| {
             if distance.is_finite() {
                 sides.push((side, distance.max(0.0), multiplier));
             }
         };
         for index in (0..n).filter(|&j| lower[j] < upper[j]) {
-            let side = Side { of_row: false, index, is_upper: false };
+            let side = ConstraintSide { of_row: false, index, is_upper: false };
             note(side, point.x[index] - lower[index], point.lower_multipliers[index]);
-            note(Side { is_upper: true, ..side }, upper[index] - point.x[index], point.upper_multipliers[index]);
+            note(
+                ConstraintSide { is_upper: true, ..side },
+                upper[index] - point.x[index],
+                point.upper_multipliers[index],
+            );
         }
         for index in (0..m).filter(|&i| row_lower[i] < row_upper[i]) {
-            let side = Side { of_row: true, index, is_upper: false };
+            let side = ConstraintSide { of_row: true, index, is_upper: false };
             let slack = point.slacks[index];
             note(side, slack - row_lower[index], point.slack_lower_multipliers[index]);
-            note(Side { is_upper: true, ..side }, row_upper[index] - slack, point.slack_upper_multipliers[index]);
+            note(
+                ConstraintSide { is_upper: true, ..side },
+                row_upper[index] - slack,
+                point.slack_upper_multipliers[index],
+            );
         }
         Self { sides }
     }
@@ -86,7 +94,7 @@ impl ActiveSet {
 }
 
 /// Whether a bound, or the row that it limits, depends on the parameter.
-fn depends(side: Side, parameter: &ParameterDerivative) -> bool {
+fn depends(side: ConstraintSide, parameter: &ParameterDerivative) -> bool {
     let i = side.index;
     match (side.of_row, side.is_upper) {
         (false, false) => parameter.lower[i] != 0.0,
@@ -97,7 +105,7 @@ fn depends(side: Side, parameter: &ParameterDerivative) -> bool {
 }
 
 /// Derivative of the distance from a bound.
-fn distance_rate(side: Side, parameter: &ParameterDerivative, along: &WarmPoint) -> f64 {
+fn distance_rate(side: ConstraintSide, parameter: &ParameterDerivative, along: &WarmPoint) -> f64 {
     let i = side.index;
     match (side.of_row, side.is_upper) {
         (false, false) => along.x[i] - parameter.lower[i],
@@ -107,7 +115,7 @@ fn distance_rate(side: Side, parameter: &ParameterDerivative, along: &WarmPoint)
     }
 }
 
-fn multiplier_rate(side: Side, along: &WarmPoint) -> f64 {
+fn multiplier_rate(side: ConstraintSide, along: &WarmPoint) -> f64 {
     let i = side.index;
     match (side.of_row, side.is_upper) {
         (false, false) => along.lower_multipliers[i],

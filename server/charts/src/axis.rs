@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 /// A range of values with round ticks.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axis {
+pub(super) struct ChartAxis {
     /// Smallest value shown.
     pub(super) from: f64,
     /// Largest value shown.
@@ -17,7 +17,7 @@ pub(super) struct Axis {
 /// Fraction of the tick distance that is too small to see.
 const HAIR: f64 = 0.05;
 
-impl Axis {
+impl ChartAxis {
     /// An axis over all values, widened to whole ticks unless `exact`; about `count` ticks.
     pub(super) fn over(values: impl Iterator<Item = f64>, count: usize, exact: bool) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -120,18 +120,18 @@ mod tests {
 
     #[test]
     fn ticks_are_round() {
-        let axis = Axis::over([0.03, 0.41].into_iter(), 5, false);
+        let axis = ChartAxis::over([0.03, 0.41].into_iter(), 5, false);
         assert_eq!(
             axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(),
             ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]
         );
-        let axis = Axis::over([-40.0, 60.0].into_iter(), 5, false);
+        let axis = ChartAxis::over([-40.0, 60.0].into_iter(), 5, false);
         assert_eq!(axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(), ["−40", "−20", "0", "20", "40", "60"]);
     }
 
     #[test]
     fn value_barely_below_a_tick_needs_no_further_tick() {
-        let axis = Axis::over([-0.01, 1.02].into_iter(), 5, false);
+        let axis = ChartAxis::over([-0.01, 1.02].into_iter(), 5, false);
         assert_eq!((axis.from, axis.to, axis.ticks[0]), (-0.01, 1.02, 0.0));
     }
 
@@ -143,7 +143,7 @@ mod tests {
     proptest! {
         #[test]
         fn every_value_lies_on_the_axis(values in proptest::collection::vec(-1e6_f64..1e6, 1..20), count in 2_usize..10) {
-            let axis = Axis::over(values.iter().copied(), count, false);
+            let axis = ChartAxis::over(values.iter().copied(), count, false);
             prop_assert!(axis.ticks.len() >= 2 && axis.ticks.len() <= count + 3);
             for value in values {
                 let place = axis.place(value);
@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn empty_and_non_finite_values_still_give_an_axis() {
         for values in [vec![], vec![f64::NAN], vec![3.0], vec![0.0, 0.0]] {
-            let axis = Axis::over(values.into_iter(), 5, false);
+            let axis = ChartAxis::over(values.into_iter(), 5, false);
             assert!(axis.from < axis.to && axis.ticks.len() >= 2, "{axis:?}");
         }
     }

@@ -1,8 +1,8 @@
 //! Line charts as SVG.
 
-use super::axis::{Axis, power_of_ten};
+use super::axis::{ChartAxis, power_of_ten};
 use super::escaped_text::escape;
-use super::series::{Band, Link, Series, Stroke};
+use super::series::{Band, PointLink, Series, Stroke};
 use std::fmt::Write;
 
 /// A named interval of the x axis.
@@ -107,7 +107,7 @@ impl Chart {
 
     /// Adds points that are links on a page.
     #[must_use]
-    pub fn with_links(mut self, label: &str, colour: usize, points: Vec<((f64, f64), Link)>) -> Self {
+    pub fn with_links(mut self, label: &str, colour: usize, points: Vec<((f64, f64), PointLink)>) -> Self {
         let (points, links) = points.into_iter().unzip();
         self.series.push(Series { label: label.to_owned(), points, colour, stroke: Stroke::Points, links });
         self
@@ -149,7 +149,7 @@ impl Chart {
     }
 
     /// For the script of the cursor: the lines of each cycle and where in the stride it begins, and places of lines.
-    fn cursor_data(&self, x: &Axis, y: &Axis) -> String {
+    fn cursor_data(&self, x: &ChartAxis, y: &ChartAxis) -> String {
         let cycle = |cycle: &LegCycle| {
             let lines = cycle.colour.map_or_else(|| "*".to_owned(), |colour| format!("c{}", colour % 10));
             format!("{lines} {:.2}", cycle.begins_percent)
@@ -181,9 +181,9 @@ impl Chart {
         svg
     }
 
-    fn axes(&self) -> (Axis, Axis) {
+    fn axes(&self) -> (ChartAxis, ChartAxis) {
         let all = || self.series.iter().flat_map(|series| series.points.iter());
-        let mut x = Axis::over(all().map(|p| p.0), 8, true);
+        let mut x = ChartAxis::over(all().map(|p| p.0), 8, true);
         if self.whole_x {
             x.keep_whole_ticks();
         }
@@ -193,7 +193,7 @@ impl Chart {
         let areas = self.bands.iter().flat_map(|band| band.points.iter()).flat_map(|p| [p.1, p.2]);
         let least = self.y_range.into_iter().flat_map(|(low, high)| [low, high]);
         let values = all().map(|p| p.1).chain(areas).chain(least).filter(|value| value.is_finite());
-        let mut y = Axis::over(values.map(|value| self.height(value)), 5, false);
+        let mut y = ChartAxis::over(values.map(|value| self.height(value)), 5, false);
         if self.log_y {
             y.keep_whole_ticks();
         }
@@ -215,7 +215,7 @@ impl Chart {
         lines.chain(bands).chain(marks).collect()
     }
 
-    fn draw(&self, svg: &mut String, x: &Axis, y: &Axis, with_links: bool) -> std::fmt::Result {
+    fn draw(&self, svg: &mut String, x: &ChartAxis, y: &ChartAxis, with_links: bool) -> std::fmt::Result {
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
         let px = |value: f64| LEFT + x.place(value) * (right - LEFT);
         let at_height = |height: f64| bottom - y.place(height) * (bottom - TOP);
@@ -350,7 +350,7 @@ mod tests {
 
     #[test]
     fn points_are_links_on_a_page_but_not_in_a_file() {
-        let link = Link { address: "/trials/1".to_owned(), name: "trial <1>".to_owned() };
+        let link = PointLink { address: "/trials/1".to_owned(), name: "trial <1>".to_owned() };
         let chart = Chart::new("", "", "").with_links("trials", 0, vec![((0.0, 1.0), link)]);
         let svg = chart.svg();
         assert!(svg.contains("<a href=\"/trials/1\" tabindex=\"-1\" aria-label=\"trial &lt;1&gt;\">"), "{svg}");

@@ -13,9 +13,9 @@ const FORMULA: [char; 8] = ['=', '+', '-', '@', '\u{ff1d}', '\u{ff0b}', '\u{ff0d
 
 /// An escaped cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Cell(String);
+pub struct CsvCell(String);
 
-impl Cell {
+impl CsvCell {
     /// An empty cell.
     pub(crate) const EMPTY: Self = Self(String::new());
 
@@ -43,25 +43,25 @@ impl Cell {
     }
 }
 
-impl From<&str> for Cell {
+impl From<&str> for CsvCell {
     fn from(text: &str) -> Self {
         Self::text(text)
     }
 }
 
-impl From<String> for Cell {
+impl From<String> for CsvCell {
     fn from(text: String) -> Self {
         Self::text(&text)
     }
 }
 
-impl From<&String> for Cell {
+impl From<&String> for CsvCell {
     fn from(text: &String) -> Self {
         Self::text(text)
     }
 }
 
-impl<T: Into<Self>> From<Option<T>> for Cell {
+impl<T: Into<Self>> From<Option<T>> for CsvCell {
     fn from(value: Option<T>) -> Self {
         value.map_or(Self::EMPTY, Into::into)
     }
@@ -69,12 +69,12 @@ impl<T: Into<Self>> From<Option<T>> for Cell {
 
 macro_rules! numbers {
     ($($number:ty),*) => {$(
-        impl From<$number> for Cell {
+        impl From<$number> for CsvCell {
             fn from(number: $number) -> Self {
                 Self(number.to_string())
             }
         }
-        impl From<&$number> for Cell {
+        impl From<&$number> for CsvCell {
             fn from(number: &$number) -> Self {
                 Self(number.to_string())
             }
@@ -96,14 +96,14 @@ pub struct CsvTable(String);
 
 impl CsvTable {
     /// A table with this header.
-    pub fn new<T: Into<Cell>>(header: impl IntoIterator<Item = T>) -> Self {
+    pub fn new<T: Into<CsvCell>>(header: impl IntoIterator<Item = T>) -> Self {
         let mut table = Self::default();
         table.row(header.into_iter().map(Into::into));
         table
     }
 
     /// Adds a row.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub fn row(&mut self, cells: impl IntoIterator<Item = CsvCell>) {
         for (place, cell) in cells.into_iter().enumerate() {
             let comma = if place == 0 { "" } else { "," };
             // Writing to a String cannot fail.
@@ -140,10 +140,10 @@ mod tests {
         for hidden in ['\u{ad}', '\u{200b}', '\u{2060}', '\u{feff}', '\u{3164}', '\u{e0020}', '\u{a0}', '\u{7f}', '\0']
         {
             for start in ["=1", "+1", "-1", "@A1", "\u{ff1d}1", " =1", "\t=1"] {
-                let cell = Cell::text(&format!("{hidden}{start}"));
+                let cell = CsvCell::text(&format!("{hidden}{start}"));
                 assert!(cell.0.starts_with('\'') || cell.0.starts_with("\"'"), "{hidden:?}{start:?}: {cell:?}");
             }
-            assert_eq!(Cell::text(&format!("{hidden}a=1")).0, format!("{hidden}a=1"));
+            assert_eq!(CsvCell::text(&format!("{hidden}a=1")).0, format!("{hidden}a=1"));
         }
     }
 
@@ -152,7 +152,7 @@ mod tests {
         for (text, expected) in
             [("a;=1+1;b", "\"a;'=1+1;b\""), ("x\n=1", "\"x\n'=1\""), ("x\t @A1", "\"x\t' @A1\""), ("a; b", "\"a; b\"")]
         {
-            assert_eq!(Cell::text(text).0, expected);
+            assert_eq!(CsvCell::text(text).0, expected);
         }
     }
 

@@ -198,7 +198,7 @@ fn file_name(group: &str, title: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Cell, Node, Stroke};
+    use crate::{Stroke, Tile, TreeNode};
 
     fn figure() -> Figure {
         let chart = Chart::new("Knee, \"left\" <a>", "cycle, %", "angle, °")
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn map_is_self_contained_and_has_csv() {
-        let one = |value: f64| Cell { value, text: format!("{value:+.2}"), below: "± 0.10".to_owned(), framed: true };
+        let one = |value: f64| Tile { value, text: format!("{value:+.2}"), below: "± 0.10".to_owned(), framed: true };
         let map = HeatMap {
             title: "Utility".to_owned(),
             columns: ("a5: clearance, m".to_owned(), vec![0.0, 0.013]),
@@ -241,13 +241,13 @@ mod tests {
 
     #[test]
     fn large_tree_is_self_contained_with_a_legend() {
-        let node = |i: usize| Node {
+        let node = |i: usize| TreeNode {
             parent: i.checked_sub(1),
             label: format!("trial {}", i + 1),
             link: "/trials/x".to_owned(),
             class: if i == 3 { "best" } else { "not_converged" },
         };
-        let forest = (0..400).map(|i| Node { parent: node(i).parent.map(|p| p / 2), ..node(i) }).collect();
+        let forest = (0..400).map(|i| TreeNode { parent: node(i).parent.map(|p| p / 2), ..node(i) }).collect();
         let figure = Figure::tree(Tree { title: "Warm starts".to_owned(), nodes: forest });
         let svg = figure.svg();
         assert!(svg.contains(".tree circle") && !svg.contains("var(--") && !svg.contains("href"), "{}", &svg[..3000]);

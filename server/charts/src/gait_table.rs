@@ -1,6 +1,6 @@
 //! A gait as a CSV table with one row for each node.
 
-use crate::csv_table::{Cell, CsvTable, cells};
+use crate::csv_table::{CsvCell, CsvTable, cells};
 use crate::gait_series::{FORCE_NAMES, MUSCLES, points};
 use gait_optimizer::Gait;
 
@@ -23,8 +23,8 @@ pub fn gait_csv(gait: &Gait) -> String {
     let mut table = CsvTable::new(header);
     for point in points(gait) {
         let mut row = cells![point.time_s, point.domain];
-        row.extend(point.q.iter().chain(point.qd).chain(point.u).chain(&point.forces).map(Cell::from));
-        row.extend(point.activation.iter().flat_map(|a| a.iter()).map(Cell::from));
+        row.extend(point.q.iter().chain(point.qd).chain(point.u).chain(&point.forces).map(CsvCell::from));
+        row.extend(point.activation.iter().flat_map(|a| a.iter()).map(CsvCell::from));
         table.row(row);
     }
     table.into_text()

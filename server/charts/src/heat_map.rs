@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cell {
+pub struct Tile {
     /// Value that determines the shade.
     pub value: f64,
     /// Text of the cell.
@@ -27,7 +27,7 @@ pub struct HeatMap {
     /// Label of the rows, with its unit, and their values.
     pub rows: (String, Vec<f64>),
     /// Cells by row.
-    pub cells: Vec<Vec<Cell>>,
+    pub cells: Vec<Vec<Tile>>,
     /// Values of the lightest and the darkest shade.
     pub range: (f64, f64),
 }
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn cells_have_their_values_and_equal_values_share_a_shade() {
-        let cell = |value: f64| Cell { value, text: format!("<{value}>"), below: String::new(), framed: value > 1.0 };
+        let cell = |value: f64| Tile { value, text: format!("<{value}>"), below: String::new(), framed: value > 1.0 };
         let map = HeatMap {
             title: "t".to_owned(),
             columns: ("x".to_owned(), vec![1.0, 2.0]),

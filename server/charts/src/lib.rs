@@ -31,14 +31,14 @@ pub use axis::power_of_ten;
 pub use chart::{Chart, LegCycle, Span};
 pub use figure::{Drawing, Figure};
 pub use gait_tiles::gait_tiles;
-pub use heat_map::{Cell, HeatMap};
+pub use heat_map::{HeatMap, Tile};
 pub use parallel::{Parallel, ParallelAxis, ParallelLine};
 #[cfg(feature = "png")]
 pub use png::PngError;
 pub(crate) use reference_band::over_reference_of_leg;
 pub use reference_band::{band_in_words, over_reference};
-pub use series::{Band, Link, Series, Stroke};
+pub use series::{Band, PointLink, Series, Stroke};
 pub use sparkline::sparkline;
 pub use standalone::STYLE_SHEET;
-pub use tree::{Node, Tree};
+pub use tree::{Tree, TreeNode};
 pub use walker::{Animation, Ghost, WalkerFigure};

@@ -1,9 +1,9 @@
 //! Parallel coordinates: one axis for each tuned bound and one for the outcome, and a line for each trial. The better the
 //! outcome, the stronger the line. The last axis shows the outcome itself, so no information is in the colour alone.
 
-use super::axis::Axis;
+use super::axis::ChartAxis;
 use super::escaped_text::escape;
-use super::series::Link;
+use super::series::PointLink;
 use std::fmt::Write;
 
 /// The axis of a bound.
@@ -21,7 +21,7 @@ pub struct ParallelAxis {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParallelLine {
     /// The trial.
-    pub link: Link,
+    pub link: PointLink,
     /// The level on each axis.
     pub levels: Vec<usize>,
     /// The outcome; `None` without a gait.
@@ -113,7 +113,7 @@ impl Parallel {
         let bottom = HEIGHT - BOTTOM;
         let step = (WIDTH - LEFT - RIGHT) / self.axes.len().max(1) as f64;
         let x = |place: usize| LEFT + step * place as f64;
-        let outcomes = Axis::over(self.lines.iter().filter_map(|line| line.outcome), 5, false);
+        let outcomes = ChartAxis::over(self.lines.iter().filter_map(|line| line.outcome), 5, false);
         let height = |outcome: f64| {
             let place = outcomes.place(outcome);
             // Better outcomes are at the top.
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     fn line(number: usize, level: usize, outcome: Option<f64>) -> ParallelLine {
-        let link = Link { address: format!("/trials/{number}"), name: format!("trial {number}") };
+        let link = PointLink { address: format!("/trials/{number}"), name: format!("trial {number}") };
         ParallelLine { link, levels: vec![level, 0], outcome }
     }
 

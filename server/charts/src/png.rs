@@ -44,7 +44,7 @@ impl Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Chart, Node, Stroke, Tree};
+    use crate::{Chart, Stroke, Tree, TreeNode};
 
     fn figure() -> Figure {
         let points = vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)];
@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn png_of_a_large_tree_is_within_the_pixel_limit() {
-        let node = |i: usize| Node {
+        let node = |i: usize| TreeNode {
             parent: i.checked_sub(1).map(|p| p / 2),
             label: format!("trial {}", i + 1),
             link: "/trials/x".to_owned(),

@@ -50,19 +50,19 @@ pub struct Series {
     /// Style.
     pub stroke: Stroke,
     /// What each point leads to on a page; empty if the points are no links.
-    pub links: Vec<Link>,
+    pub links: Vec<PointLink>,
 }
 
 /// A link of a page.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Link {
+pub struct PointLink {
     /// Address.
     pub address: String,
     /// Name.
     pub name: String,
 }
 
-impl Link {
+impl PointLink {
     /// Opens the link. Not in the order of the keyboard: a table of the page has the same links.
     pub(super) fn open(&self, svg: &mut String) -> std::fmt::Result {
         let (address, name) = (escape(&self.address), escape(&self.name));

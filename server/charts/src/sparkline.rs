@@ -1,6 +1,6 @@
 //! Sparklines: small lines without axes, within text.
 
-use super::axis::Axis;
+use super::axis::ChartAxis;
 use std::fmt::Write;
 
 const WIDTH: f64 = 96.0;
@@ -10,8 +10,8 @@ const MARGIN: f64 = 3.0;
 /// A step line of values from 0 to `end`; `None` without values.
 pub fn sparkline(label: &str, points: &[(f64, f64)], end: f64) -> Option<String> {
     let (first, last) = (points.first()?, points.last()?);
-    let x = Axis::over([first.0, end.max(last.0)].into_iter(), 2, true);
-    let y = Axis::over(points.iter().map(|p| p.1), 2, true);
+    let x = ChartAxis::over([first.0, end.max(last.0)].into_iter(), 2, true);
+    let y = ChartAxis::over(points.iter().map(|p| p.1), 2, true);
     let px = |value: f64| MARGIN + x.place(value) * (WIDTH - 2.0 * MARGIN);
     let py = |value: f64| HEIGHT - MARGIN - y.place(value) * (HEIGHT - 2.0 * MARGIN);
     let mut path = format!("M{:.1} {:.1}", px(first.0), py(first.1));

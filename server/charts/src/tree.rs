@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// One node.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Node {
+pub struct TreeNode {
     /// Index of the parent, which is smaller than its own.
     pub parent: Option<usize>,
     /// Label.
@@ -32,7 +32,7 @@ pub struct Tree {
     /// Title.
     pub title: String,
     /// Nodes, parents before their children.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<TreeNode>,
 }
 
 impl Tree {
@@ -115,7 +115,7 @@ fn mark(svg: &mut String, class: &str, label: &str, (x, y): (f64, f64)) -> std::
 }
 
 /// The positions of nodes. The first child continues the row of its parent; every other child starts a new row below.
-fn places(nodes: &[Node]) -> Vec<(f64, f64)> {
+fn places(nodes: &[TreeNode]) -> Vec<(f64, f64)> {
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     let mut open: Vec<usize> = Vec::new();
     for (index, node) in nodes.iter().enumerate() {
@@ -145,9 +145,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn nodes(parents: &[Option<usize>]) -> Vec<Node> {
-        let node =
-            |parent: &Option<usize>| Node { parent: *parent, label: "<1>".to_owned(), link: String::new(), class: "" };
+    fn nodes(parents: &[Option<usize>]) -> Vec<TreeNode> {
+        let node = |parent: &Option<usize>| TreeNode {
+            parent: *parent,
+            label: "<1>".to_owned(),
+            link: String::new(),
+            class: "",
+        };
         parents.iter().map(node).collect()
     }
 

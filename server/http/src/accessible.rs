@@ -4,7 +4,7 @@
 //! belongs to. An inaccessible object gets the same response as one that does not exist.
 
 use super::AppState;
-use super::authorization::{Refused, permitted};
+use super::authorization::{RefusedRequest, permitted};
 use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
 use gaitwright_service::access::{Permission, Reach};
@@ -133,15 +133,15 @@ pub(super) struct OfStudy(pub(super) Option<StudyId>);
 pub(crate) struct Id<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 
 impl<T: Located, P: Permission> FromRequestParts<AppState> for Id<T, P> {
-    type Rejection = Refused;
+    type Rejection = RefusedRequest;
 
-    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Refused> {
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, RefusedRequest> {
         let found = if parts.method.is_safe() {
             in_path::<T, P>(parts, app).await.map(|(id, _)| id)
         } else {
             visible::<T, P>(parts, app).await
         };
-        found.map(|id| Self(id, PhantomData)).map_err(|error| Refused::of(parts, error))
+        found.map(|id| Self(id, PhantomData)).map_err(|error| RefusedRequest::of(parts, error))
     }
 }
 
@@ -150,13 +150,13 @@ impl<T: Located, P: Permission> FromRequestParts<AppState> for Id<T, P> {
 pub(crate) struct DespiteWithdrawal<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 
 impl<T: Located, P: Permission> FromRequestParts<AppState> for DespiteWithdrawal<T, P> {
-    type Rejection = Refused;
+    type Rejection = RefusedRequest;
 
-    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Refused> {
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, RefusedRequest> {
         let found = in_path::<T, P>(parts, app).await;
         // A stored response of such a handler has no data of the subject, so it may be repeated.
         parts.extensions.insert(OfStudy(None));
-        found.map(|(id, _)| Self(id, PhantomData)).map_err(|error| Refused::of(parts, error))
+        found.map(|(id, _)| Self(id, PhantomData)).map_err(|error| RefusedRequest::of(parts, error))
     }
 }
 

@@ -21,12 +21,12 @@ pub(crate) struct Authorized<P> {
 
 /// A refusal: a problem document for programs, a page for people.
 #[derive(Debug)]
-pub(crate) struct Refused {
+pub(crate) struct RefusedRequest {
     error: Error,
     for_program: bool,
 }
 
-impl Refused {
+impl RefusedRequest {
     /// The refusal of this request.
     pub(crate) fn of(parts: &Parts, error: Error) -> Self {
         // Nested routers see only the rest of the path.
@@ -35,7 +35,7 @@ impl Refused {
     }
 }
 
-impl IntoResponse for Refused {
+impl IntoResponse for RefusedRequest {
     fn into_response(self) -> Response {
         if self.for_program { Refusal(self.error).into_response() } else { PageError::from(self.error).into_response() }
     }
@@ -55,10 +55,10 @@ pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller
 }
 
 impl<P: Permission, S: Send + Sync> FromRequestParts<S> for Authorized<P> {
-    type Rejection = Refused;
+    type Rejection = RefusedRequest;
 
-    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refused> {
-        let caller = permitted::<P>(&parts.extensions).map_err(|error| Refused::of(parts, error))?;
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, RefusedRequest> {
+        let caller = permitted::<P>(&parts.extensions).map_err(|error| RefusedRequest::of(parts, error))?;
         Ok(Self { caller, right: PhantomData })
     }
 }

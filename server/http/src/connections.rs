@@ -71,7 +71,7 @@ fn descriptors() -> u64 {
 pub struct Peer(SocketAddr);
 
 impl Address for Peer {
-    type Stream = Held;
+    type Stream = HeldConnection;
     type Listener = LimitedListener;
 }
 
@@ -100,7 +100,7 @@ impl LimitedListener {
     }
 }
 
-impl AddrListener<Held, Peer> for LimitedListener {
+impl AddrListener<HeldConnection, Peer> for LimitedListener {
     async fn bind_to(address: Peer) -> io::Result<Self> {
         let listener = std::net::TcpListener::bind(address.0)?;
         listener.set_nonblocking(true)?;
@@ -108,7 +108,7 @@ impl AddrListener<Held, Peer> for LimitedListener {
         Self::new(listener, limits.within_descriptors(), Proxies::default())
     }
 
-    async fn accept_stream(&self) -> io::Result<(Held, Peer)> {
+    async fn accept_stream(&self) -> io::Result<(HeldConnection, Peer)> {
         loop {
             let (stream, peer) = self.listener.accept().await?;
             let network = (!self.proxies.trust(peer.ip())).then(|| ClientAddress::new(peer.ip()).network());
@@ -130,13 +130,13 @@ struct Connections {
     /// Permits for descriptors. A connection returns its permit when it is closed.
     room: Arc<Semaphore>,
     begun: Instant,
-    held: Mutex<Table>,
+    held: Mutex<ConnectionTable>,
 }
 
 #[derive(Debug, Default)]
-struct Table {
+struct ConnectionTable {
     next: u64,
-    by_number: HashMap<u64, Arc<Connection>>,
+    by_number: HashMap<u64, Arc<ClientConnection>>,
     by_network: HashMap<String, usize>,
     /// Closed and refused connections that are not logged yet.
     untold: (u64, u64),
@@ -145,7 +145,7 @@ struct Table {
 
 /// The state of a connection.
 #[derive(Debug)]
-struct Connection {
+struct ClientConnection {
     /// Network of the client; `None` for a trusted proxy.
     network: Option<String>,
     /// Time of the last byte in either direction, in milliseconds since the start.
@@ -162,7 +162,7 @@ impl Connections {
         Self { limits, room, begun: Instant::now(), held: Mutex::default() }
     }
 
-    fn table(&self) -> MutexGuard<'_, Table> {
+    fn table(&self) -> MutexGuard<'_, ConnectionTable> {
         // The table is consistent between statements, so a poisoned lock is usable.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -172,12 +172,12 @@ impl Connections {
     }
 
     /// Accepts a connection; `None` if all connections that it could replace are busy.
-    async fn hold(self: &Arc<Self>, stream: TcpStream, network: Option<String>) -> Option<Held> {
+    async fn hold(self: &Arc<Self>, stream: TcpStream, network: Option<String>) -> Option<HeldConnection> {
         if !self.make_room_for(network.as_deref()) {
             return None;
         }
         let permit = self.permit(network.as_deref()).await?;
-        let connection = Arc::new(Connection {
+        let connection = Arc::new(ClientConnection {
             network,
             active_at: self.milliseconds().into(),
             heard: false.into(),
@@ -185,7 +185,7 @@ impl Connections {
         });
         let number = self.table().enter(&connection);
         let closed = Box::pin(connection.closing.clone().cancelled_owned());
-        Some(Held { stream, closed, number, connection, connections: Arc::clone(self), _permit: permit })
+        Some(HeldConnection { stream, closed, number, connection, connections: Arc::clone(self), _permit: permit })
     }
 
     /// Makes room for a connection of a network, if necessary by closing its longest idle one. Returns whether there is
@@ -223,7 +223,7 @@ impl Connections {
         let mut table = self.table();
         let mut closed = self.close_quietest(&mut table, QUIET, |_| true);
         if !closed && let Some(largest) = table.largest_beyond(network) {
-            let of_largest = |connection: &Connection| connection.network.as_ref() == Some(&largest);
+            let of_largest = |connection: &ClientConnection| connection.network.as_ref() == Some(&largest);
             closed = self.close_quietest(&mut table, Duration::ZERO, of_largest);
         }
         let waits = closed || table.count(network) == 0 || table.is_closing();
@@ -234,9 +234,14 @@ impl Connections {
 
     /// Closes the longest idle connection among some that have been idle for a time. Connections that never sent a byte
     /// come first.
-    fn close_quietest(&self, table: &mut Table, idle: Duration, among: impl Fn(&Connection) -> bool) -> bool {
+    fn close_quietest(
+        &self,
+        table: &mut ConnectionTable,
+        idle: Duration,
+        among: impl Fn(&ClientConnection) -> bool,
+    ) -> bool {
         let now = self.milliseconds();
-        let quiet_since = |connection: &Connection| connection.active_at.load(Ordering::Relaxed);
+        let quiet_since = |connection: &ClientConnection| connection.active_at.load(Ordering::Relaxed);
         let quietest = table
             .by_number
             .values()
@@ -251,7 +256,7 @@ impl Connections {
         true
     }
 
-    fn tell(&self, table: &mut Table) {
+    fn tell(&self, table: &mut ConnectionTable) {
         let (closed, refused) = table.untold;
         if (closed, refused) == (0, 0) || table.told_at.is_some_and(|at| at.elapsed() < SAY_EVERY) {
             return;
@@ -263,8 +268,8 @@ impl Connections {
     }
 }
 
-impl Table {
-    fn enter(&mut self, connection: &Arc<Connection>) -> u64 {
+impl ConnectionTable {
+    fn enter(&mut self, connection: &Arc<ClientConnection>) -> u64 {
         let number = self.next;
         self.next += 1;
         self.by_number.insert(number, Arc::clone(connection));
@@ -304,22 +309,22 @@ impl Table {
 
 /// An open connection that counts towards the limits.
 #[derive(Debug)]
-pub struct Held {
+pub struct HeldConnection {
     stream: TcpStream,
     closed: Pin<Box<WaitForCancellationFutureOwned>>,
     number: u64,
-    connection: Arc<Connection>,
+    connection: Arc<ClientConnection>,
     connections: Arc<Connections>,
     _permit: OwnedSemaphorePermit,
 }
 
-impl Held {
+impl HeldConnection {
     fn active(&self) {
         self.connection.active_at.store(self.connections.milliseconds(), Ordering::Relaxed);
     }
 }
 
-impl Drop for Held {
+impl Drop for HeldConnection {
     fn drop(&mut self) {
         let mut table = self.connections.table();
         table.by_number.remove(&self.number);
@@ -330,7 +335,7 @@ impl Drop for Held {
     }
 }
 
-impl AsyncRead for Held {
+impl AsyncRead for HeldConnection {
     fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         if self.closed.as_mut().poll(cx).is_ready() {
             return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
@@ -345,7 +350,7 @@ impl AsyncRead for Held {
     }
 }
 
-impl AsyncWrite for Held {
+impl AsyncWrite for HeldConnection {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
         if written.is_ready() {

@@ -6,7 +6,7 @@
 
 use super::AppState;
 use super::authentication::Credential;
-use super::authorization::Refused;
+use super::authorization::RefusedRequest;
 use super::visible::Visible;
 use crate::problem_details::Refusal;
 use axum::extract::{FromRequestParts, State};
@@ -44,7 +44,7 @@ impl<P: Permission> FromRequestParts<AppState> for Listening<P> {
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Response> {
         let Visible(study, _) =
-            Visible::<StudyId, P>::from_request_parts(parts, app).await.map_err(Refused::into_response)?;
+            Visible::<StudyId, P>::from_request_parts(parts, app).await.map_err(RefusedRequest::into_response)?;
         let credential = Credential::of(&parts.headers).map_err(|error| Refusal(error).into_response())?;
         let State(app) = State::<AppState>::from_request_parts(parts, app).await.map_err(|never| match never {})?;
         Ok(Self { app, credential, study, right: PhantomData })

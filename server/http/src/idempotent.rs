@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Caller, Permission};
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::idempotency::{self, KEY_UNIQUE, Kept, fingerprint};
+use gaitwright_store::idempotency::{self, KEY_UNIQUE, StoredResponse, fingerprint};
 use gaitwright_store::{LentWriter, OnConstraint, StudyId, commit, consents};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -124,7 +124,7 @@ impl<P: Permission> Idempotent<P> {
         body: &T,
     ) -> Result<Response, Refusal> {
         let body = serde_json::to_string(body).map_err(|e| Error::Internal(e.to_string()))?;
-        let kept = Kept { request: self.request.clone(), status: status.as_u16(), location, body };
+        let kept = StoredResponse { request: self.request.clone(), status: status.as_u16(), location, body };
         if let Some(key) = &self.key {
             // Two concurrent requests with the same key can both have found no stored response.
             idempotency::keep(&mut writer, &self.actor, key, &kept).await.on_constraint(KEY_UNIQUE, || {
@@ -152,7 +152,7 @@ fn key_in(headers: &HeaderMap) -> Result<Option<String>, Error> {
     Ok(Some(key.ok_or_else(|| malformed("must have 1 to 200 printable ASCII characters"))?.to_owned()))
 }
 
-fn response(kept: &Kept) -> Response {
+fn response(kept: &StoredResponse) -> Response {
     let status = StatusCode::from_u16(kept.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     let mut response = (status, [(header::CONTENT_TYPE, "application/json")], kept.body.clone()).into_response();
     if let Some(location) = kept.location.as_ref().and_then(|l| HeaderValue::from_str(l).ok()) {

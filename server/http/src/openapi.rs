@@ -47,7 +47,7 @@ use utoipa_axum::router::OpenApiRouter;
         (name = "trials", description = "Evaluated actions of a study, and their gaits.")
     )
 )]
-struct Described;
+struct ApiDescription;
 
 /// Marks an operation whose response contains a secret. It takes no Idempotency-Key.
 const SHOWN_ONCE: &str = "x-shown-once";
@@ -58,7 +58,7 @@ const PAGE: &str = "Page_";
 /// Every route below `/api/v1` as its handler describes it.
 fn document() -> OpenApi {
     let (_, mut document) =
-        OpenApiRouter::with_openapi(Described::openapi()).nest("/api/v1", api::routes()).split_for_parts();
+        OpenApiRouter::with_openapi(ApiDescription::openapi()).nest("/api/v1", api::routes()).split_for_parts();
     let components = document.components.get_or_insert_default();
     components.schemas.insert(Problem::name().into_owned(), Problem::schema());
     let token = Http::builder().scheme(HttpAuthScheme::Bearer).description(Some("Token created by an administrator"));

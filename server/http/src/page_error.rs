@@ -63,13 +63,13 @@ pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
 }
 
 /// A rendered page, or the error to show.
-pub type Page = Result<Html<String>, PageError>;
+pub type PageResult = Result<Html<String>, PageError>;
 
 /// Renders a template.
 ///
 /// # Errors
 /// If the template fails.
-pub fn page(template: &impl Template) -> Page {
+pub fn page(template: &impl Template) -> PageResult {
     Ok(Html(template.render().map_err(|e| Error::Internal(e.to_string()))?))
 }
 

@@ -1,6 +1,6 @@
 //! Problem documents (RFC 9457): maps each error to its HTTP response.
 
-use super::problem_kinds::Kind;
+use super::problem_kinds::ProblemKind;
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -47,7 +47,7 @@ pub(super) struct Problem {
 
 impl Problem {
     /// A problem of a kind.
-    pub(super) fn new(kind: Kind, detail: String) -> Self {
+    pub(super) fn new(kind: ProblemKind, detail: String) -> Self {
         let entry = kind.entry();
         let (field, value, allowed, request_id) = (None, None, None, None);
         let (kind, title, status) = (entry.uri, entry.title, entry.status.as_u16());
@@ -56,7 +56,7 @@ impl Problem {
 
     /// The default detail for a status.
     pub(super) fn of_status(status: StatusCode) -> Self {
-        let kind = Kind::of_status(status);
+        let kind = ProblemKind::of_status(status);
         Self { status: status.as_u16(), ..Self::new(kind, kind.entry().meaning.to_owned()) }
     }
 
@@ -75,27 +75,28 @@ impl From<&Error> for Problem {
     fn from(error: &Error) -> Self {
         let detail = error.to_string();
         match error {
-            Error::NotFound { .. } => Self::new(Kind::NotFound, detail),
-            Error::Malformed(_) => Self::new(Kind::Malformed, detail),
-            Error::Unreadable(field) => Self::new(Kind::Malformed, detail).of(field),
-            Error::UnsupportedMediaType(_) => Self::new(Kind::UnsupportedMediaType, detail),
-            Error::Invalid(field) => Self::new(Kind::InvalidField, detail).of(field),
-            Error::NotSignedIn(_) => Self::new(Kind::NotSignedIn, detail),
-            Error::TooManyAttempts(_) => Self::new(Kind::TooManyAttempts, detail),
-            Error::Changed(_) => Self::new(Kind::Changed, detail),
-            Error::TooLarge(_) => Self::new(Kind::TooLarge, detail),
-            Error::MethodNotAllowed { .. } => Self::new(Kind::MethodNotAllowed, detail),
-            Error::Forbidden(_) => Self::new(Kind::Forbidden, detail),
-            Error::Conflict(_) => Self::new(Kind::Conflict, detail),
-            Error::Learner(_) => Self::new(Kind::Learner, detail),
-            Error::StorageFull(_) => Self::new(Kind::StorageFull, detail),
-            Error::NotReady(_) => Self::new(Kind::NotReady, detail),
+            Error::NotFound { .. } => Self::new(ProblemKind::NotFound, detail),
+            Error::Malformed(_) => Self::new(ProblemKind::Malformed, detail),
+            Error::Unreadable(field) => Self::new(ProblemKind::Malformed, detail).of(field),
+            Error::UnsupportedMediaType(_) => Self::new(ProblemKind::UnsupportedMediaType, detail),
+            Error::Invalid(field) => Self::new(ProblemKind::InvalidField, detail).of(field),
+            Error::NotSignedIn(_) => Self::new(ProblemKind::NotSignedIn, detail),
+            Error::TooManyAttempts(_) => Self::new(ProblemKind::TooManyAttempts, detail),
+            Error::Changed(_) => Self::new(ProblemKind::Changed, detail),
+            Error::TooLarge(_) => Self::new(ProblemKind::TooLarge, detail),
+            Error::MethodNotAllowed { .. } => Self::new(ProblemKind::MethodNotAllowed, detail),
+            Error::Forbidden(_) => Self::new(ProblemKind::Forbidden, detail),
+            Error::Conflict(_) => Self::new(ProblemKind::Conflict, detail),
+            Error::Learner(_) => Self::new(ProblemKind::Learner, detail),
+            Error::StorageFull(_) => Self::new(ProblemKind::StorageFull, detail),
+            Error::NotReady(_) => Self::new(ProblemKind::NotReady, detail),
             Error::Store(StoreError::RecordVanished { .. }) => {
-                Self::new(Kind::RecordVanished, Kind::RecordVanished.entry().meaning.to_owned())
+                Self::new(ProblemKind::RecordVanished, ProblemKind::RecordVanished.entry().meaning.to_owned())
             }
-            Error::Store(_) | Error::Dispatch(_) | Error::Output(_) | Error::Internal(_) => {
-                Self::new(Kind::Internal, "The service failed and logged the error. Nothing was changed.".to_owned())
-            }
+            Error::Store(_) | Error::Dispatch(_) | Error::Output(_) | Error::Internal(_) => Self::new(
+                ProblemKind::Internal,
+                "The service failed and logged the error. Nothing was changed.".to_owned(),
+            ),
         }
     }
 }

@@ -4,7 +4,7 @@ use axum::http::StatusCode;
 
 /// A kind of problem. Its address is the `type` of a problem document, and serves a page that explains it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ProblemKind {
     /// 400.
     Malformed,
     /// 401.
@@ -66,7 +66,7 @@ const fn entry(
     Entry { uri, status, title, meaning, remedy }
 }
 
-impl Kind {
+impl ProblemKind {
     /// Every kind, by status.
     pub(super) const ALL: [Self; 17] = [
         Self::Malformed,
@@ -247,12 +247,12 @@ mod tests {
 
     #[test]
     fn every_problem_kind_has_its_own_address() {
-        let names: BTreeSet<_> = Kind::ALL.map(|kind| kind.entry().name()).into();
-        assert_eq!(names.len(), Kind::ALL.len());
-        for kind in Kind::ALL {
-            assert_eq!(Kind::named(kind.entry().name()), Some(kind));
+        let names: BTreeSet<_> = ProblemKind::ALL.map(|kind| kind.entry().name()).into();
+        assert_eq!(names.len(), ProblemKind::ALL.len());
+        for kind in ProblemKind::ALL {
+            assert_eq!(ProblemKind::named(kind.entry().name()), Some(kind));
             let status = kind.entry().status;
-            assert_eq!(Kind::of_status(status).entry().status, status);
+            assert_eq!(ProblemKind::of_status(status).entry().status, status);
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::page_error::{is_for_programs, shown};
 use super::problem_details::Problem;
-use super::problem_kinds::Kind;
+use super::problem_kinds::ProblemKind;
 use super::responded_to::RespondedTo;
 use axum::extract::{MatchedPath, Request};
 use axum::http::{HeaderName, HeaderValue, header};
@@ -74,5 +74,5 @@ pub(super) fn after_panic(panic: Box<dyn Any + Send>) -> Response {
         .unwrap_or("unknown");
     tracing::error!(reason, "a handler panicked");
     let detail = "The service failed and logged the error. Check the current state before you try again.";
-    Problem::new(Kind::Internal, detail.to_owned()).into_response()
+    Problem::new(ProblemKind::Internal, detail.to_owned()).into_response()
 }

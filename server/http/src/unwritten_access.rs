@@ -16,10 +16,10 @@ const MOST_WAITING: usize = 1000;
 
 /// The rows that are not written yet.
 #[derive(Debug, Default)]
-pub struct AccessLog(Mutex<Waiting>);
+pub struct AccessLog(Mutex<UnwrittenRows>);
 
 #[derive(Debug, Default)]
-struct Waiting {
+struct UnwrittenRows {
     rows: HashMap<Access, Tally>,
     /// When each row was last written.
     written: HashMap<Access, Instant>,
@@ -28,7 +28,7 @@ struct Waiting {
 }
 
 impl AccessLog {
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+    fn waiting(&self) -> MutexGuard<'_, UnwrittenRows> {
         // The rows are consistent between statements, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -50,7 +50,7 @@ impl AccessLog {
     /// Takes the rows that are due: all, or those that were not written within the last minute.
     fn due(&self, all: bool) -> Vec<(Access, Tally)> {
         let mut waiting = self.waiting();
-        let Waiting { rows, written, .. } = &mut *waiting;
+        let UnwrittenRows { rows, written, .. } = &mut *waiting;
         written.retain(|_, at| at.elapsed() < REPEATED_WITHIN);
         let mut due: Vec<_> = rows.extract_if(|access, _| all || !written.contains_key(access)).collect();
         due.sort_by_key(|(_, tally)| tally.first_at);

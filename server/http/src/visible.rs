@@ -2,7 +2,7 @@
 
 use super::AppState;
 use super::accessible::{Located, visible};
-use super::authorization::Refused;
+use super::authorization::RefusedRequest;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use gaitwright_service::access::Permission;
@@ -14,10 +14,10 @@ use std::marker::PhantomData;
 pub(crate) struct Visible<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 
 impl<T: Located, P: Permission> FromRequestParts<AppState> for Visible<T, P> {
-    type Rejection = Refused;
+    type Rejection = RefusedRequest;
 
-    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Refused> {
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, RefusedRequest> {
         let found = visible::<T, P>(parts, app).await;
-        found.map(|id| Self(id, PhantomData)).map_err(|error| Refused::of(parts, error))
+        found.map(|id| Self(id, PhantomData)).map_err(|error| RefusedRequest::of(parts, error))
     }
 }

@@ -38,12 +38,12 @@ pub struct Backup {
 /// The backups that this process makes, and those that it could not make.
 #[derive(Debug, Default)]
 pub struct Backups {
-    progress: Mutex<BTreeMap<BackupId, Progress>>,
+    progress: Mutex<BTreeMap<BackupId, BackupProgress>>,
     scheduled: Option<Arc<ScheduledBackups>>,
 }
 
 #[derive(Debug, Clone)]
-enum Progress {
+enum BackupProgress {
     Running(CancellationToken),
     Failed(String),
 }
@@ -86,7 +86,7 @@ impl Backups {
         self.scheduled.as_deref()
     }
 
-    fn table(&self) -> MutexGuard<'_, BTreeMap<BackupId, Progress>> {
+    fn table(&self) -> MutexGuard<'_, BTreeMap<BackupId, BackupProgress>> {
         // The table is consistent between statements, so a poisoned lock is usable.
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -105,7 +105,7 @@ impl Backups {
         let id = BackupId::fresh();
         audit::append(writer, actor, REQUESTED, &object(id), &json!({})).await?;
         let cancel = CancellationToken::new();
-        self.table().insert(id, Progress::Running(cancel.clone()));
+        self.table().insert(id, BackupProgress::Running(cancel.clone()));
         Ok(Requested { id, backups: Arc::clone(self), cancel, begun: false })
     }
 
@@ -122,8 +122,8 @@ impl Backups {
             _ if rows.is_empty() => None,
             _ if has(COMPLETE) => Some((JobState::Done, None)),
             _ if has(CANCELLED) => Some((JobState::Cancelled, None)),
-            Some(Progress::Running(_)) => Some((JobState::Running, None)),
-            Some(Progress::Failed(reason)) => Some((JobState::Failed, Some(reason))),
+            Some(BackupProgress::Running(_)) => Some((JobState::Running, None)),
+            Some(BackupProgress::Failed(reason)) => Some((JobState::Failed, Some(reason))),
             None => Some((JobState::Failed, Some("The service stopped before the backup was complete.".to_owned()))),
         })
     }
@@ -131,12 +131,12 @@ impl Backups {
     /// The backups in progress.
     pub fn running(&self) -> Vec<BackupId> {
         let table = self.table();
-        table.iter().filter(|(_, progress)| matches!(progress, Progress::Running(_))).map(|(id, _)| *id).collect()
+        table.iter().filter(|(_, progress)| matches!(progress, BackupProgress::Running(_))).map(|(id, _)| *id).collect()
     }
 
     /// Stops a backup whose cancellation is durable.
     pub fn stop(&self, id: BackupId) {
-        if let Some(Progress::Running(cancel)) = self.table().get(&id) {
+        if let Some(BackupProgress::Running(cancel)) = self.table().get(&id) {
             cancel.cancel();
         }
     }
@@ -183,7 +183,7 @@ impl Requested {
             table.remove(&self.id);
             if let Err(error) = recorded {
                 tracing::warn!(id = %self.id, %error, "a backup failed");
-                table.insert(self.id, Progress::Failed(error.to_string()));
+                table.insert(self.id, BackupProgress::Failed(error.to_string()));
             }
         })
     }

@@ -28,12 +28,12 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
     let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         // The parser reports a value of the wrong kind in place of a word as a syntax error.
         let parsed = if error.inner().is_data() { None } else { serde_json::from_slice::<Value>(bytes).ok() };
-        let of_value = parsed.and_then(|parsed| serde_path_to_error::deserialize::<_, T>(Named(&parsed)).err());
+        let of_value = parsed.and_then(|parsed| serde_path_to_error::deserialize::<_, T>(NamedFields(&parsed)).err());
         unreadable(of_value.unwrap_or(error), bytes)
     })?;
     reader.end().map_err(|e| Error::Malformed(format!("There is text after the JSON document: {e}.")))?;
     let parsed: Value = serde_json::from_slice(bytes).map_err(|e| Error::Malformed(e.to_string()))?;
-    serde_path_to_error::deserialize::<_, T>(Named(&parsed)).map_err(|e| unreadable(e, bytes))?;
+    serde_path_to_error::deserialize::<_, T>(NamedFields(&parsed)).map_err(|e| unreadable(e, bytes))?;
     Ok(value)
 }
 
@@ -80,7 +80,7 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
 /// searched.
 fn place(error: &serde_json::Error, path: &Path, bytes: &[u8]) -> String {
     let segments: Vec<&Segment> = path.iter().collect();
-    let found = Place(&segments).deserialize(&mut serde_json::Deserializer::from_slice(bytes)).err();
+    let found = PathPosition(&segments).deserialize(&mut serde_json::Deserializer::from_slice(bytes)).err();
     let (line, column) = match found {
         _ if error.line() > 0 => (error.line(), error.column()),
         Some(found) if found.line() > 0 => (found.line(), found.column()),
@@ -90,9 +90,9 @@ fn place(error: &serde_json::Error, path: &Path, bytes: &[u8]) -> String {
 }
 
 /// A reader that stops with an error at the value of a path, to find its position.
-struct Place<'a>(&'a [&'a Segment]);
+struct PathPosition<'a>(&'a [&'a Segment]);
 
-impl<'de> DeserializeSeed<'de> for Place<'_> {
+impl<'de> DeserializeSeed<'de> for PathPosition<'_> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
@@ -100,7 +100,7 @@ impl<'de> DeserializeSeed<'de> for Place<'_> {
     }
 }
 
-impl<'de> Visitor<'de> for Place<'_> {
+impl<'de> Visitor<'de> for PathPosition<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -110,7 +110,7 @@ impl<'de> Visitor<'de> for Place<'_> {
     fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<(), A::Error> {
         while let Some(name) = fields.next_key::<String>()? {
             match self.0.first() {
-                Some(Segment::Map { key }) if *key == name => fields.next_value_seed(Place(&self.0[1..]))?,
+                Some(Segment::Map { key }) if *key == name => fields.next_value_seed(PathPosition(&self.0[1..]))?,
                 _ => drop(fields.next_value::<IgnoredAny>()?),
             }
         }
@@ -122,7 +122,7 @@ impl<'de> Visitor<'de> for Place<'_> {
         for _ in 0..*index {
             values.next_element::<IgnoredAny>()?;
         }
-        values.next_element_seed(Place(&self.0[1..])).map(drop)
+        values.next_element_seed(PathPosition(&self.0[1..])).map(drop)
     }
 }
 
@@ -162,9 +162,9 @@ pub fn expected(message: &str) -> String {
 
 /// A deserialiser that accepts only objects with named fields for structures.
 #[derive(Clone, Copy)]
-struct Named<'de>(&'de Value);
+struct NamedFields<'de>(&'de Value);
 
-impl<'de> IntoDeserializer<'de, serde_json::Error> for Named<'de> {
+impl<'de> IntoDeserializer<'de, serde_json::Error> for NamedFields<'de> {
     type Deserializer = Self;
 
     fn into_deserializer(self) -> Self {
@@ -172,14 +172,15 @@ impl<'de> IntoDeserializer<'de, serde_json::Error> for Named<'de> {
     }
 }
 
-impl<'de> Deserializer<'de> for Named<'de> {
+impl<'de> Deserializer<'de> for NamedFields<'de> {
     type Error = serde_json::Error;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
         match self.0 {
-            Value::Array(values) => visitor.visit_seq(SeqDeserializer::new(values.iter().map(Named))),
-            Value::Object(fields) => visitor
-                .visit_map(MapDeserializer::new(fields.iter().map(|(name, value)| (name.as_str(), Named(value))))),
+            Value::Array(values) => visitor.visit_seq(SeqDeserializer::new(values.iter().map(NamedFields))),
+            Value::Object(fields) => visitor.visit_map(MapDeserializer::new(
+                fields.iter().map(|(name, value)| (name.as_str(), NamedFields(value))),
+            )),
             scalar => scalar.deserialize_any(visitor),
         }
     }

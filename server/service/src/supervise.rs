@@ -20,10 +20,10 @@ const RECENTLY: Duration = Duration::from_mins(1);
 
 /// The states of the background tasks.
 #[derive(Debug, Clone, Default)]
-pub struct Tasks(Arc<Mutex<BTreeMap<&'static str, State>>>);
+pub struct Tasks(Arc<Mutex<BTreeMap<&'static str, TaskState>>>);
 
 #[derive(Debug, Default)]
-struct State {
+struct TaskState {
     /// Why the task is down; `None` while it runs.
     down: Option<String>,
     /// Times of the last failures, and the reason of the newest.
@@ -100,7 +100,7 @@ impl Tasks {
         state.down = Some(reason);
     }
 
-    fn all(&self) -> MutexGuard<'_, BTreeMap<&'static str, State>> {
+    fn all(&self) -> MutexGuard<'_, BTreeMap<&'static str, TaskState>> {
         // The map is consistent between statements, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 /// A target format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Form {
+enum TargetFormat {
     /// Table of the nodes (CSV) with angles, velocities, torques, forces and activations in SI units.
     Csv,
     /// OpenSim motion file (.mot) in degrees, with OpenSim's sign conventions.
@@ -33,7 +33,7 @@ pub(super) struct Convert {
     gait: PathBuf,
     /// Target format.
     #[arg(long, value_enum)]
-    to: Form,
+    to: TargetFormat,
     /// Sampling rate of `mot`, 10 to 5000.
     #[arg(long, value_name = "HZ", default_value = "200", value_parser = number, allow_negative_numbers = true)]
     rate_hz: f64,
@@ -47,10 +47,10 @@ impl Convert {
         let gait = read_gait_file(&self.gait)?.gait;
         let out = OutFile::instead_of_stdout(self.out.as_deref(), &[&self.gait])?;
         let text = match self.to {
-            Form::Csv => gait_csv(&gait),
-            Form::Mot => motion_file(&gait, self.rate_hz)?,
-            Form::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),
-            Form::Animation => gait_charts::animation(WalkerFigure::new(&gait)?).svg(),
+            TargetFormat::Csv => gait_csv(&gait),
+            TargetFormat::Mot => motion_file(&gait, self.rate_hz)?,
+            TargetFormat::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),
+            TargetFormat::Animation => gait_charts::animation(WalkerFigure::new(&gait)?).svg(),
         };
         match out {
             Some(out) => out.write(&text),

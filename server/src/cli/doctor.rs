@@ -20,11 +20,11 @@ pub(super) struct Doctor {
 }
 
 /// The outcome of a check.
-enum Found {
+enum CheckOutcome {
     Good(String),
     Bad(String),
 }
-use Found::{Bad, Good};
+use CheckOutcome::{Good, Trouble};
 
 impl Doctor {
     pub(super) fn flags(&self) -> Flags {
@@ -58,13 +58,13 @@ impl Doctor {
     }
 }
 
-fn program() -> Found {
+fn program() -> CheckOutcome {
     let (version, os, architecture) = (env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH);
     let processors = available_parallelism().map_or_else(|_| "unknown".to_owned(), |number| number.to_string());
     Good(format!("gaitwright {version}, schema {SCHEMA_VERSION}, {os} {architecture}, processors: {processors}"))
 }
 
-fn disk(database: &Path, reserve: u64) -> Found {
+fn disk(database: &Path, reserve: u64) -> CheckOutcome {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
     let folder = database.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     match free_bytes(folder) {
@@ -77,7 +77,7 @@ fn disk(database: &Path, reserve: u64) -> Found {
     }
 }
 
-async fn record(database: &Path, anchors: &[PathBuf]) -> Found {
+async fn record(database: &Path, anchors: &[PathBuf]) -> CheckOutcome {
     match verify::file(database, anchors).await {
         Ok(whole) => Good(format!(
             "{} is intact: audit trail of {} rows, {} seals, anchors: {}",
@@ -91,7 +91,7 @@ async fn record(database: &Path, anchors: &[PathBuf]) -> Found {
 }
 
 /// A clock that is behind the record was set back.
-async fn clock_after(database: &Path) -> Found {
+async fn clock_after(database: &Path) -> CheckOutcome {
     let present = now();
     match access_clock::latest_of_file(database).await {
         Ok(Some(latest)) if latest > present.plus_seconds(CLOCKS_DIFFER_S) => {
@@ -102,7 +102,7 @@ async fn clock_after(database: &Path) -> Found {
     }
 }
 
-async fn broker(settings: &Settings) -> Result<Found, Error> {
+async fn broker(settings: &Settings) -> Result<CheckOutcome, Error> {
     match settings.nats()? {
         #[cfg(feature = "nats")]
         Some((url, _)) => Ok(match nats::reach(url).await {

@@ -7,7 +7,7 @@ use super::output::data;
 use super::problem_flags::read;
 use clap::Args;
 use gait_optimizer::emg::{Activity, CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope};
-use gaitwright_charts::csv_table::{Cell, CsvTable};
+use gaitwright_charts::csv_table::{CsvCell, CsvTable};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat};
 use serde::Serialize;
@@ -93,7 +93,7 @@ fn channel(text: &str) -> Result<(String, String), String> {
 
 /// The results and the settings of the filters.
 #[derive(Serialize)]
-struct Found {
+struct EmgResults {
     settings: EmgSettings,
     heel_strikes_s: Vec<f64>,
     #[serde(flatten)]
@@ -127,7 +127,7 @@ impl Emg {
         if let Some(out) = envelope_file {
             out.write(&envelopes_csv(&recording, envelopes))?;
         }
-        let found = Found { settings, heel_strikes_s: strikes, activity };
+        let found = EmgResults { settings, heel_strikes_s: strikes, activity };
         if self.json {
             data(&serde_json::to_string_pretty(&found).map_err(|e| Error::Internal(e.to_string()))?)
         } else {
@@ -151,7 +151,7 @@ impl Emg {
     }
 }
 
-fn for_people(found: &Found) -> String {
+fn for_people(found: &EmgResults) -> String {
     let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = found.settings;
     let mut lines = vec![format!(
         "band-pass {band_low_hz} to {band_high_hz} Hz, low-pass {envelope_hz} Hz, order {order}, zero-phase; relative to the \
@@ -192,7 +192,7 @@ fn envelopes_csv(recording: &EmgRecording, envelopes: Vec<Envelope>) -> String {
 fn csv(columns: &[(String, Vec<f64>)]) -> String {
     let mut table = CsvTable::new(columns.iter().map(|(name, _)| name));
     for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
-        table.row(columns.iter().map(|(_, values)| Cell::from(values.get(row))));
+        table.row(columns.iter().map(|(_, values)| CsvCell::from(values.get(row))));
     }
     table.into_text()
 }

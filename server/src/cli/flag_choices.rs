@@ -5,10 +5,10 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 /// A name and its help.
-type Choice = (&'static str, &'static str);
+type FlagChoice = (&'static str, &'static str);
 
 /// Formats of a file of joint angles.
-pub(super) const JOINT_ANGLE_FORMATS: [Choice; 3] = [
+pub(super) const JOINT_ANGLE_FORMATS: [FlagChoice; 3] = [
     ("opensim", "OpenSim motion or storage file (.mot, .sto) of a gait model"),
     (
         "camargo",
@@ -17,19 +17,19 @@ pub(super) const JOINT_ANGLE_FORMATS: [Choice; 3] = [
     ("csv", "time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad; optionally knee_R_rad, right_force_n"),
 ];
 /// Units of angles.
-pub(super) const ANGLE_UNITS: [Choice; 2] = [("degrees", "Angles in degrees"), ("radians", "Angles in radians")];
+pub(super) const ANGLE_UNITS: [FlagChoice; 2] = [("degrees", "Angles in degrees"), ("radians", "Angles in radians")];
 /// Ways to find right heel strikes.
-pub(super) const HEEL_STRIKES: [Choice; 3] = [
+pub(super) const HEEL_STRIKES: [FlagChoice; 3] = [
     ("force", "Whenever the vertical force under the right foot rises above 20 N"),
     ("kinematics", "Whenever the right heel is farthest ahead of the pelvis"),
     ("ends", "At the first and the last row: the file is one stride"),
 ];
 /// Formats of an EMG recording.
-pub(super) const EMG_FORMATS: [Choice; 2] =
+pub(super) const EMG_FORMATS: [FlagChoice; 2] =
     [("csv", "CSV file whose header names the columns"), ("opensim", "OpenSim storage file (.sto)")];
 
 /// Reads one of these names as the REST interface reads it.
-pub(super) fn one_of<T>(choices: impl IntoIterator<Item = Choice>) -> impl TypedValueParser<Value = T>
+pub(super) fn one_of<T>(choices: impl IntoIterator<Item = FlagChoice>) -> impl TypedValueParser<Value = T>
 where
     T: DeserializeOwned + Clone + Send + Sync + 'static,
 {
@@ -43,7 +43,7 @@ mod tests {
     use gaitwright_service::studies::lab::MeasurementFormat;
     use gaitwright_service::studies::reference_import::{JointAngleFormat, Strikes, Unit};
 
-    fn all_are_known<T: DeserializeOwned>(choices: &[Choice]) {
+    fn all_are_known<T: DeserializeOwned>(choices: &[FlagChoice]) {
         for (name, _) in choices {
             assert!(serde_json::from_value::<T>(Value::from(*name)).is_ok(), "{name}");
         }

@@ -51,7 +51,7 @@ const INTERRUPTED: u8 = 130;
 
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ended {
+enum CommandEnd {
     /// It succeeded.
     Done,
     /// A person stopped it.
@@ -172,39 +172,39 @@ pub fn run() -> ExitCode {
         Err(error) => return report(&Error::Internal(error.to_string())),
     };
     let done = match cli.command {
-        Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| Ended::Done),
-        Command::Worker(worker) => runtime.block_on(worker.run(&settings)).map(|()| Ended::Done),
+        Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| CommandEnd::Done),
+        Command::Worker(worker) => runtime.block_on(worker.run(&settings)).map(|()| CommandEnd::Done),
         Command::Tune(tune) => runtime.block_on(tune.run(&settings)),
         Command::Reproduce(reproduce) => runtime.block_on(reproduce.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
-        Command::Certify(certify) => runtime.block_on(certify.run()).map(|()| Ended::Done),
-        Command::Simulate(simulate) => runtime.block_on(simulate.run()).map(|()| Ended::Done),
-        Command::Reference(reference) => reference.run().map(|()| Ended::Done),
-        Command::Emg(emg) => emg.run().map(|()| Ended::Done),
-        Command::Convert(convert) => convert.run().map(|()| Ended::Done),
-        Command::Audit(audit) => runtime.block_on(audit.run(&settings)).map(|()| Ended::Done),
-        Command::Config(_) => settings.show().map(|()| Ended::Done),
+        Command::Certify(certify) => runtime.block_on(certify.run()).map(|()| CommandEnd::Done),
+        Command::Simulate(simulate) => runtime.block_on(simulate.run()).map(|()| CommandEnd::Done),
+        Command::Reference(reference) => reference.run().map(|()| CommandEnd::Done),
+        Command::Emg(emg) => emg.run().map(|()| CommandEnd::Done),
+        Command::Convert(convert) => convert.run().map(|()| CommandEnd::Done),
+        Command::Audit(audit) => runtime.block_on(audit.run(&settings)).map(|()| CommandEnd::Done),
+        Command::Config(_) => settings.show().map(|()| CommandEnd::Done),
         Command::Doctor(doctor) => {
             let healthy = runtime.block_on(doctor.run(&settings));
-            healthy.map(|healthy| if healthy { Ended::Done } else { Ended::Failed })
+            healthy.map(|healthy| if healthy { CommandEnd::Done } else { CommandEnd::Failed })
         }
         Command::Openapi => {
             let text = openapi::text().map_err(|e| Error::Internal(e.to_string()));
-            text.and_then(|text| data(text.trim_end())).map(|()| Ended::Done)
+            text.and_then(|text| data(text.trim_end())).map(|()| CommandEnd::Done)
         }
-        Command::Backup(backup) => runtime.block_on(backup.run(&settings)).map(|()| Ended::Done),
-        Command::Restore(restore) => runtime.block_on(restore.run(&settings)).map(|()| Ended::Done),
-        Command::Export(export) => runtime.block_on(export.run(&settings)).map(|()| Ended::Done),
-        Command::SigningKey(key) => key.run().map(|()| Ended::Done),
-        Command::Import(import) => runtime.block_on(import.run(&settings)).map(|()| Ended::Done),
-        Command::Users(users) => runtime.block_on(users.run(&settings)).map(|()| Ended::Done),
-        Command::Prune(prune) => runtime.block_on(prune.run(&settings)).map(|()| Ended::Done),
+        Command::Backup(backup) => runtime.block_on(backup.run(&settings)).map(|()| CommandEnd::Done),
+        Command::Restore(restore) => runtime.block_on(restore.run(&settings)).map(|()| CommandEnd::Done),
+        Command::Export(export) => runtime.block_on(export.run(&settings)).map(|()| CommandEnd::Done),
+        Command::SigningKey(key) => key.run().map(|()| CommandEnd::Done),
+        Command::Import(import) => runtime.block_on(import.run(&settings)).map(|()| CommandEnd::Done),
+        Command::Users(users) => runtime.block_on(users.run(&settings)).map(|()| CommandEnd::Done),
+        Command::Prune(prune) => runtime.block_on(prune.run(&settings)).map(|()| CommandEnd::Done),
     };
     match done {
-        Ok(Ended::Done) => ExitCode::SUCCESS,
-        Ok(Ended::Interrupted) => ExitCode::from(INTERRUPTED),
-        Ok(Ended::Failed) => ExitCode::FAILURE,
+        Ok(CommandEnd::Done) => ExitCode::SUCCESS,
+        Ok(CommandEnd::Interrupted) => ExitCode::from(INTERRUPTED),
+        Ok(CommandEnd::Failed) => ExitCode::FAILURE,
         Err(error) => report(&error),
     }
 }

@@ -4,7 +4,7 @@ use super::flag_numbers::{iterations, number};
 use super::lineage::{Lineage, LineageStart, basin_of_answer};
 use super::output::tell;
 use super::serve::interrupted;
-use super::subject_flags::{Body, Switch};
+use super::subject_flags::{SubjectFlags, Switch};
 use clap::Args;
 use gait_optimizer::NlpSettings;
 use gait_optimizer::{
@@ -92,7 +92,7 @@ pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> 
 #[derive(Debug, Clone, Args)]
 pub(super) struct ProblemFlags {
     #[command(flatten)]
-    body: Body,
+    body: SubjectFlags,
     /// Whether to solve with muscles.
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
@@ -146,7 +146,7 @@ impl ProblemFlags {
         let Some(path) = &self.warm else { return Ok(None) };
         let what = "a file written by `gaitwright solve --out`";
         let outcome: SolveOutcome = read_document(path, what, |_| Ok(()))?;
-        let Kept { lineage } = read_document(path, what, |_| Ok(()))?;
+        let FileLineage { lineage } = read_document(path, what, |_| Ok(()))?;
         let answers = basin_of_answer(&outcome.report);
         let Some(basin) = basin.filter(|basin| Some(*basin) != answers) else {
             return Ok(Some(LineageStart::answer(outcome, lineage)));
@@ -170,7 +170,7 @@ impl ProblemFlags {
 
 /// The lineage in a file of `solve --out`, if it has one.
 #[derive(Deserialize)]
-struct Kept {
+struct FileLineage {
     #[serde(default)]
     lineage: Option<Lineage>,
 }

@@ -81,7 +81,7 @@ pub(super) struct Solve {
 
 /// The printed figures, with the certificate or the explanation if requested.
 #[derive(Debug, Serialize)]
-struct Figures<'a> {
+struct PrintedSolve<'a> {
     #[serde(flatten)]
     report: &'a SolveReport,
     lineage: &'a Lineage,
@@ -97,7 +97,7 @@ struct Figures<'a> {
 
 /// The content of the output file.
 #[derive(Debug, Serialize)]
-struct Kept<'a> {
+struct SolveFile<'a> {
     #[serde(flatten)]
     outcome: &'a SolveOutcome,
     lineage: &'a Lineage,
@@ -168,7 +168,7 @@ impl Solve {
         };
         // Print the figures first, so that they are not lost if the file cannot be written.
         if self.json {
-            let figures = Figures {
+            let figures = PrintedSolve {
                 report: &outcome.report,
                 lineage: &lineage,
                 reference_gaits: &comparisons,
@@ -190,7 +190,7 @@ impl Solve {
             return Ok(Ended::Interrupted);
         }
         if let Some(out) = out {
-            let kept = Kept { outcome: &outcome, lineage: &lineage };
+            let kept = SolveFile { outcome: &outcome, lineage: &lineage };
             out.write(&serde_json::to_string(&kept).map_err(|e| Error::Internal(e.to_string()))?)?;
         }
         Ok(Ended::Done)

@@ -7,7 +7,7 @@ use gaitwright_service::error::Error;
 
 /// The subject: one of the paper's, or a height and a mass.
 #[derive(Debug, Clone, Args)]
-pub(super) struct Body {
+pub(super) struct SubjectFlags {
     /// Subject from the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg) (default: 1).
     #[arg(long, value_name = "NUMBER", value_parser = subject, allow_negative_numbers = true, conflicts_with_all = ["height_m", "mass_kg"])]
     subject: Option<u32>,
@@ -19,7 +19,7 @@ pub(super) struct Body {
     mass_kg: Option<f64>,
 }
 
-impl Body {
+impl SubjectFlags {
     /// The subject, validated.
     pub(super) fn subject(&self) -> Result<Subject, Error> {
         Ok(match (self.height_m, self.mass_kg) {

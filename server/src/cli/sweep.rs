@@ -12,7 +12,7 @@ use clap::Args;
 use gait_optimizer::{
     CancelToken, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveStatus, TunedBounds, WarmStart, solve,
 };
-use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
+use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
 use indicatif::ProgressBar;
@@ -62,7 +62,7 @@ impl Sweep {
         let stopped = cancel.clone();
         let pool = Pool::new(1);
         let table = pool.run(move |_| {
-            let mut table = Table::begin(out);
+            let mut table = SweepTable::begin(out);
             solve_all(&problem, &actions, warm.as_ref(), &options, workers, &cancel, &mut table);
             table
         });
@@ -71,7 +71,7 @@ impl Sweep {
 }
 
 /// The table of results. Each row is written as soon as all earlier ones are.
-struct Table {
+struct SweepTable {
     out: OutFile,
     /// A write error. All rows are printed at the end then, so that hours of solving are not lost.
     unwritten: Option<Error>,
@@ -82,15 +82,15 @@ struct Table {
     refused: Option<SolveError>,
 }
 
-impl Table {
+impl SweepTable {
     fn begin(out: OutFile) -> Self {
         let mut table = Self { out, unwritten: None, text: String::new(), rows: 0, converged: 0, refused: None };
-        table.line(TunedBounds::NAMES.iter().chain(&COLUMNS).map(|name| Cell::from(*name)).collect());
+        table.line(TunedBounds::NAMES.iter().chain(&COLUMNS).map(|name| CsvCell::from(*name)).collect());
         table
     }
 
     fn add(&mut self, action: &TunedBounds, answer: Answer) {
-        let mut row: Vec<Cell> = action.to_array().iter().map(Cell::from).collect();
+        let mut row: Vec<CsvCell> = action.to_array().iter().map(CsvCell::from).collect();
         match answer {
             Ok(outcome) => {
                 let r = &outcome.report;
@@ -107,14 +107,14 @@ impl Table {
             }
             Err(error) => {
                 tell(&format!("{}: {error}", action.to_array().map(|value| value.to_string()).join(",")));
-                row.extend([status_word(SolveStatus::Stalled), "", "", "", "", ""].map(Cell::from));
+                row.extend([status_word(SolveStatus::Stalled), "", "", "", "", ""].map(CsvCell::from));
                 self.refused = Some(error);
             }
         }
         self.line(row);
     }
 
-    fn line(&mut self, cells: Vec<Cell>) {
+    fn line(&mut self, cells: Vec<CsvCell>) {
         let mut table = CsvTable::default();
         table.row(cells);
         let line = table.into_text();
@@ -179,7 +179,7 @@ fn solve_all(
     options: &SolveOptions,
     workers: usize,
     cancel: &CancelToken,
-    table: &mut Table,
+    table: &mut SweepTable,
 ) {
     let bar = ProgressBar::new(actions.len() as u64);
     bar.tick();

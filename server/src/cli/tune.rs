@@ -7,7 +7,7 @@ use super::output::{data, tell};
 use super::problem_flags::ProblemFiles;
 use super::serve::cores_or;
 use super::settings::{AnchoredFlags, Settings};
-use super::subject_flags::{Body, Switch};
+use super::subject_flags::{SubjectFlags, Switch};
 use super::unattended::{self, Lines, action_line};
 use clap::Args;
 use gaitwright_compute::OnPool;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 #[derive(Debug, Args)]
 pub(super) struct Tune {
     #[command(flatten)]
-    body: Body,
+    body: SubjectFlags,
     /// Whether to solve with muscles.
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,

@@ -15,7 +15,7 @@ const AT_ONCE: usize = 200;
 const LONGEST_LINE_BYTES: u64 = 1 << 16;
 
 #[derive(Serialize, Deserialize)]
-struct Line {
+struct SpoolLine {
     at: Instant,
     access: Access,
 }
@@ -31,7 +31,7 @@ fn path_of(record: &Path) -> PathBuf {
 pub fn note(record: &Path, access: &Access) -> StoreResult<()> {
     let path = path_of(record);
     let failed = |source| StoreError::Open { path: path.clone(), source };
-    let line = Line { at: super::now(), access: access.clone() };
+    let line = SpoolLine { at: super::now(), access: access.clone() };
     let mut text = super::json_columns::to_text("access", &line)?;
     text.push('\n');
     let mut options = OpenOptions::new();
@@ -83,7 +83,7 @@ impl Spool {
                 break;
             }
             lines += 1;
-            if let Ok(Line { at, access }) = serde_json::from_slice(&line) {
+            if let Ok(SpoolLine { at, access }) = serde_json::from_slice(&line) {
                 noted.push((access, Tally { first_at: at, last_at: at, times: 1 }));
             } else {
                 tracing::warn!(file = %self.path.display(), "ignoring a malformed line of the access spool");

@@ -24,7 +24,7 @@ const PLACE_BYTES: usize = 512;
 
 /// The last row of a chain.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct End {
+pub struct ChainEnd {
     /// Sequence number; 0 for an empty chain.
     pub seq: i64,
     /// Hash of the row.
@@ -35,14 +35,14 @@ pub struct End {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ends {
     /// Of the audit trail.
-    pub audit: End,
+    pub audit: ChainEnd,
     /// Of the seals.
-    pub seals: End,
+    pub seals: ChainEnd,
 }
 
 /// The content of one of the two places.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Place {
+struct AnchorPlace {
     /// Number of the write. The place with the larger number applies.
     turn: u64,
     at: Instant,
@@ -52,7 +52,7 @@ struct Place {
     sha256: String,
 }
 
-impl Place {
+impl AnchorPlace {
     fn new(turn: u64, ends: Ends) -> StoreResult<Self> {
         let whole = Self { turn, at: now(), ends, sha256: String::new() };
         Ok(Self { sha256: whole.digest()?, ..whole })
@@ -92,7 +92,7 @@ pub(super) async fn ends(db: &mut Connection) -> StoreResult<Ends> {
     let row = sqlx::query(sql).fetch_one(db).await?;
     let end = |first: usize| {
         let (seq, hash): (Option<i64>, Option<String>) = (row.try_get(first)?, row.try_get(first + 1)?);
-        Ok::<_, StoreError>(End { seq: seq.unwrap_or(0), hash: hash.unwrap_or_else(|| ORIGIN.to_owned()) })
+        Ok::<_, StoreError>(ChainEnd { seq: seq.unwrap_or(0), hash: hash.unwrap_or_else(|| ORIGIN.to_owned()) })
     };
     Ok(Ends { audit: end(0)?, seals: end(2)? })
 }
@@ -107,7 +107,7 @@ pub fn read(anchor: &Path) -> StoreResult<Option<Ends>> {
         other => other.map_err(|source| StoreError::Open { path: anchor.to_owned(), source })?,
     };
     let reason = || format!("{} cannot be read; remove it only if you know the cause", anchor.display());
-    let place = Place::newest(&bytes).ok_or_else(|| StoreError::Damaged { what: "anchor", reason: reason() })?;
+    let place = AnchorPlace::newest(&bytes).ok_or_else(|| StoreError::Damaged { what: "anchor", reason: reason() })?;
     Ok(Some(place.ends))
 }
 
@@ -176,7 +176,7 @@ fn resolved(path: &Path) -> PathBuf {
 
 /// Replaces an anchor durably.
 pub(super) fn put(anchor: &Path, ends: &Ends) -> StoreResult<()> {
-    let place = Place::new(1, ends.clone())?.bytes()?;
+    let place = AnchorPlace::new(1, ends.clone())?.bytes()?;
     make(anchor, &place).map_err(|source| StoreError::Open { path: anchor.to_owned(), source })
 }
 
@@ -245,7 +245,7 @@ impl Anchor {
     fn write(&mut self, ends: &Ends) -> StoreResult<()> {
         let cannot = |source| StoreError::Open { path: self.path.clone(), source };
         self.turn += 1;
-        let place = Place::new(self.turn, ends.clone())?.bytes()?;
+        let place = AnchorPlace::new(self.turn, ends.clone())?.bytes()?;
         let there = std::fs::metadata(&self.path).ok().map(|file| FileId::of(&file));
         if let Some((file, id)) = &mut self.file
             && there == Some(*id)
@@ -268,7 +268,7 @@ mod tests {
     use super::*;
 
     fn ends(seq: i64) -> Ends {
-        let end = || End { seq, hash: ORIGIN.to_owned() };
+        let end = || ChainEnd { seq, hash: ORIGIN.to_owned() };
         Ends { audit: end(), seals: end() }
     }
 

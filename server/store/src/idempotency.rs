@@ -6,7 +6,7 @@ use sqlx::Row;
 
 /// A stored response.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Kept {
+pub struct StoredResponse {
     /// SHA-256 of the request.
     pub request: String,
     /// HTTP status.
@@ -28,14 +28,14 @@ pub fn fingerprint(method: &str, path: &str, body: &[u8]) -> String {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn find(db: &mut Connection, actor: &Actor, key: &str) -> StoreResult<Option<Kept>> {
+pub async fn find(db: &mut Connection, actor: &Actor, key: &str) -> StoreResult<Option<StoredResponse>> {
     let row = sqlx::query("select * from idempotency_keys where actor = ? and key = ?")
         .bind(actor.as_str())
         .bind(key)
         .fetch_optional(db)
         .await?;
     let Some(row) = row else { return Ok(None) };
-    Ok(Some(Kept {
+    Ok(Some(StoredResponse {
         request: row.try_get("request")?,
         status: row.try_get("status")?,
         location: row.try_get("location")?,
@@ -50,7 +50,7 @@ pub const KEY_UNIQUE: &str = "idempotency_keys.key";
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn keep(db: &mut Connection, actor: &Actor, key: &str, kept: &Kept) -> StoreResult<()> {
+pub async fn keep(db: &mut Connection, actor: &Actor, key: &str, kept: &StoredResponse) -> StoreResult<()> {
     sqlx::query(
         "insert into idempotency_keys (actor, key, request, status, location, body, created_at) \
          values (?, ?, ?, ?, ?, ?, ?)",

@@ -12,7 +12,7 @@ use std::str::FromStr;
 
 /// A step of a session, which happens at most once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Act {
+pub enum SessionStep {
     /// Walk 1, 2 or 3 was recorded.
     Walk(u8),
     /// The session was unblinded.
@@ -21,7 +21,7 @@ pub enum Act {
     Closed,
 }
 
-impl Act {
+impl SessionStep {
     const ALL: [Self; 5] = [Self::Walk(1), Self::Walk(2), Self::Walk(3), Self::Unblinded, Self::Closed];
 
     fn as_str(self) -> &'static str {
@@ -35,7 +35,7 @@ impl Act {
     }
 }
 
-impl FromStr for Act {
+impl FromStr for SessionStep {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
         Self::ALL
@@ -78,14 +78,14 @@ pub struct LabSession {
     /// Time of planning.
     pub created_at: Instant,
     /// Completed steps, in order.
-    pub acts: Vec<(Act, LabSessionStep)>,
+    pub acts: Vec<(SessionStep, LabSessionStep)>,
     /// Answers of the subject, in order.
     pub answers: Vec<LabAnswer>,
 }
 
 impl LabSession {
     /// A step, if it is completed.
-    pub fn done(&self, act: Act) -> Option<&LabSessionStep> {
+    pub fn done(&self, act: SessionStep) -> Option<&LabSessionStep> {
         self.acts.iter().find(|(known, _)| *known == act).map(|(_, done)| done)
     }
 
@@ -143,7 +143,13 @@ pub async fn insert(db: &mut Connection, actor: &Actor, new: &NewLabSession<'_>)
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn act(db: &mut Connection, actor: &Actor, id: LabSessionId, act: Act, note: &str) -> StoreResult<bool> {
+pub async fn act(
+    db: &mut Connection,
+    actor: &Actor,
+    id: LabSessionId,
+    act: SessionStep,
+    note: &str,
+) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into lab_acts (session_id, act, note, actor, created_at) values (?, ?, ?, ?, ?) \
          on conflict (session_id, act) do nothing",
@@ -215,7 +221,7 @@ async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> 
     let id: LabSessionId = row.try_get("id")?;
     let acts = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id);
     let acts = acts.fetch_all(&mut *db).await?;
-    let act = |row: &SqliteRow| -> StoreResult<(Act, LabSessionStep)> {
+    let act = |row: &SqliteRow| -> StoreResult<(SessionStep, LabSessionStep)> {
         let done =
             LabSessionStep { note: row.try_get("note")?, actor: row.try_get("actor")?, at: row.try_get("created_at")? };
         Ok((row.try_get::<&str, _>("act")?.parse()?, done))

@@ -95,7 +95,7 @@ pub use writer::Writer;
 
 use anchor::Anchors;
 use gaitwright_compute::{ComputeError, OnPool, Pool};
-use lost_files::Files;
+use lost_files::RecordFiles;
 use opening_checks::{check_history, refuse_empty_in_place_of_record, refuse_unchanged};
 use ownership::Ownership;
 use sqlx::SqlitePool;
@@ -224,7 +224,7 @@ impl Store {
         seals::watch(&mut connection).await?;
         // The log is merged into the file only after it was verified, not in the middle of a commit.
         sqlx::query("pragma wal_autocheckpoint = 0").execute(&mut connection).await?;
-        let files = Arc::new(Files::of(path)?);
+        let files = Arc::new(RecordFiles::of(path)?);
         let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
         let writing = Arc::new(Writing::new(connection, Some(version), free_disk_space::Space::of(path), outside));
         let readers = SqlitePoolOptions::new()

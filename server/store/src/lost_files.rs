@@ -38,7 +38,7 @@ struct Seen {
 
 /// The files of an open record.
 #[derive(Debug)]
-pub(super) struct Files {
+pub(super) struct RecordFiles {
     path: PathBuf,
     seen: Mutex<Vec<Seen>>,
     log: Mutex<Log>,
@@ -48,7 +48,7 @@ pub(super) struct Files {
     saved: OnceLock<()>,
 }
 
-impl Files {
+impl RecordFiles {
     /// The database file of an open connection, and SQLite's companion files.
     pub(super) fn of(path: &Path) -> StoreResult<Self> {
         let files =

@@ -248,7 +248,7 @@ pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<P
 
 /// An answer to record.
 #[derive(Debug, Clone, Copy)]
-pub struct NewAnswer<'a> {
+pub struct NewPairAnswer<'a> {
     /// The judgement of the pair.
     pub judgement: Judgement,
     /// Response time by the rater's clock, ms.
@@ -265,7 +265,7 @@ pub struct NewAnswer<'a> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>) -> StoreResult<bool> {
+pub async fn answer(db: &mut Connection, id: PresentationId, new: NewPairAnswer<'_>) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into presentation_answers (presentation_id, answer, response_ms, note, feedback_id, could_have_known, \
          created_at) values (?, ?, ?, ?, ?, ?, ?) on conflict (presentation_id) do nothing",

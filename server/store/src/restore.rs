@@ -20,7 +20,7 @@ const COMPANIONS: [&str; 2] = ["-wal", "-shm"];
 
 /// A step of a restore that is on the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Step {
+enum RestoreStep {
     OldRecordKept,
     Marked,
     Renamed,
@@ -42,7 +42,7 @@ async fn replace(
     from: &Path,
     to: &Path,
     elsewhere: Option<&Path>,
-    reached: &(dyn Fn(Step) + Sync),
+    reached: &(dyn Fn(RestoreStep) + Sync),
 ) -> StoreResult<Option<PathBuf>> {
     anchor::refuse_wrong(elsewhere, to, Some(from))?;
     read_only::check(from).await?;
@@ -63,17 +63,17 @@ async fn replace(
         keep(to, kept).map_err(|error| backup::cannot_write(kept, error))?;
         like(to, copy.part());
     }
-    reached(Step::OldRecordKept);
+    reached(RestoreStep::OldRecordKept);
     let sha256 = hash_of(copy.part()).map_err(cannot_write)?;
     let elsewhere = elsewhere.map(std::path::absolute).transpose().map_err(cannot_write)?;
     let marker = Marker { sha256, ends, elsewhere };
     mark(to, &marker)?;
-    reached(Step::Marked);
+    reached(RestoreStep::Marked);
     if let Err(error) = copy.replace(to) {
         finish_interrupted(to)?;
         return Err(cannot_write(error));
     }
-    reached(Step::Renamed);
+    reached(RestoreStep::Renamed);
     finish(to, &marker, reached)?;
     Ok(kept)
 }
@@ -112,18 +112,18 @@ pub(super) fn finish_interrupted(record: &Path) -> StoreResult<()> {
 }
 
 /// Removes the log of the old record, which must not be used with the backup, and updates the anchors.
-fn finish(record: &Path, marker: &Marker, reached: &dyn Fn(Step)) -> StoreResult<()> {
+fn finish(record: &Path, marker: &Marker, reached: &dyn Fn(RestoreStep)) -> StoreResult<()> {
     let others = COMPANIONS.map(|ending| companion(record, ending));
     for path in others.into_iter().filter(|path| path.exists()) {
         std::fs::remove_file(&path).map_err(|source| StoreError::Open { path, source })?;
     }
     sync_folder(record).map_err(|source| StoreError::Open { path: record.to_owned(), source })?;
-    reached(Step::LogRemoved);
+    reached(RestoreStep::LogRemoved);
     let own_anchor = anchor::path_of(record);
     for anchor in std::iter::once(&own_anchor).chain(&marker.elsewhere) {
         anchor::put(anchor, &marker.ends)?;
     }
-    reached(Step::Anchored);
+    reached(RestoreStep::Anchored);
     unmark(record)
 }
 
@@ -157,7 +157,13 @@ mod tests {
 
     /// Step, backup and record of the process that is killed.
     const VARIABLE: &str = "GAITWRIGHT_TEST_KILLED_RESTORE";
-    const STEPS: [Step; 5] = [Step::OldRecordKept, Step::Marked, Step::Renamed, Step::LogRemoved, Step::Anchored];
+    const STEPS: [RestoreStep; 5] = [
+        RestoreStep::OldRecordKept,
+        RestoreStep::Marked,
+        RestoreStep::Renamed,
+        RestoreStep::LogRemoved,
+        RestoreStep::Anchored,
+    ];
 
     async fn add(store: &Store, name: &str) {
         let sql = "insert into subjects (id, pseudonym, height_m, body_mass_kg, created_at) values (?, ?, 1.8, 70, '')";
@@ -176,7 +182,7 @@ mod tests {
     async fn restore_is_killed_at_a_step() {
         let Ok(text) = std::env::var(VARIABLE) else { return };
         let parts: Vec<&str> = text.split('|').collect();
-        let die = |step: Step| {
+        let die = |step: RestoreStep| {
             if format!("{step:?}") == parts[0] {
                 std::process::abort();
             }
@@ -210,8 +216,8 @@ mod tests {
                 .unwrap();
             assert!(!killed.status.success(), "{step:?}: {killed:?}");
 
-            let is_renamed = !matches!(step, Step::OldRecordKept | Step::Marked);
-            if step != Step::OldRecordKept {
+            let is_renamed = !matches!(step, RestoreStep::OldRecordKept | RestoreStep::Marked);
+            if step != RestoreStep::OldRecordKept {
                 let refused = verify::file(&record, &[]).await;
                 assert!(matches!(refused, Err(StoreError::RestoreInterrupted { .. })), "{step:?}: {refused:?}");
             }

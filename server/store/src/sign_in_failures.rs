@@ -16,7 +16,7 @@ pub struct Failures {
 
 /// All failed sign-ins from a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Source {
+pub struct NetworkFailures {
     /// The network.
     pub network: String,
     /// Number of attempts, including those refused without checking the password.
@@ -77,7 +77,7 @@ pub async fn forget(db: &mut Connection, name: &str, source: &str) -> StoreResul
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_network(db: &mut Connection, network: &str) -> StoreResult<Option<Source>> {
+pub async fn of_network(db: &mut Connection, network: &str) -> StoreResult<Option<NetworkFailures>> {
     let row = sqlx::query("select * from sign_in_sources where network = ?").bind(network).fetch_optional(db).await?;
     row.as_ref().map(source).transpose()
 }
@@ -86,7 +86,7 @@ pub async fn of_network(db: &mut Connection, network: &str) -> StoreResult<Optio
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn most(db: &mut Connection, limit: u32) -> StoreResult<Vec<Source>> {
+pub async fn most(db: &mut Connection, limit: u32) -> StoreResult<Vec<NetworkFailures>> {
     let sql = "select * from sign_in_sources where attempts > 0 order by attempts desc, network limit ?";
     sqlx::query(sql).bind(limit).fetch_all(db).await?.iter().map(source).collect()
 }
@@ -122,7 +122,7 @@ pub async fn uncount(db: &mut Connection, network: &str) -> StoreResult<()> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn prune(db: &mut Connection, before: Instant) -> StoreResult<Vec<Source>> {
+pub async fn prune(db: &mut Connection, before: Instant) -> StoreResult<Vec<NetworkFailures>> {
     let old = "delete from sign_in_failures where (name, source) in \
                (select name, source from sign_in_failures where last_at < ? limit 1000)";
     sqlx::query(old).bind(before).execute(&mut *db).await?;
@@ -131,8 +131,8 @@ pub async fn prune(db: &mut Connection, before: Instant) -> StoreResult<Vec<Sour
     sqlx::query(old).bind(before).fetch_all(db).await?.iter().map(source).collect()
 }
 
-fn source(row: &SqliteRow) -> StoreResult<Source> {
-    Ok(Source {
+fn source(row: &SqliteRow) -> StoreResult<NetworkFailures> {
+    Ok(NetworkFailures {
         network: row.try_get("network")?,
         attempts: row.try_get("attempts")?,
         names: row.try_get("names")?,

@@ -37,7 +37,7 @@ pub struct Listing {
 
 /// A row of the table.
 #[derive(Debug, Clone)]
-pub struct Listed {
+pub struct ListedTrial {
     /// Identifier.
     pub id: TrialId,
     /// Number of the trial, from 1.
@@ -68,7 +68,7 @@ pub struct Listed {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<Listed>> {
+pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<ListedTrial>> {
     let rows = sqlx::query(
         "select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
          t.cost_of_transport, t.iterations, t.seconds_total, t.message, (select w.number from trials w where w.id = t.warm_started_from) as from_number, \
@@ -97,7 +97,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
         .map(|row| {
             let from: Option<TrialId> = row.try_get("warm_started_from")?;
             let state = row.try_get::<&str, _>("state")?.parse()?;
-            Ok(Listed {
+            Ok(ListedTrial {
                 id: row.try_get("id")?,
                 number: row.try_get("number")?,
                 action: json_columns::column(row, "action")?,

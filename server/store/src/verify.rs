@@ -51,13 +51,13 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
 }
 
 /// Number of links of a chain, and the hash of the last one.
-type Chain = (u64, String);
+type ChainSummary = (u64, String);
 
 /// Verifies schema, chains, and every row of a record of this version. Returns the audit trail and the seals.
 ///
 /// # Errors
 /// [`StoreError::Damaged`], or [`StoreError::Unsealed`] for a row that was added outside the program.
-pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chain, Option<Chain>)> {
+pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(ChainSummary, Option<ChainSummary>)> {
     let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     schema(db, version).await?;
     let audit = match audit::verify(db).await? {
@@ -92,7 +92,7 @@ async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
 }
 
 /// The parts of the schema that this program creates.
-async fn created(version: i64) -> StoreResult<BTreeSet<Part>> {
+async fn created(version: i64) -> StoreResult<BTreeSet<SchemaPart>> {
     let options = SqliteConnectOptions::new().filename(":memory:");
     let mut fresh = SqliteConnection::connect_with(&options).await?;
     schema_versions::up_to(version).run_direct(None, &mut fresh, false).await?;
@@ -102,14 +102,14 @@ async fn created(version: i64) -> StoreResult<BTreeSet<Part>> {
 }
 
 /// Kind, name, table and text of a part of a schema.
-type Part = (String, String, String, Option<String>);
+type SchemaPart = (String, String, String, Option<String>);
 
 /// The parts of the newest schema, which every start compares.
-static PRESENT: OnceCell<BTreeSet<Part>> = OnceCell::const_new();
+static PRESENT: OnceCell<BTreeSet<SchemaPart>> = OnceCell::const_new();
 
 /// The parts of a schema. The table of applied migrations is written by a library; the tests of upgrades
 /// detect if a version of it changes the text.
-async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<Part>> {
+async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<SchemaPart>> {
     let sql = "select type, name, tbl_name, sql from sqlite_master";
     Ok(sqlx::query_as(sql).fetch_all(db).await?.into_iter().collect())
 }

@@ -19,12 +19,12 @@ type Sums = (u32, u32);
 #[derive(Debug)]
 pub(super) struct Log {
     file: File,
-    read: Option<Place>,
+    read: Option<LogPosition>,
 }
 
 /// A position in a log.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct LogPosition {
     /// Salt of the header, which changes when SQLite restarts the log.
     salt: [u8; 8],
     /// Number of frames before the position.
@@ -72,7 +72,7 @@ impl Log {
                 None => return Ok(false),
             }
         }
-        self.read = Some(Place { salt: header.salt, frames, before_last });
+        self.read = Some(LogPosition { salt: header.salt, frames, before_last });
         Ok(true)
     }
 

@@ -6,7 +6,7 @@
 
 use super::anchor::{self, Anchors};
 use super::free_disk_space::Space;
-use super::lost_files::Files;
+use super::lost_files::RecordFiles;
 use super::{StoreError, StoreResult};
 use sqlx::{Connection as _, Row as _, SqliteConnection};
 use std::ops::{Deref, DerefMut};
@@ -17,7 +17,7 @@ use tokio::task::JoinHandle;
 use tokio_util::task::AbortOnDropHandle;
 
 /// The connection, which is lent in the order of requests; `None` after closing.
-type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
+type LentConnection = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
 
 /// A log with this number of frames is checkpointed into the database file.
 const LONGEST_LOG: u32 = 1000;
@@ -26,12 +26,12 @@ const LONGEST_LOG: u32 = 1000;
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// The result of a group commit; `None` until it is known.
-type Outcome = Option<Result<(), Arc<StoreError>>>;
+type CommitOutcome = Option<Result<(), Arc<StoreError>>>;
 
 /// The writing connection and the task that commits its changes.
 #[derive(Debug)]
 pub(super) struct Writing {
-    line: Line,
+    line: LentConnection,
     shared: Arc<Shared>,
     flusher: JoinHandle<()>,
 }
@@ -45,7 +45,7 @@ pub struct Writer {
 
 #[derive(Debug)]
 struct Shared {
-    state: Mutex<State>,
+    state: Mutex<WriterState>,
     /// Signals that a change has ended and must be committed.
     ended: Notify,
     space: Space,
@@ -57,7 +57,7 @@ struct Shared {
 #[derive(Debug, Default)]
 pub(super) struct Outside {
     /// The files of the record, which must not be replaced.
-    pub(super) files: Option<Arc<Files>>,
+    pub(super) files: Option<Arc<RecordFiles>>,
     /// The anchors.
     pub(super) anchors: Option<Anchors>,
 }
@@ -87,9 +87,9 @@ impl Outside {
 
 /// Changed only while the connection is held.
 #[derive(Debug, Default)]
-struct State {
+struct WriterState {
     /// The open transaction, on whose outcome its changes wait.
-    group: Option<watch::Sender<Outcome>>,
+    group: Option<watch::Sender<CommitOutcome>>,
     /// Whether a change has begun and not ended.
     begun: bool,
     /// The data version of the connection, which changes with every commit of another connection.
@@ -100,8 +100,8 @@ impl Writing {
     /// Takes over a connection that nothing else writes with. `version` is its data version when the record was
     /// verified.
     pub(super) fn new(connection: SqliteConnection, version: Option<i64>, space: Space, outside: Outside) -> Self {
-        let line = Line::new(Some(connection).into());
-        let state = State { version, ..State::default() };
+        let line = LentConnection::new(Some(connection).into());
+        let state = WriterState { version, ..WriterState::default() };
         let shared = Arc::new(Shared { state: Mutex::new(state), ended: Notify::new(), space, outside });
         let flusher = tokio::spawn(supervise_flushing(Arc::clone(&line), Arc::clone(&shared)));
         Self { line, shared, flusher }
@@ -191,7 +191,7 @@ impl DerefMut for Writer {
 }
 
 impl Shared {
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, WriterState> {
         // The state is consistent between statements, so a poisoned lock is usable.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -272,7 +272,7 @@ impl Shared {
     }
 }
 
-async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
+async fn begin(line: LentConnection, shared: Arc<Shared>) -> StoreResult<Writer> {
     let held = line.lock_owned().await;
     let mut connection = OwnedMutexGuard::try_map(held, Option::as_mut).map_err(|_| StoreError::Closed)?;
     shared.retract(&mut connection).await;
@@ -301,7 +301,7 @@ async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
 }
 
 /// Restarts [`keep_flushing`] after a panic, because every change waits for it.
-async fn supervise_flushing(line: Line, shared: Arc<Shared>) {
+async fn supervise_flushing(line: LentConnection, shared: Arc<Shared>) {
     loop {
         let flushing = keep_flushing(Arc::clone(&line), Arc::clone(&shared));
         match AbortOnDropHandle::new(tokio::spawn(flushing)).await {
@@ -314,7 +314,7 @@ async fn supervise_flushing(line: Line, shared: Arc<Shared>) {
 }
 
 /// Commits changes as they end. Changes that are already waiting join the same transaction.
-async fn keep_flushing(line: Line, shared: Arc<Shared>) {
+async fn keep_flushing(line: LentConnection, shared: Arc<Shared>) {
     loop {
         shared.ended.notified().await;
         match line.lock().await.as_mut() {

@@ -35,7 +35,7 @@ struct Front {
 
 /// Numerical factor of a front.
 #[derive(Debug, Default)]
-struct Factor {
+struct DelayedFactor {
     /// Eliminated indices in pivot order, then delayed ones, then (from `candidates` on) the border.
     indices: Vec<usize>,
     eliminated: usize,
@@ -51,7 +51,7 @@ pub(super) struct DelayedPivots {
     column_starts: Vec<usize>,
     row_indices: Vec<usize>,
     fronts: Vec<Front>,
-    factors: Vec<Factor>,
+    factors: Vec<DelayedFactor>,
     scale: Vec<f64>,
     largest: Vec<f64>,
     /// Position of an index in the current front.
@@ -96,7 +96,7 @@ impl DelayedPivots {
         Self {
             column_starts: column_starts.to_vec(),
             row_indices: row_indices.to_vec(),
-            factors: fronts.iter().map(|_| Factor::default()).collect(),
+            factors: fronts.iter().map(|_| DelayedFactor::default()).collect(),
             fronts,
             scale: vec![1.0; order],
             largest: vec![0.0; order],
@@ -127,7 +127,7 @@ impl DelayedPivots {
     }
 
     /// Assembles front `f`: its indices, those delayed by its children, its border, and its matrix.
-    fn assemble(&mut self, f: usize, values: &[f64], own: &mut Factor) {
+    fn assemble(&mut self, f: usize, values: &[f64], own: &mut DelayedFactor) {
         let front = &self.fronts[f];
         own.indices.clear();
         own.indices.extend(&front.own);
@@ -163,7 +163,7 @@ enum Pivot {
     Two(usize, usize),
 }
 
-impl Factor {
+impl DelayedFactor {
     fn size(&self) -> usize {
         self.indices.len()
     }
@@ -315,7 +315,7 @@ impl KktSolver for DelayedPivots {
     }
 }
 
-impl Factor {
+impl DelayedFactor {
     /// L and B.
     fn substitute_forward(&self, x: &mut [f64]) {
         let size = self.size();

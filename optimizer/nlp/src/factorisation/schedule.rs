@@ -155,7 +155,7 @@ impl Schedule {
                 continue;
             };
             // Marks the task done on drop, so that a panic cannot deadlock its dependents.
-            let done = Done { schedule: self, task: k };
+            let done = DoneOnDrop { schedule: self, task: k };
             work(&self.tasks[k]);
             drop(done);
         }
@@ -163,12 +163,12 @@ impl Schedule {
 }
 
 /// Marks a task done on drop.
-struct Done<'a> {
+struct DoneOnDrop<'a> {
     schedule: &'a Schedule,
     task: usize,
 }
 
-impl Drop for Done<'_> {
+impl Drop for DoneOnDrop<'_> {
     fn drop(&mut self) {
         let task = &self.schedule.tasks[self.task];
         let mut round = self.schedule.round();

@@ -73,7 +73,7 @@ impl Animation {
             let begin = first.figure.time_s;
             let times: Vec<String> =
                 pictures.iter().map(|pose| format!("{:.4}", (pose.figure.time_s - begin) / seconds)).collect();
-            let clock = Clock { seconds, times: times.join(";") };
+            let clock = PictureTimes { seconds, times: times.join(";") };
             self.draw_ground(svg, &clock)?;
             let figures: Vec<&StickFigure> = pictures.iter().map(|pose| pose.figure).collect();
             for part in parts(first.figure) {
@@ -91,7 +91,7 @@ impl Animation {
     }
 
     /// Marks at a whole share of the stride, so that the end of the loop is not seen.
-    fn draw_ground(&self, svg: &mut String, clock: &Clock) -> std::fmt::Result {
+    fn draw_ground(&self, svg: &mut String, clock: &PictureTimes) -> std::fmt::Result {
         let [left, _, width, _] = self.walker.view_box();
         // A malformed gait may have any length.
         let stride_m = self.walker.stride_length_m.clamp(MARK_M, LONGEST_STRIDE_M);
@@ -110,7 +110,13 @@ impl Animation {
         )
     }
 
-    fn draw_muscles(&self, svg: &mut String, pictures: &[Pose<'_>], clock: &Clock, of_left: bool) -> std::fmt::Result {
+    fn draw_muscles(
+        &self,
+        svg: &mut String,
+        pictures: &[Pose<'_>],
+        clock: &PictureTimes,
+        of_left: bool,
+    ) -> std::fmt::Result {
         let Some(first) = pictures.first().filter(|_| self.walker.has_muscles()) else { return Ok(()) };
         let peaks = self.walker.peaks();
         for (muscle, path) in
@@ -141,7 +147,7 @@ impl Animation {
         Ok(())
     }
 
-    fn draw_forces(&self, svg: &mut String, pictures: &[Pose<'_>], clock: &Clock) -> std::fmt::Result {
+    fn draw_forces(&self, svg: &mut String, pictures: &[Pose<'_>], clock: &PictureTimes) -> std::fmt::Result {
         for side in 0..2 {
             // A path keeps its commands while it moves, so a foot in swing has an arrow of no length, out of sight.
             let arrow = |pose: &Pose<'_>| {
@@ -161,13 +167,13 @@ impl Animation {
 const SCALE: f64 = 3.0;
 
 /// When the pictures of the stride are shown.
-struct Clock {
+struct PictureTimes {
     seconds: f64,
     /// Share of the stride at each picture.
     times: String,
 }
 
-impl Clock {
+impl PictureTimes {
     fn animate(&self, svg: &mut String, attribute: &str, values: impl Iterator<Item = String>) -> std::fmt::Result {
         self.write(svg, "animate", &format!("attributeName=\"{attribute}\""), values)
     }
@@ -207,7 +213,13 @@ fn placements(segment: Segment, figures: &[&StickFigure]) -> Vec<Placement> {
     placements
 }
 
-fn draw_moving(svg: &mut String, class: &str, outline: &str, places: &[Placement], clock: &Clock) -> std::fmt::Result {
+fn draw_moving(
+    svg: &mut String,
+    class: &str,
+    outline: &str,
+    places: &[Placement],
+    clock: &PictureTimes,
+) -> std::fmt::Result {
     let Some(first) = places.first() else { return Ok(()) };
     write!(svg, "<g transform=\"translate({:.1} {:.1})\">", first.x, first.y)?;
     let what = |kind: &str| format!("attributeName=\"transform\" type=\"{kind}\"");

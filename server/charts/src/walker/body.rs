@@ -12,7 +12,7 @@ const ABOVE_SOCKET: f64 = 0.62;
 
 /// A part of the body with an outline in the frame of its segment.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Part {
+pub(crate) struct BodyPart {
     pub(crate) segment: Segment,
     /// Class in the style sheet.
     pub(crate) class: &'static str,
@@ -69,11 +69,11 @@ impl Lengths {
 }
 
 /// The parts of the body in a figure, in the order in which they are drawn: the right leg is nearest.
-pub(crate) fn parts(figure: &StickFigure) -> Vec<Part> {
+pub(crate) fn parts(figure: &StickFigure) -> Vec<BodyPart> {
     let lengths = Lengths::of(figure);
     let t = lengths.trunk;
     let human = lengths.residual_thigh();
-    let part = |segment, class, outline| Part { segment, class, outline };
+    let part = |segment, class, outline| BodyPart { segment, class, outline };
     vec![
         part(Segment::LeftFoot, "left", foot(t, &lengths.left_foot)),
         part(Segment::LeftShank, "left", shank(t, lengths.shank)),
@@ -89,18 +89,18 @@ pub(crate) fn parts(figure: &StickFigure) -> Vec<Part> {
 }
 
 /// Two legs without a prosthesis, for a reference gait. Both have the size of the left one.
-pub(super) fn human_parts(figure: &StickFigure) -> Vec<Part> {
+pub(super) fn human_parts(figure: &StickFigure) -> Vec<BodyPart> {
     let lengths = Lengths::of(figure);
     let t = lengths.trunk;
     let leg = |class, [thigh_of, shank_of, foot_of]: [Segment; 3]| {
         [
-            Part { segment: foot_of, class, outline: foot(t, &lengths.left_foot) },
-            Part { segment: shank_of, class, outline: shank(t, lengths.shank) },
-            Part { segment: thigh_of, class, outline: thigh(t, lengths.thigh) },
+            BodyPart { segment: foot_of, class, outline: foot(t, &lengths.left_foot) },
+            BodyPart { segment: shank_of, class, outline: shank(t, lengths.shank) },
+            BodyPart { segment: thigh_of, class, outline: thigh(t, lengths.thigh) },
         ]
     };
     let mut parts = Vec::from(leg("left", [Segment::LeftThigh, Segment::LeftShank, Segment::LeftFoot]));
-    parts.push(Part { segment: Segment::Trunk, class: "trunk", outline: trunk(t) });
+    parts.push(BodyPart { segment: Segment::Trunk, class: "trunk", outline: trunk(t) });
     parts.extend(leg("right", [Segment::RightThigh, Segment::RightShank, Segment::RightFoot]));
     parts
 }

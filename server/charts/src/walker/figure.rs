@@ -1,6 +1,6 @@
 //! The figure of a gait on a page: one pose, with everything that the script needs to move it.
 
-use super::body::{Part, human_parts, parts};
+use super::body::{BodyPart, human_parts, parts};
 use super::muscle_paths::{MusclePath, is_left, muscle_paths};
 use super::segment::UNITS_PER_M;
 use crate::escaped_text::escape;
@@ -278,7 +278,7 @@ pub(super) fn muscle_line(path: &MusclePath, figure: &StickFigure) -> String {
     line
 }
 
-pub(super) fn draw_part(svg: &mut String, part: &Part, figure: &StickFigure) -> std::fmt::Result {
+pub(super) fn draw_part(svg: &mut String, part: &BodyPart, figure: &StickFigure) -> std::fmt::Result {
     let (segment, place) = (part.segment.name(), part.segment.placement(figure).transform());
     write!(
         svg,

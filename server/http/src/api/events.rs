@@ -15,7 +15,7 @@ use axum::response::Response;
 use axum::response::sse::Event;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::workers::Progress;
+use gaitwright_service::workers::SolveProgress;
 use gaitwright_store::{StudyId, TrialId, events, studies};
 use serde::Deserialize;
 use serde_json::json;
@@ -118,7 +118,7 @@ async fn replay(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sen
     }
 }
 
-fn is_due(shown: &mut HashMap<TrialId, Instant>, progress: &Progress) -> bool {
+fn is_due(shown: &mut HashMap<TrialId, Instant>, progress: &SolveProgress) -> bool {
     let now = Instant::now();
     let due = shown.get(&progress.trial_id).is_none_or(|before| now.duration_since(*before) >= THROTTLE);
     if due {

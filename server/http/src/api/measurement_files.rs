@@ -19,7 +19,7 @@ use axum::response::Response;
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self, Checked, MeasurementFormat, NewEmg, NewMotion, UploadedFile};
+use gaitwright_service::studies::lab::{self, CheckedFile, MeasurementFormat, NewEmg, NewMotion, UploadedFile};
 use gaitwright_store::{LabSessionId, MeasurementFileId, measurement_files};
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -148,7 +148,7 @@ async fn keep(
     app: &AppState,
     id: LabSessionId,
     request: &Idempotent<Run>,
-    checked: &Checked,
+    checked: &CheckedFile,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,

@@ -13,7 +13,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::safety_report::{self, Report};
+use gaitwright_service::studies::safety_report::{self, NewSafetyReport};
 use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReports};
 use gaitwright_service::studies::safety_review::{self, Decision};
 use gaitwright_store::safety_reviews::SafetyDecision;
@@ -88,14 +88,14 @@ pub(super) async fn of_study(
     operation_id = "create_safety_report",
     tag = "preferences",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
-    request_body = Report,
+    request_body = NewSafetyReport,
     responses((status = 201, description = "Report", body = SafetyReport)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn report(
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, access::Answer>,
-    IdempotentWith(request, report): IdempotentWith<access::Answer, Report>,
+    IdempotentWith(request, report): IdempotentWith<access::Answer, NewSafetyReport>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

@@ -14,7 +14,7 @@ use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::command;
-use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
+use gaitwright_service::studies::lifecycle::{StudyTransition, acts_of_people};
 use gaitwright_service::studies::study_change::{self, Change, Extend, Fork};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::studies::{self, StudyFilter, StudyState};
@@ -35,7 +35,7 @@ pub(super) struct StudyView {
 impl StudyView {
     async fn of(db: &mut Connection, study: studies::Study) -> Result<Self, Refusal> {
         let trials = trials::counts(db, study.id).await?;
-        let possible = acts_of_people(study.state).into_iter().map(Act::as_str).collect();
+        let possible = acts_of_people(study.state).into_iter().map(StudyTransition::as_str).collect();
         Ok(Self { study: study.into(), trials: trials.into(), possible })
     }
 }
@@ -169,7 +169,7 @@ pub(super) async fn start(
     expected: IfMatch,
     IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, Act::Start, &why).await
+    act(&app, id, expected, &request, StudyTransition::Start, &why).await
 }
 
 /// Pause a study
@@ -191,7 +191,7 @@ pub(super) async fn pause(
     expected: IfMatch,
     IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, Act::Pause, &why).await
+    act(&app, id, expected, &request, StudyTransition::Pause, &why).await
 }
 
 /// Resume a study
@@ -211,7 +211,7 @@ pub(super) async fn resume(
     expected: IfMatch,
     IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, Act::Resume, &why).await
+    act(&app, id, expected, &request, StudyTransition::Resume, &why).await
 }
 
 /// Stop a study
@@ -233,7 +233,7 @@ pub(super) async fn stop(
     expected: IfMatch,
     IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, Act::Stop, &why).await
+    act(&app, id, expected, &request, StudyTransition::Stop, &why).await
 }
 
 async fn act(
@@ -241,7 +241,7 @@ async fn act(
     id: StudyId,
     expected: IfMatch,
     request: &Idempotent<Run>,
-    act: Act,
+    act: StudyTransition,
     why: &StudyActionReason,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(app).await? {

@@ -14,7 +14,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::TunedBounds;
-use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
+use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::command;
@@ -254,7 +254,7 @@ fn written(all: &[trials::Trial]) -> CsvTable {
     let mut table = CsvTable::new(header);
     for trial in all {
         let mut row = cells![trial.number, trial.id.to_string()];
-        row.extend(trial.action.to_array().iter().map(Cell::from));
+        row.extend(trial.action.to_array().iter().map(CsvCell::from));
         row.extend(cells![
             trial.state.as_str(),
             trial.gait_rmse_rad,

@@ -4,7 +4,7 @@ use super::trials_by_bound::{by_bound, parallel};
 use crate::format::{meaning, percent, signed};
 use crate::shared_state::AppState;
 use gait_learner::{Dimension, LearnerError, Marginal, SearchSpace};
-use gaitwright_charts::{Cell, Chart, Figure, HeatMap, Stroke};
+use gaitwright_charts::{Chart, Figure, HeatMap, Stroke, Tile};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::{Belief, MOST_ANSWERS};
@@ -176,7 +176,7 @@ pub(crate) fn maps(
         for (column, prediction) in predictions.iter().enumerate() {
             let action = at(row, column)?;
             let framed = action == best;
-            utilities.push(Cell {
+            utilities.push(Tile {
                 value: prediction.mean,
                 text: signed(prediction.mean),
                 below: format!("± {:.2}", prediction.standard_deviation),
@@ -184,7 +184,7 @@ pub(crate) fn maps(
             });
             let chance = belief.posterior.probability_of_converging(action)?;
             let below = tried(snapshot, space, [(down, row), (right, column)]);
-            chances.push(Cell { value: chance, text: percent(chance), below, framed });
+            chances.push(Tile { value: chance, text: percent(chance), below, framed });
         }
         utility.push(utilities);
         converging.push(chances);

@@ -12,7 +12,7 @@ pub(crate) mod trial;
 pub(crate) mod trials_by_bound;
 mod utility;
 
-pub(crate) use outcome::Outcome;
+pub(crate) use outcome::StudyOutcome;
 pub(crate) use study_progress::{COURSE, course, warm_starts};
 pub(crate) use study_results::{StudyResults, have_one_reference_gait};
 pub(crate) use utility::utility;

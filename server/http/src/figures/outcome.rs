@@ -12,7 +12,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 
 /// What a study has found.
 #[derive(Default)]
-pub(crate) struct Outcome {
+pub(crate) struct StudyOutcome {
     /// Whether people answer and nobody has yet, so that the posterior is only the prior.
     pub(crate) unanswered: bool,
     /// The best trial.
@@ -27,7 +27,7 @@ pub(crate) struct Outcome {
     pub(crate) question_after: Option<TrialId>,
 }
 
-impl Outcome {
+impl StudyOutcome {
     /// The outcome of a study. Of a large study, the snapshot has the newest trials only.
     ///
     /// # Errors

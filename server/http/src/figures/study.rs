@@ -1,6 +1,6 @@
 //! The figures of a study, or of two.
 
-use super::outcome::Outcome;
+use super::outcome::StudyOutcome;
 use super::study_progress::{COURSE, course, warm_starts};
 use super::study_results::{StudyResults, have_one_reference_gait};
 use crate::shared_state::AppState;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// A section of figures.
 #[derive(Debug)]
-pub(crate) struct Section {
+pub(crate) struct FigureSection {
     pub(crate) id: &'static str,
     pub(crate) heading: &'static str,
     pub(crate) hint: String,
@@ -30,7 +30,7 @@ pub(crate) struct StudyFigures {
     pub(crate) best: Option<(TrialId, u32)>,
     /// Names of the studies without a gait to draw.
     pub(crate) without_gait: Vec<String>,
-    pub(crate) sections: Vec<Section>,
+    pub(crate) sections: Vec<FigureSection>,
     /// The warm-start tree and the utility of the recommended gait, which the study page shows.
     on_study_page: Vec<Figure>,
 }
@@ -43,16 +43,16 @@ impl StudyFigures {
 }
 
 /// A study with its best gait.
-struct Best {
+struct StudyWithBest {
     results: StudyResults,
-    outcome: Outcome,
+    outcome: StudyOutcome,
     /// The utility of the recommended gait over the answers of people.
     utility: Option<Figure>,
     trial: Option<(TrialId, u32)>,
     gait: Option<Gait>,
 }
 
-impl Best {
+impl StudyWithBest {
     async fn read(app: &mut AppState, id: StudyId) -> Result<Self, Error> {
         let beliefs = Arc::clone(&app.beliefs);
         let results = StudyResults::read(&mut *app.read().await?, id).await?;
@@ -87,9 +87,9 @@ impl Best {
 /// # Errors
 /// A conflict when the subject of one of them withdrew, [`Error::NotFound`]; errors of the database.
 pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
-    let mut shown = vec![Best::read(app, id).await?];
+    let mut shown = vec![StudyWithBest::read(app, id).await?];
     if let Some(other) = other.filter(|other| *other != id) {
-        shown.push(Best::read(app, other).await?);
+        shown.push(StudyWithBest::read(app, other).await?);
     }
     let mut reader = app.read().await?;
     let reference = shown[0].results.snapshot.study.plan.reference_gait_id;
@@ -112,7 +112,7 @@ pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<Stud
     })
 }
 
-fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {
+fn sections(shown: &[StudyWithBest], reference: &ReferenceGait) -> Result<Vec<FigureSection>, Error> {
     let mut snapshots: Vec<_> = shown.iter().map(|best| (&best.results.snapshot, &best.outcome)).collect();
     let mut course_hint = "Figure 3b of the paper, which compares a study with muscles and one without.";
     if !have_one_reference_gait(&snapshots.iter().map(|(snapshot, _)| *snapshot).collect::<Vec<_>>()) {
@@ -126,25 +126,25 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
     }
     let charts = |group: &str, charts: Vec<Chart>| charts.into_iter().map(|c| Figure::chart(group, c)).collect();
     Ok(vec![
-        Section {
+        FigureSection {
             id: COURSE,
             heading: "Gait RMSE of the best action by iteration",
             hint: course_hint.to_owned(),
             figures: charts(COURSE, course(&snapshots).into_iter().collect()),
         },
-        Section {
+        FigureSection {
             id: "angles",
             heading: "Joint angles of the best gait",
             hint: format!("Figure 3c of the paper, with the reference gait. {}", band_in_words(reference)),
             figures: charts("angles", gait_charts::with_reference(&gaits, reference)),
         },
-        Section {
+        FigureSection {
             id: "tiles",
             heading: "Gait tiles",
             hint: "Figure 4 of the paper: the stride of the best gait.".to_owned(),
             figures: tiles,
         },
-        Section {
+        FigureSection {
             id: "orbits",
             heading: "Limit cycles of the best gait",
             hint: "Figure 5 of the paper: angle and velocity over the stride. The pages of lab sessions show measured limit cycles."

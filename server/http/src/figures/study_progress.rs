@@ -1,7 +1,7 @@
 //! The progress of studies: Gait RMSE of the best action by iteration, and the warm starts.
 
-use super::outcome::Outcome;
-use gaitwright_charts::{Chart, Figure, Node, Stroke, Tree};
+use super::outcome::StudyOutcome;
+use gaitwright_charts::{Chart, Figure, Stroke, Tree, TreeNode};
 use gaitwright_service::studies::history;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::TrialId;
@@ -13,7 +13,7 @@ pub(crate) const COURSE: &str = "course";
 
 /// Gait RMSE of the best action by iteration, for one study with its trials or for several studies; `None` before the first
 /// converged trial.
-pub(crate) fn course(studies: &[(&StudySnapshot, &Outcome)]) -> Option<Chart> {
+pub(crate) fn course(studies: &[(&StudySnapshot, &StudyOutcome)]) -> Option<Chart> {
     let title = "Gait RMSE of the best action by iteration";
     let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad");
     if let [(snapshot, outcome)] = studies {
@@ -43,13 +43,13 @@ fn converged(snapshot: &StudySnapshot) -> Vec<(f64, f64)> {
 pub(crate) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>, newest: usize) -> Option<Figure> {
     let trials = &snapshot.trials[snapshot.trials.len().saturating_sub(newest)..];
     let places: HashMap<TrialId, usize> = trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
-    let node = |trial: &Trial| Node {
+    let node = |trial: &Trial| TreeNode {
         parent: trial.warm_started_from.and_then(|from| places.get(&from).copied()),
         label: format!("trial {}", trial.number),
         link: format!("/trials/{}", trial.id),
         class: if best == Some(trial.id) { "best" } else { trial.state.as_str() },
     };
-    let nodes: Vec<Node> = trials.iter().map(node).collect();
+    let nodes: Vec<TreeNode> = trials.iter().map(node).collect();
     let title = format!("Warm starts of {}", snapshot.study.plan.name);
     nodes.iter().any(|node| node.parent.is_some()).then(|| Figure::tree(Tree { title, nodes }))
 }

@@ -1,6 +1,6 @@
 //! A study with its trials, as charts of one or of several studies show it.
 
-use super::outcome::Outcome;
+use super::outcome::StudyOutcome;
 use super::utility::utility;
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
@@ -46,8 +46,8 @@ impl StudyResults {
         Ok(Self { snapshot, subject, reference_gait, counts, feedback })
     }
 
-    pub(crate) fn outcome(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Outcome, Error> {
-        Outcome::of(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
+    pub(crate) fn outcome(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<StudyOutcome, Error> {
+        StudyOutcome::of(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
     }
 
     /// The utility of the recommended gait over the answers of people; `None` of a large study.

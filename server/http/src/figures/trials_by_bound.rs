@@ -2,7 +2,7 @@
 
 use crate::format::{figure, meaning, signed};
 use gait_learner::LearnerError;
-use gaitwright_charts::{Chart, Figure, Link, Parallel, ParallelAxis, ParallelLine};
+use gaitwright_charts::{Chart, Figure, Parallel, ParallelAxis, ParallelLine, PointLink};
 use gaitwright_service::studies::belief::Belief;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::FeedbackMode;
@@ -51,21 +51,21 @@ impl OutcomeShown {
 }
 
 /// A result to draw.
-struct Drawn<'a> {
+struct DrawnTrial<'a> {
     trial: &'a Trial,
     outcome: Option<f64>,
-    link: Link,
+    link: PointLink,
 }
 
 /// The newest results.
-fn drawn<'a>(snapshot: &'a StudySnapshot, belief: &Belief) -> Result<Vec<Drawn<'a>>, LearnerError> {
+fn drawn<'a>(snapshot: &'a StudySnapshot, belief: &Belief) -> Result<Vec<DrawnTrial<'a>>, LearnerError> {
     let shown = OutcomeShown::of(snapshot);
     let results = snapshot.trials.iter().rev().filter(|trial| trial.state.is_result()).take(DRAWN);
     let draw = |trial: &'a Trial| {
         let outcome = shown.value(trial, belief)?;
         let what = outcome.map_or_else(|| "no gait".to_owned(), |value| shown.in_words(value));
         let name = format!("trial {}: {what}", trial.number);
-        Ok(Drawn { trial, outcome, link: Link { address: format!("/trials/{}", trial.id), name } })
+        Ok(DrawnTrial { trial, outcome, link: PointLink { address: format!("/trials/{}", trial.id), name } })
     };
     results.map(draw).collect()
 }
@@ -81,7 +81,7 @@ pub(crate) fn parallel(snapshot: &StudySnapshot, belief: &Belief) -> Result<Opti
         meaning: meaning(&dimension.name).to_owned(),
         values: dimension.values.clone(),
     });
-    let line = |drawn: Drawn<'_>| {
+    let line = |drawn: DrawnTrial<'_>| {
         let levels = space.levels(space.check(drawn.trial.action_index)?);
         Ok(ParallelLine { link: drawn.link, levels, outcome: drawn.outcome })
     };

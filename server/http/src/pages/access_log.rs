@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
@@ -17,7 +17,7 @@ const PAGE: u32 = 100;
 
 /// Which rows.
 #[derive(Debug, Deserialize)]
-pub(super) struct Choice {
+pub(super) struct AccessLogQuery {
     before: Option<i64>,
     #[serde(default)]
     contains: String,
@@ -49,8 +49,8 @@ impl AccessLogPage {
 pub(super) async fn get(
     _: Authorized<Administer>,
     State(app): State<AppState>,
-    Params(choice): Params<Choice>,
-) -> Page {
+    Params(choice): Params<AccessLogQuery>,
+) -> PageResult {
     app.access.log.write(app.store(), true).await?;
     let mut reader = app.read().await?;
     let subject = match choice.subject {

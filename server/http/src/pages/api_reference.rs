@@ -4,7 +4,7 @@
 //! complete without scripts and loads nothing from other origins.
 
 use crate::openapi;
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use askama::Template;
 use gaitwright_service::error::Error;
 use serde_json::Value;
@@ -12,13 +12,13 @@ use serde_json::Value;
 #[derive(Template)]
 #[template(path = "api.html")]
 struct ReferencePage {
-    groups: Vec<Group>,
+    groups: Vec<OperationGroup>,
     /// The changes that refuse an Idempotency-Key.
     without_key: Vec<String>,
 }
 
 /// The operations with one tag.
-struct Group {
+struct OperationGroup {
     name: String,
     meaning: String,
     operations: Vec<Operation>,
@@ -45,7 +45,7 @@ struct Parameter {
 }
 
 /// `GET /api`.
-pub(super) async fn get() -> Page {
+pub(super) async fn get() -> PageResult {
     let document = openapi::value().map_err(|e| Error::Internal(e.to_string()))?;
     let groups = groups(&document);
     let operations = groups.iter().flat_map(|group| &group.operations);
@@ -63,8 +63,8 @@ impl Operation {
     }
 }
 
-fn groups(document: &Value) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
+fn groups(document: &Value) -> Vec<OperationGroup> {
+    let mut groups: Vec<OperationGroup> = Vec::new();
     for (path, item) in document["paths"].as_object().into_iter().flatten() {
         for (method, operation) in item.as_object().into_iter().flatten() {
             let name = operation["tags"][0].as_str().unwrap_or("other").to_owned();
@@ -75,7 +75,7 @@ fn groups(document: &Value) -> Vec<Group> {
                     let tag =
                         document["tags"].as_array().into_iter().flatten().find(|tag| tag["name"] == name.as_str());
                     let meaning = tag.and_then(|tag| tag["description"].as_str()).unwrap_or_default().to_owned();
-                    groups.push(Group { name, meaning, operations: vec![described] });
+                    groups.push(OperationGroup { name, meaning, operations: vec![described] });
                 }
             }
         }

@@ -4,7 +4,7 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::format::words;
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Administer;
@@ -16,7 +16,7 @@ const PAGE: u32 = 100;
 
 /// Which rows to show, and whether to verify the chain.
 #[derive(Debug, Deserialize)]
-pub(super) struct Choice {
+pub(super) struct AuditQuery {
     before: Option<i64>,
     #[serde(default)]
     verify: bool,
@@ -73,8 +73,8 @@ impl AuditPage {
 pub(super) async fn get(
     _: Authorized<Administer>,
     State(app): State<AppState>,
-    Params(choice): Params<Choice>,
-) -> Page {
+    Params(choice): Params<AuditQuery>,
+) -> PageResult {
     let mut reader = app.read().await?;
     let mut rows = audit::page(&mut reader, choice.contains.trim(), choice.before, PAGE + 1).await?;
     let more = rows.len() > PAGE as usize;

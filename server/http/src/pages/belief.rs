@@ -1,7 +1,7 @@
 //! The page *Analysis*: what the learner believes about the gaits and the bounds of a study, beside what was measured.
 
 use super::certainty::certainty;
-use super::page_chart::{Drawn, shared_legend};
+use super::page_chart::{PageChart, shared_legend};
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
@@ -11,7 +11,7 @@ use crate::figures::belief::{
 };
 use crate::figures::trials_by_bound::{DRAWN, by_bound, parallel};
 use crate::format::{self, figure, meaning, percent};
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -38,10 +38,10 @@ struct BeliefPage {
     study: Study,
     /// Why no belief is shown; `None` if it is shown.
     absent: Option<String>,
-    shown: Option<Everything>,
+    shown: Option<ShownBelief>,
 }
 
-struct Everything {
+struct ShownBelief {
     agreement: Agreement,
     /// How sure the recommendation is; `None` without one.
     certainty: Option<String>,
@@ -50,15 +50,15 @@ struct Everything {
     gaits: Vec<GaitRow>,
     /// So many gaits are not in that list.
     more_gaits: usize,
-    bounds: Vec<BoundRow>,
-    marginals: Vec<Drawn>,
+    bounds: Vec<BoundEffect>,
+    marginals: Vec<PageChart>,
     legend: Vec<(String, String)>,
     maps: Maps,
     /// The maps as shown.
-    charts: Vec<Drawn>,
+    charts: Vec<PageChart>,
     /// The trials by the two bounds of the maps.
-    by_bound: Vec<Drawn>,
-    parallel: Option<Drawn>,
+    by_bound: Vec<PageChart>,
+    parallel: Option<PageChart>,
     /// Whether some trials are not drawn.
     newest_only: bool,
     surprises: Vec<SurpriseRow>,
@@ -77,7 +77,7 @@ struct GaitRow {
 }
 
 /// How much a bound matters.
-struct BoundRow {
+struct BoundEffect {
     name: String,
     limited: &'static str,
     /// Share of the largest effect.
@@ -100,7 +100,7 @@ pub(super) async fn get(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Params(choice): Params<AxisChoice>,
-) -> Page {
+) -> PageResult {
     let study = studies::get(&mut *app.read().await?, id).await?;
     page(&match believed(&mut app, id).await? {
         Believed::Absent(why) => BeliefPage { study, absent: Some(why), shown: None },
@@ -112,7 +112,7 @@ pub(super) async fn get(
     })
 }
 
-fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisChoice) -> Result<Everything, Error> {
+fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisChoice) -> Result<ShownBelief, Error> {
     let pair = chosen(belief, choice)?;
     let files = format!("/api/v1/studies/{id}/belief/figures");
     let maps = maps(belief, snapshot, pair).map_err(Error::Learner)?;
@@ -122,18 +122,18 @@ fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisCho
         (Some(x), Some(y)) => format!("?x={x}&y={y}"),
         _ => String::new(),
     };
-    let drawn = |figure: &_| Drawn::of(figure, &files, "");
+    let drawn = |figure: &_| PageChart::of(figure, &files, "");
     let dimensions = pair.map_or_else(|| vec![0], |(x, y)| vec![x, y]);
     let by_bound = dimensions.into_iter().map(|dimension| by_bound(snapshot, belief, dimension));
     let by_bound: Vec<_> = by_bound.collect::<Result<Vec<_>, _>>().map_err(Error::Learner)?;
     let charts = maps.figures.iter().zip(MAP_NOTES);
-    let charts = charts.map(|(figure, note)| Drawn { note, ..Drawn::of(figure, &files, &query) }).collect();
+    let charts = charts.map(|(figure, note)| PageChart { note, ..PageChart::of(figure, &files, &query) }).collect();
     let parallel = parallel(snapshot, belief).map_err(Error::Learner)?;
-    let mut marginals: Vec<Drawn> = marginals(belief).iter().map(drawn).collect();
+    let mut marginals: Vec<PageChart> = marginals(belief).iter().map(drawn).collect();
     let results = snapshot.trials.iter().filter(|trial| trial.state.is_result()).count();
     // As on the page of the study: no recommendation before people have answered.
     let recommends = !snapshot.waits_for_first_answer();
-    Ok(Everything {
+    Ok(ShownBelief {
         agreement: belief.agreement,
         certainty: certainty(snapshot, belief),
         recommends,
@@ -189,14 +189,14 @@ fn believed_worse(behind: &Prediction) -> String {
 }
 
 /// The bounds with several values, the one that matters most first.
-fn bounds(belief: &Belief) -> Vec<BoundRow> {
+fn bounds(belief: &Belief) -> Vec<BoundEffect> {
     let dimensions = belief.posterior.space().dimensions();
     let ranked = ranked(belief);
     let largest = ranked.first().map_or(0.0, |place| belief.main_effects[*place].difference.mean);
     let row = |place: usize| {
         let effect = &belief.main_effects[place];
         let name = &dimensions[place].name;
-        BoundRow {
+        BoundEffect {
             limited: meaning(name),
             name: name.clone(),
             share: if largest > 0.0 { effect.difference.mean / largest } else { 0.0 },

@@ -1,6 +1,6 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::page_chart::{Drawn, shared_legend};
+use super::page_chart::{PageChart, shared_legend};
 use super::study::{answer_in_words, assessment_in_words};
 use super::undo::undo_seconds;
 use super::walking_pair::{WalkingGait, walking_pair};
@@ -11,7 +11,7 @@ use crate::extractors::{Form, Params};
 use crate::figures::trial;
 use crate::form_errors;
 use crate::format::source_name;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::visible::Visible;
 use askama::Template;
@@ -33,7 +33,7 @@ use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::walkable;
 use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
-use gaitwright_store::idempotency::{self, Kept, fingerprint};
+use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
@@ -46,7 +46,7 @@ use std::str::FromStr;
 
 /// The gaits to compare, and the answer that was just saved.
 #[derive(Debug, Default, Deserialize)]
-pub(super) struct Choice {
+pub(super) struct GaitsQuery {
     a: Option<TrialId>,
     b: Option<TrialId>,
     saved: Option<Recorded>,
@@ -86,17 +86,17 @@ const ASSESSMENT: &str = "assessment-";
 #[template(path = "compare.html")]
 struct ComparePage {
     study: Study,
-    trials: Vec<Offered>,
+    trials: Vec<OfferedGait>,
     /// The gaits shown: identifier and number.
     a: Option<(TrialId, u32)>,
     b: Option<(TrialId, u32)>,
-    charts: Vec<Drawn>,
+    charts: Vec<PageChart>,
     /// The legend of all charts.
     legend: Vec<(String, String)>,
     /// Both gaits; empty if they cannot be drawn.
     walking: Vec<WalkingGait>,
     key: FeedbackId,
-    saved: Option<Saved>,
+    saved: Option<SavedAnswer>,
     /// Whether the study waits for an answer.
     waits: bool,
     /// How many gaits can be compared once they are certified.
@@ -104,7 +104,7 @@ struct ComparePage {
     /// Whether the study computes another gait.
     is_going_on: bool,
     last_event: i64,
-    typed: Submitted,
+    typed: AnswerForm,
     /// The signed-in user; empty without sign-in.
     user: String,
     refused: Option<String>,
@@ -142,13 +142,13 @@ impl ComparePage {
     }
 
     /// Who retracts an answer: the signed-in user, or else its author.
-    fn retractor<'a>(&'a self, saved: &'a Saved) -> &'a str {
+    fn retractor<'a>(&'a self, saved: &'a SavedAnswer) -> &'a str {
         if self.user.is_empty() { &saved.author } else { &self.user }
     }
 }
 
 /// A gait that can be compared.
-struct Offered {
+struct OfferedGait {
     id: TrialId,
     number: u32,
     as_a: bool,
@@ -156,7 +156,7 @@ struct Offered {
 }
 
 /// An answer, read from the record.
-struct Saved {
+struct SavedAnswer {
     id: Recorded,
     text: String,
     author: String,
@@ -169,7 +169,7 @@ struct Saved {
     other_answers: Vec<(String, String)>,
 }
 
-impl Saved {
+impl SavedAnswer {
     /// Seconds for which the page offers *Undo*, if the answer is new.
     fn undo(&self) -> Option<f64> {
         undo_seconds(self.at).filter(|_| !self.retracted && !self.is_safety_report)
@@ -187,17 +187,18 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    Params(choice): Params<Choice>,
-) -> Page {
+    Params(choice): Params<GaitsQuery>,
+) -> PageResult {
     // The default author is the signed-in user, and the default source is a clinician.
-    let mut typed = Submitted::default();
+    let mut typed = AnswerForm::default();
     let user = user_of(&authorized.caller);
     if !user.is_empty() {
         (typed.author, typed.source) = (user.clone(), Source::Clinician.as_str().to_owned());
     }
     if choice.a.is_some() && choice.a == choice.b {
         let refused = "Gait A and gait B are the same. Choose two different gaits.".to_owned();
-        return Box::pin(show(&mut app, id, Choice { a: None, b: None, ..choice }, (user, typed), Some(refused))).await;
+        return Box::pin(show(&mut app, id, GaitsQuery { a: None, b: None, ..choice }, (user, typed), Some(refused)))
+            .await;
     }
     Box::pin(show(&mut app, id, choice, (user, typed), None)).await
 }
@@ -210,10 +211,10 @@ fn user_of(caller: &Caller) -> String {
 async fn show(
     app: &mut AppState,
     id: StudyId,
-    choice: Choice,
-    (user, typed): (String, Submitted),
+    choice: GaitsQuery,
+    (user, typed): (String, AnswerForm),
     refused: Option<String>,
-) -> Page {
+) -> PageResult {
     let mut reader = app.read().await?;
     let last_event = events::last(&mut reader, id).await?;
     let study = studies::get(&mut reader, id).await?;
@@ -244,11 +245,11 @@ async fn show(
     {
         being_certified += usize::from(app.scheduler.certify(trial.id));
     }
-    let mut trials: Vec<Offered> = snapshot
+    let mut trials: Vec<OfferedGait> = snapshot
         .trials
         .iter()
         .filter(|trial| snapshot.walkable(trial).is_ok())
-        .map(|trial| Offered { id: trial.id, number: trial.number, as_a: false, as_b: false })
+        .map(|trial| OfferedGait { id: trial.id, number: trial.number, as_a: false, as_b: false })
         .collect();
     if refused.is_none()
         && let (Some(a), Some(b)) = (choice.a, choice.b)
@@ -278,12 +279,12 @@ async fn show(
         let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return Ok((Vec::new(), Vec::new())) };
         let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
         let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
-        let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
+        let drawn = |figure: &Figure| PageChart::of(figure, &files, &query);
         let charts = trial::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
         let walking = walking_pair([(a, of_a, "Gait A".to_owned(), &gait_a), (b, of_b, "Gait B".to_owned(), &gait_b)]);
         Ok::<_, Error>((charts, walking.into_iter().flatten().collect()))
     };
-    let (mut charts, walking): (Vec<Drawn>, _) = app.compute(draw).await.map_err(Error::from)??;
+    let (mut charts, walking): (Vec<PageChart>, _) = app.compute(draw).await.map_err(Error::from)??;
     page(&ComparePage {
         study: snapshot.study,
         trials,
@@ -305,7 +306,11 @@ async fn show(
 }
 
 /// Reads an answer from the record; `None` if its trials are not in the snapshot.
-async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorded) -> Result<Option<Saved>, Error> {
+async fn read_back(
+    db: &mut Connection,
+    snapshot: &StudySnapshot,
+    saved: Recorded,
+) -> Result<Option<SavedAnswer>, Error> {
     Ok(match saved {
         Recorded::Preference(id) => {
             let row = feedback::get(db, id).await?;
@@ -314,7 +319,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
             }
             let in_words = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
             let other_answers = answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
-            answer_in_words(&row, snapshot).map(|text| Saved {
+            answer_in_words(&row, snapshot).map(|text| SavedAnswer {
                 id: saved,
                 text,
                 author: row.author.clone(),
@@ -330,7 +335,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
             if assessment.study_id != snapshot.study.id {
                 return Err(Error::NotFound { what: "assessment".to_owned(), id: id.to_string() });
             }
-            assessment_in_words(&assessment, snapshot).map(|text| Saved {
+            assessment_in_words(&assessment, snapshot).map(|text| SavedAnswer {
                 id: saved,
                 text,
                 author: assessment.author.clone(),
@@ -347,7 +352,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Submitted {
+pub(super) struct AnswerForm {
     a: String,
     b: String,
     #[serde(default)]
@@ -382,7 +387,7 @@ impl GivenAnswer {
     }
 }
 
-impl Submitted {
+impl AnswerForm {
     fn read(&self) -> Result<(GivenAnswer, FeedbackId), Error> {
         let source = Source::from_str(&self.source)
             .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician or script"))?;
@@ -426,7 +431,7 @@ fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
 /// The outcome of a submitted form.
 enum Given {
     /// The answer is recorded, now or before.
-    Saved(Recorded),
+    SavedAnswer(Recorded),
     /// The same form was sent before with another answer, which is the recorded one.
     Before(Recorded),
     /// The same author answered this comparison before; that answer is the recorded one.
@@ -448,7 +453,7 @@ pub(super) async fn post(
     authorized: Authorized<access::Answer>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, access::Answer>,
-    Form(form): Form<Submitted>,
+    Form(form): Form<AnswerForm>,
 ) -> Result<Response, PageError> {
     let (saved, status, why) = match give(&app, &authorized.caller, id, &form).await {
         Ok(Given::Saved(saved)) => {
@@ -470,12 +475,12 @@ pub(super) async fn post(
         }
         Err(other) => return Err(other.into()),
     };
-    let choice = Choice { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
+    let choice = GaitsQuery { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
     let typed = (user_of(&authorized.caller), form);
     Ok((status, Box::pin(show(&mut app, id, choice, typed, Some(why))).await?).into_response())
 }
 
-async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
+async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &AnswerForm) -> Result<Given, Error> {
     let (judgement, key) = form.read()?;
     let mut writer = app.write().await?;
     // The key of the form makes a repeated form (double click, reload, two tabs) count once.
@@ -501,7 +506,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
         GivenAnswer::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };
     if !is_reviewed {
-        let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
+        let kept = StoredResponse { request, status: 303, location: None, body: saved.to_string() };
         idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
     }
     commit(writer).await?;
@@ -510,7 +515,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
 }
 
 /// The answer in force of the same author to the same comparison, given in another tab or elsewhere.
-async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitted) -> Result<Option<Recorded>, Error> {
+async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerForm) -> Result<Option<Recorded>, Error> {
     let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;
     Ok(preference::current_answer(db, study, pair, author).await?.and_then(|answer| match answer {

@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -27,7 +27,7 @@ struct DevicesPage {
 }
 
 /// `GET /devices`.
-pub(super) async fn list(_: Authorized<Read>, State(app): State<AppState>) -> Page {
+pub(super) async fn list(_: Authorized<Read>, State(app): State<AppState>) -> PageResult {
     page(&DevicesPage { devices: devices::all(&mut *app.read().await?).await? })
 }
 
@@ -38,14 +38,14 @@ type Typed = BTreeMap<String, String>;
 #[template(path = "device.html")]
 struct DevicePage {
     device: Device,
-    rows: Vec<Row>,
+    rows: Vec<DeviceRow>,
     name: String,
     carried_limb: bool,
     may_run: bool,
     refused: Option<FieldError>,
 }
 
-struct Row {
+struct DeviceRow {
     field: DeviceField,
     allowed: String,
     value: String,
@@ -54,7 +54,7 @@ struct Row {
 
 impl DevicePage {
     fn of(device: Device, may_run: bool) -> Self {
-        let of_device = |field: &DeviceField| Row {
+        let of_device = |field: &DeviceField| DeviceRow {
             field: *field,
             allowed: format::range(field.minimum, field.maximum),
             value: (field.value)(&device.definition).to_string(),
@@ -96,7 +96,7 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<DeviceId, Read>,
-) -> Page {
+) -> PageResult {
     let device = devices::get(&mut *app.read().await?, id).await?;
     page(&DevicePage::of(device, authorized.caller.may(Run::NEEDED)))
 }

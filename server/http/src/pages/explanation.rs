@@ -13,7 +13,7 @@ use gait_optimizer::Violation;
 use gait_optimizer::explanation::{Explanation, quantity, status_in_words, unit_after_number};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::explanation::{self, Effort, Elapsed, ExplanationState};
+use gaitwright_service::studies::explanation::{self, Elapsed, ExplanationEffort, ExplanationState};
 use gaitwright_service::studies::relaxed_trial::{self, NoRelaxedTrial, Relaxation, RelaxedTrial};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
@@ -41,10 +41,10 @@ impl NoGait {
         trial: &Trial,
         state: ExplanationState,
         ways: Vec<WayOut>,
-        effort: &Effort,
+        effort: &ExplanationEffort,
         last_event: i64,
     ) -> Option<Self> {
-        let elapsed = if let Effort::Running(elapsed) = effort { Some(*elapsed) } else { None };
+        let elapsed = if let ExplanationEffort::Running(elapsed) = effort { Some(*elapsed) } else { None };
         Some(Self { outcome: trial.status.and_then(status_in_words)?, state, elapsed, ways, last_event })
     }
 

@@ -1,12 +1,12 @@
 //! The page with the figures of a study, or of two.
 
-use super::page_chart::Drawn;
+use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::figures::study::{Section, StudyFigures, of_study};
-use crate::page_error::{Page, page};
+use crate::figures::study::{FigureSection, StudyFigures, of_study};
+use crate::page_error::{PageResult, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -28,7 +28,7 @@ struct FiguresPage {
     other: Option<StudyId>,
     offered: Vec<Study>,
     sessions: Vec<(LabSessionId, u32)>,
-    sections: Vec<(Section, Vec<Drawn>)>,
+    sections: Vec<(FigureSection, Vec<PageChart>)>,
 }
 
 impl FiguresPage {
@@ -50,7 +50,7 @@ pub(super) async fn get(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Params(compared): Params<ComparedWith>,
-) -> Page {
+) -> PageResult {
     let other = match compared.other.as_deref() {
         None | Some("") => None,
         Some(text) => {
@@ -67,8 +67,8 @@ pub(super) async fn get(
     drop(reader);
     let query = other.map_or_else(String::new, |other| format!("?other={other}"));
     let files = format!("/api/v1/studies/{id}/figures");
-    let drawn = |section: Section| {
-        let drawn = section.figures.iter().map(|figure| Drawn::of(figure, &files, &query)).collect();
+    let drawn = |section: FigureSection| {
+        let drawn = section.figures.iter().map(|figure| PageChart::of(figure, &files, &query)).collect();
         (section, drawn)
     };
     page(&FiguresPage {

@@ -4,7 +4,7 @@ use super::certificate;
 use super::explanation::{NoGait, WayOut};
 use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
-use super::page_chart::{Drawn, shared_legend};
+use super::page_chart::{PageChart, shared_legend};
 use super::reached_bounds::{self, BoundUse};
 use super::sensitivities::SensitivityTable;
 use super::simulated_walks::SimulatedWalks;
@@ -12,7 +12,7 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::format::{self, words};
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -56,12 +56,12 @@ struct GaitPage {
     offers_sensitivities: bool,
     /// The sensitivities, or why there are none.
     sensitivities: Option<Result<SensitivityTable, String>>,
-    groups: Vec<Group>,
-    solve: Option<Drawn>,
+    groups: Vec<ChartSection>,
+    solve: Option<PageChart>,
     /// The stride as a row of pictures.
-    tiles: Option<Drawn>,
+    tiles: Option<PageChart>,
     /// The walker, which a script moves.
-    walker: Option<Drawn>,
+    walker: Option<PageChart>,
     /// Largest torques and powers of each joint.
     peaks: Vec<JointPeaks>,
     /// Each bound with the value that the gait reaches.
@@ -91,7 +91,7 @@ impl GaitPage {
 /// What the page shows beyond what it always shows.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Shown {
+pub(super) struct GaitQuery {
     #[serde(default)]
     sensitivities: bool,
 }
@@ -101,8 +101,8 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
-    Params(shown): Params<Shown>,
-) -> Page {
+    Params(shown): Params<GaitQuery>,
+) -> PageResult {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;
@@ -192,7 +192,7 @@ pub(super) async fn get(
 }
 
 /// A section of charts.
-struct Group {
+struct ChartSection {
     id: &'static str,
     heading: &'static str,
     hint: String,
@@ -200,15 +200,15 @@ struct Group {
     legend: Vec<(String, String)>,
     /// Whether the charts mark stance and swing.
     has_stances: bool,
-    charts: Vec<Drawn>,
+    charts: Vec<PageChart>,
 }
 
 /// Charts that are computed from the gait on the thread pool.
-struct Everything {
-    groups: Vec<Group>,
-    solve: Option<Drawn>,
-    tiles: Option<Drawn>,
-    walker: Option<Drawn>,
+struct GaitCharts {
+    groups: Vec<ChartSection>,
+    solve: Option<PageChart>,
+    tiles: Option<PageChart>,
+    walker: Option<PageChart>,
     peaks: Vec<JointPeaks>,
     bounds: Vec<BoundUse>,
 }
@@ -218,13 +218,13 @@ fn draw(
     gait: Option<&Gait>,
     reference: &ReferenceGait,
     iterations: &[IterationRecord],
-) -> Result<Everything, Error> {
+) -> Result<GaitCharts, Error> {
     let files = format!("/api/v1/trials/{}/figures", trial.id);
-    let drawn = |figure: &Figure| Drawn::of(figure, &files, "");
+    let drawn = |figure: &Figure| PageChart::of(figure, &files, "");
     let groups = gait.map(|gait| gait_charts::of_gait(gait, reference)).transpose()?.unwrap_or_default();
     let group = |group: gait_charts::Group| {
-        let mut charts: Vec<Drawn> = group.figures.iter().map(drawn).collect();
-        Group {
+        let mut charts: Vec<PageChart> = group.figures.iter().map(drawn).collect();
+        ChartSection {
             id: group.id,
             heading: group.heading,
             has_stances: group.marks_stances(),
@@ -236,11 +236,11 @@ fn draw(
     let walker = |gait: &Gait| {
         let figure = WalkerFigure::new(gait)?.with_ghost(Ghost::of_reference(gait, reference)?);
         let svg = figure.svg("The walker");
-        Ok::<_, Error>(Drawn { svg, ..drawn(&gait_charts::animation(figure)) })
+        Ok::<_, Error>(PageChart { svg, ..drawn(&gait_charts::animation(figure)) })
     };
     let unchanged = trial.report.as_ref().map_or(&[][..], |report| &report.unchanged_bounds);
     let tiles = gait.map(stick_figures).transpose()?.map(gait_charts::tiles);
-    Ok(Everything {
+    Ok(GaitCharts {
         groups: groups.into_iter().map(group).collect(),
         solve: gait_charts::solve(iterations).as_ref().map(drawn),
         tiles: tiles.as_ref().map(drawn),

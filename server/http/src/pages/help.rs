@@ -1,6 +1,6 @@
 //! The guides of the repository, embedded into the binary, so that a lab without internet has them.
 
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use crate::problem_details::Refusal;
 use crate::responded_to::RespondedTo;
 use askama::Template;
@@ -15,7 +15,7 @@ use rust_embed::Embed;
 
 #[derive(Embed)]
 #[folder = "docs"]
-struct Files;
+struct Guides;
 
 /// The guides in the order of the table of contents: name in addresses, title, and file in the repository.
 const GUIDES: [(&str, &str, &str); 14] = [
@@ -53,13 +53,13 @@ struct Help {
 }
 
 /// `GET /help`.
-pub(super) async fn contents(caller: Option<Extension<Caller>>) -> Page {
+pub(super) async fn contents(caller: Option<Extension<Caller>>) -> PageResult {
     let to = caller.map(|Extension(caller)| RespondedTo(caller.role));
     page(&Help { to, title: "Help".to_owned(), guide: String::new(), guides: GUIDES })
 }
 
 /// `GET /help/{name}`.
-pub(super) async fn guide(caller: Option<Extension<Caller>>, Path(name): Path<String>) -> Page {
+pub(super) async fn guide(caller: Option<Extension<Caller>>, Path(name): Path<String>) -> PageResult {
     let to = caller.map(|Extension(caller)| RespondedTo(caller.role));
     let unknown = || Error::NotFound { what: "guide".to_owned(), id: name.clone() };
     let (_, title, file) = GUIDES.iter().find(|(guide, ..)| *guide == name).ok_or_else(unknown)?;
@@ -69,7 +69,7 @@ pub(super) async fn guide(caller: Option<Extension<Caller>>, Path(name): Path<St
 
 /// `GET /help/images/{name}`.
 pub(super) async fn image(Path(name): Path<String>) -> Result<Response, Refusal> {
-    let file = Files::get(&format!("images/{name}"));
+    let file = Guides::get(&format!("images/{name}"));
     let file = file.ok_or_else(|| Error::NotFound { what: "image".to_owned(), id: name })?;
     Ok(([(header::CONTENT_TYPE, file.metadata.mimetype().to_owned())], file.data).into_response())
 }
@@ -80,7 +80,7 @@ fn text_of(file: &str) -> Option<String> {
         DATA_FILES => Some(include_str!("../../data-files.md").to_owned()),
         LEARNER => Some(include_str!("../../learner.md").to_owned()),
         _ => {
-            let found = Files::get(file.strip_prefix("docs/")?)?;
+            let found = Guides::get(file.strip_prefix("docs/")?)?;
             Some(String::from_utf8_lossy(&found.data).into_owned())
         }
     }

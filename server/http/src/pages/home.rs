@@ -2,10 +2,10 @@
 
 use crate::AppState;
 use crate::authorization::SignedIn;
-use crate::authorization::{Authorized, Refused};
+use crate::authorization::{Authorized, RefusedRequest};
 use crate::extractors::Params;
 use crate::format::variant;
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -27,8 +27,8 @@ struct Home {
     /// Whether the user has no password and came with a one-time link.
     no_password: bool,
     /// Studies that wait for an action of a user.
-    waiting: Vec<Waiting>,
-    studies: Vec<Row>,
+    waiting: Vec<WaitingStudy>,
+    studies: Vec<HomeRow>,
     /// Whether there are newer studies than these.
     later: bool,
     /// The address of the next page, if older studies follow.
@@ -108,7 +108,7 @@ const STATES: [StudyState; 6] = [
     StudyState::Stopped,
 ];
 
-struct Row {
+struct HomeRow {
     study: Study,
     subject: String,
     /// Name of the reference gait.
@@ -122,7 +122,7 @@ struct Row {
     withdrawn: bool,
 }
 
-impl Row {
+impl HomeRow {
     /// The class of the state: a study that finished without a gait does not look like a success.
     fn state_class(&self) -> &'static str {
         if is_without_gait(self.study.state, self.counts) { "without_gait" } else { self.study.state.as_str() }
@@ -138,7 +138,7 @@ fn state_in_words(state: StudyState, counts: TrialCounts) -> String {
     if is_without_gait(state, counts) { "finished, no gait".to_owned() } else { lifecycle::in_words(state).to_owned() }
 }
 
-struct Waiting {
+struct WaitingStudy {
     study: Study,
     what: String,
     /// The page of the action.
@@ -148,10 +148,10 @@ struct Waiting {
 /// `GET /`: the studies; for raters, their page.
 pub(super) async fn get(
     SignedIn(caller): SignedIn,
-    authorized: Result<Authorized<Read>, Refused>,
+    authorized: Result<Authorized<Read>, RefusedRequest>,
     State(app): State<AppState>,
     Params(filter): Params<ListQuery>,
-) -> Result<Response, Refused> {
+) -> Result<Response, RefusedRequest> {
     match authorized {
         Ok(authorized) => Ok(show(&app, &authorized, filter).await.into_response()),
         Err(_) if caller.is_some_and(|caller| caller.may(Rate::NEEDED)) => Ok(Redirect::to("/rate").into_response()),
@@ -159,7 +159,7 @@ pub(super) async fn get(
     }
 }
 
-async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) -> Page {
+async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) -> PageResult {
     let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
     let mut found = studies::page(&mut reader, reach, &filter.filter(PAGE + 1)?).await?;
@@ -180,15 +180,15 @@ async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) 
 }
 
 /// Safety reports that staff have to review.
-fn unsafe_gaits((study, count): (Study, usize)) -> Waiting {
+fn unsafe_gaits((study, count): (Study, usize)) -> WaitingStudy {
     let what = match count {
         1 => "1 gait reported as unsafe needs a safety review".to_owned(),
         _ => format!("{count} gaits reported as unsafe need a safety review"),
     };
-    Waiting { link: format!("/studies/{}", study.id), what, study }
+    WaitingStudy { link: format!("/studies/{}", study.id), what, study }
 }
 
-fn waiting(study: Study) -> Waiting {
+fn waiting(study: Study) -> WaitingStudy {
     let (what, place) = match study.state {
         StudyState::Waiting => ("a comparison needs your answer".to_owned(), "/compare"),
         // A pause by a user has no reason; a pause by the service has one.
@@ -196,17 +196,17 @@ fn waiting(study: Study) -> Waiting {
         StudyState::Paused => (format!("paused: {}", study.state_reason), ""),
         _ => (lifecycle::in_words(study.state).to_owned(), ""),
     };
-    Waiting { link: format!("/studies/{}{place}", study.id), what, study }
+    WaitingStudy { link: format!("/studies/{}{place}", study.id), what, study }
 }
 
-async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
+async fn row(db: &mut Connection, study: Study) -> Result<HomeRow, Error> {
     let counts = trials::counts(db, study.id).await?;
     let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
     let reference = reference_gaits::get(db, study.plan.reference_gait_id).await?.name;
     let withdrawn = consents::is_withdrawn(db, study.id).await?;
     let improvements = if withdrawn { Vec::new() } else { trials::improvements(db, study.id).await? };
     let course: Vec<(f64, f64)> = improvements.iter().map(|(number, rmse)| (f64::from(*number), *rmse)).collect();
-    Ok(Row {
+    Ok(HomeRow {
         state: state_in_words(study.state, counts),
         variant: variant(study.plan.muscles),
         best_rmse: improvements.last().map(|(_, rmse)| format!("{rmse:.4}")),

@@ -1,7 +1,7 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
-use super::measurement_forms::{Forms, Settings};
-use super::page_chart::Drawn;
+use super::measurement_forms::{FilterFields, Forms};
+use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -10,7 +10,7 @@ use crate::figures::lab_charts;
 use crate::figures::lab_session::measured_cycles;
 use crate::form_errors;
 use crate::format::{self, words};
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::visible::Visible;
 use askama::Template;
@@ -26,7 +26,7 @@ use gaitwright_service::studies::lab::{
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::trials_table::Listed;
+use gaitwright_store::trials_table::ListedTrial;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 
@@ -41,7 +41,7 @@ struct SessionsPage {
     /// Different walkable gaits of the study, lowest Gait RMSE first, with their labels.
     gaits: Vec<(TrialId, String)>,
     may_run: bool,
-    fields: Fields,
+    fields: LabSessionFields,
     refused: Option<String>,
 }
 
@@ -54,13 +54,13 @@ impl SessionsPage {
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Fields {
+pub(super) struct LabSessionFields {
     trial_a: String,
     trial_b: String,
     notes: String,
 }
 
-impl Fields {
+impl LabSessionFields {
     fn read(&self) -> Result<NewLabSession, Error> {
         let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait from the list"));
         Ok(NewLabSession {
@@ -76,18 +76,25 @@ pub(super) async fn list(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-) -> Page {
-    show_list(&app, id, authorized.caller.may(Run::NEEDED), Fields::default(), None).await
+) -> PageResult {
+    show_list(&app, id, authorized.caller.may(Run::NEEDED), LabSessionFields::default(), None).await
 }
 
-async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, refused: Option<String>) -> Page {
+async fn show_list(
+    app: &AppState,
+    id: StudyId,
+    may_run: bool,
+    fields: LabSessionFields,
+    refused: Option<String>,
+) -> PageResult {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
     let gaits = lab::gaits_to_plan_with(&mut reader, id, OFFERED).await?;
     drop(reader);
-    let named =
-        |trial: Listed| (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)));
+    let named = |trial: ListedTrial| {
+        (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)))
+    };
     let shown = |session| {
         let view = LabSessionView::from(&session);
         let state = words(view.state.as_str());
@@ -111,7 +118,7 @@ pub(super) async fn plan(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    Form(fields): Form<Fields>,
+    Form(fields): Form<LabSessionFields>,
 ) -> Result<Response, PageError> {
     let planned = async {
         let new = fields.read()?;
@@ -135,7 +142,7 @@ pub(super) async fn plan(
 struct SessionPage {
     study: Study,
     state: String,
-    gaits: [Named; 2],
+    gaits: [NumberedTrial; 2],
     walks: Vec<WalkRow>,
     may_run: bool,
     may_unblind: bool,
@@ -144,9 +151,9 @@ struct SessionPage {
     recordings: Vec<MeasurementFile>,
     has_emg: bool,
     forms: Forms,
-    filters: Settings,
-    measured: Option<Measured>,
-    portraits: Vec<Drawn>,
+    filters: FilterFields,
+    measured: Option<MeasuredActivity>,
+    portraits: Vec<PageChart>,
     refused: Option<String>,
     /// The answer of the subject, in words.
     answer_in_words: &'static str,
@@ -154,7 +161,7 @@ struct SessionPage {
 }
 
 /// The results of the EMG recordings.
-struct Measured {
+struct MeasuredActivity {
     how: String,
     walks: Vec<String>,
     /// The walks that are compared with the walk without the device.
@@ -165,11 +172,11 @@ struct Measured {
     model: Vec<[String; 5]>,
     /// Why a comparison is uncertain, with the walk.
     warnings: Vec<String>,
-    charts: Vec<Drawn>,
+    charts: Vec<PageChart>,
 }
 
-impl Measured {
-    fn of(session: &LabSessionView, emg: &EmgView, charts: Vec<Drawn>) -> Self {
+impl MeasuredActivity {
+    fn of(session: &LabSessionView, emg: &EmgView, charts: Vec<PageChart>) -> Self {
         let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
         let strides = |walk: &WalkActivity| {
             let strides = match walk.channels.first().map_or(0, |channel| channel.strides) {
@@ -222,7 +229,7 @@ impl Measured {
 }
 
 /// A trial and its number.
-struct Named {
+struct NumberedTrial {
     id: TrialId,
     number: u32,
 }
@@ -238,14 +245,14 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
-) -> Page {
+) -> PageResult {
     show(&mut app, id, &authorized.caller, Forms::default(), None).await
 }
 
 /// The charts of a session.
 struct Drawings {
-    emg: Vec<Drawn>,
-    portraits: Vec<Drawn>,
+    emg: Vec<PageChart>,
+    portraits: Vec<PageChart>,
 }
 
 pub(super) async fn show(
@@ -254,7 +261,7 @@ pub(super) async fn show(
     caller: &Caller,
     mut forms: Forms,
     refused: Option<String>,
-) -> Page {
+) -> PageResult {
     let emg = lab::emg(app.store_mut(), id).await?;
     let cycles = measured_cycles(app.store_mut(), id).await?;
     let mut reader = app.read().await?;
@@ -266,7 +273,7 @@ pub(super) async fn show(
     drop(reader);
     let draw = move |_: &OnPool| {
         let files = format!("/api/v1/lab-sessions/{id}/figures");
-        let drawn = |figures: &[Figure]| figures.iter().map(|figure| Drawn::of(figure, &files, "")).collect();
+        let drawn = |figures: &[Figure]| figures.iter().map(|figure| PageChart::of(figure, &files, "")).collect();
         let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::emg(&session, emg)));
         let drawings = Drawings { emg: of_emg, portraits: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
         (session, emg, drawings)
@@ -275,7 +282,7 @@ pub(super) async fn show(
     page(&SessionPage {
         study,
         state: words(session.state.as_str()),
-        gaits: [Named { id: session.trial_a, number: one }, Named { id: session.trial_b, number: two }],
+        gaits: [NumberedTrial { id: session.trial_a, number: one }, NumberedTrial { id: session.trial_b, number: two }],
         walks: session
             .walks
             .iter()
@@ -291,7 +298,7 @@ pub(super) async fn show(
             .take()
             .unwrap_or_else(|| emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default().into()),
         forms,
-        measured: emg.as_ref().map(|emg| Measured::of(&session, emg, drawings.emg)),
+        measured: emg.as_ref().map(|emg| MeasuredActivity::of(&session, emg, drawings.emg)),
         portraits: drawings.portraits,
         refused,
         answer_in_words: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),

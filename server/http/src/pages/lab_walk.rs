@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format::walks_in_words;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
@@ -64,7 +64,7 @@ pub(super) struct Walked {
 }
 
 /// `GET /lab`.
-pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppState>) -> Page {
+pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppState>) -> PageResult {
     let mut reader = app.read().await?;
     let mut sessions = Vec::new();
     let since = now().plus_seconds(-LISTED_SECONDS);
@@ -85,11 +85,15 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
 }
 
 /// `GET /lab/{id}`.
-pub(super) async fn get(_: Authorized<Rate>, State(app): State<AppState>, Id(id, _): Id<LabSessionId, Rate>) -> Page {
+pub(super) async fn get(
+    _: Authorized<Rate>,
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+) -> PageResult {
     show(&app, id, None, String::new()).await
 }
 
-async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> Page {
+async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> PageResult {
     let seen = lab::session_progress(&mut *app.read().await?, id).await?;
     let answer_in_words = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
     page(&WalkPage { name: id.short(), answer_in_words, seen, refused, typed })

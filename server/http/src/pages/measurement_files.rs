@@ -1,8 +1,8 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
 use super::lab;
-use super::measurement_forms::{EmgFields, Forms, MotionFields, Preview, Settings};
-use super::page_chart::Drawn;
+use super::measurement_forms::{EmgFields, FilterFields, Forms, MotionFields, Preview};
+use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -16,7 +16,7 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self as session, Checked, EmgPreview};
+use gaitwright_service::studies::lab::{self as session, CheckedFile, EmgPreview};
 use gaitwright_store::{LabSessionId, commit};
 
 /// `POST /lab-sessions/{id}/measurement-files/emg`.
@@ -65,7 +65,7 @@ async fn previewed(app: &mut AppState, fields: &EmgFields) -> Result<Preview, Er
     let new = fields.read()?;
     let draw = move |_: &OnPool| {
         let preview = new.preview()?;
-        let charts = lab_charts::preview(&preview).iter().map(Drawn::new).collect();
+        let charts = lab_charts::preview(&preview).iter().map(PageChart::new).collect();
         let EmgPreview { columns, strides, refused, .. } = preview;
         let refused = refused.as_ref().map(form_errors::in_words);
         Ok::<_, Error>(Preview { columns, channels: lab_charts::muscles(), charts, strides, refused })
@@ -73,7 +73,12 @@ async fn previewed(app: &mut AppState, fields: &EmgFields) -> Result<Preview, Er
     app.compute(draw).await?
 }
 
-async fn keep(app: &AppState, authorized: &Authorized<Run>, id: LabSessionId, checked: Checked) -> Result<(), Error> {
+async fn keep(
+    app: &AppState,
+    authorized: &Authorized<Run>,
+    id: LabSessionId,
+    checked: CheckedFile,
+) -> Result<(), Error> {
     let mut writer = app.write().await?;
     session::keep(&mut writer, &authorized.caller.actor, id, &checked).await?;
     Ok(commit(writer).await?)
@@ -84,7 +89,7 @@ pub(super) async fn process(
     authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    Form(typed): Form<Settings>,
+    Form(typed): Form<FilterFields>,
 ) -> Result<Response, PageError> {
     let processed = async {
         let result = session::compute(app.store_mut(), id, typed.read()?).await?;

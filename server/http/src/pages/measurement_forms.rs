@@ -1,6 +1,6 @@
 //! The forms of a lab session for measurement files and filter settings, as typed, and their parsed values.
 
-use super::page_chart::Drawn;
+use super::page_chart::PageChart;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, Stride};
@@ -187,14 +187,14 @@ impl MotionFields {
 /// The filter settings, as typed.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Settings {
+pub(super) struct FilterFields {
     pub(super) band_low_hz: String,
     pub(super) band_high_hz: String,
     pub(super) envelope_hz: String,
     pub(super) order: String,
 }
 
-impl Settings {
+impl FilterFields {
     pub(super) fn read(&self) -> Result<EmgSettings, Error> {
         Ok(EmgSettings {
             band_low_hz: number("band_low_hz", &self.band_low_hz)?,
@@ -205,7 +205,7 @@ impl Settings {
     }
 }
 
-impl From<EmgSettings> for Settings {
+impl From<EmgSettings> for FilterFields {
     fn from(settings: EmgSettings) -> Self {
         Self {
             band_low_hz: settings.band_low_hz.to_string(),
@@ -222,7 +222,7 @@ pub(super) struct Forms {
     pub(super) emg: EmgFields,
     pub(super) motion: MotionFields,
     /// `None` for the settings of the last processing.
-    pub(super) filters: Option<Settings>,
+    pub(super) filters: Option<FilterFields>,
     /// The refused form: `emg`, `motion` or `filters`.
     pub(super) open: &'static str,
     /// The preview of the EMG recording in the form.
@@ -235,7 +235,7 @@ pub(super) struct Preview {
     pub(super) columns: Vec<String>,
     /// Each channel and its muscle.
     pub(super) channels: [(&'static str, &'static str); 6],
-    pub(super) charts: Vec<Drawn>,
+    pub(super) charts: Vec<PageChart>,
     pub(super) strides: Vec<Stride>,
     /// Why the file would be refused.
     pub(super) refused: Option<String>,

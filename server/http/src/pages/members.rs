@@ -8,7 +8,7 @@ use crate::client_address::Secure;
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::qr_code;
 use askama::Template;
@@ -52,19 +52,19 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
-) -> Page {
-    show(&app, &authorized.caller, id, Visible::default()).await
+) -> PageResult {
+    show(&app, &authorized.caller, id, AfterAction::default()).await
 }
 
 /// The parts of the page that depend on the last action.
 #[derive(Default)]
-struct Visible {
+struct AfterAction {
     link: Option<(String, String)>,
     refused: Option<String>,
     typed: String,
 }
 
-async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Visible) -> Page {
+async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) -> PageResult {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let access = membership::access(&mut reader, id).await?;
@@ -91,7 +91,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Visible) -> P
 
 /// The fields of every form of the page.
 #[derive(Debug, Deserialize)]
-pub(super) struct Asked {
+pub(super) struct MembersForm {
     act: String,
     /// `user R1` or `token rig`.
     #[serde(default)]
@@ -112,7 +112,7 @@ pub(super) async fn post(
     DespiteWithdrawal(id, _): DespiteWithdrawal<StudyId, Run>,
     secure: Secure,
     headers: HeaderMap,
-    Form(asked): Form<Asked>,
+    Form(asked): Form<MembersForm>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
     match act(&mut writer, &authorized.caller, id, &asked).await {
@@ -124,11 +124,13 @@ pub(super) async fn post(
                 return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());
             };
             let link = Some((name, format!("{}/sign-in/{secret}", origin(secure, &headers))));
-            Ok(show(&app, &authorized.caller, id, Visible { link, ..Visible::default() }).await?.into_response())
+            Ok(show(&app, &authorized.caller, id, AfterAction { link, ..AfterAction::default() })
+                .await?
+                .into_response())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
             drop(writer);
-            let shown = Visible { refused: Some(form_errors::in_words(&error)), typed: asked.name, link: None };
+            let shown = AfterAction { refused: Some(form_errors::in_words(&error)), typed: asked.name, link: None };
             Ok((Problem::from(&error).status(), show(&app, &authorized.caller, id, shown).await?).into_response())
         }
         Err(error) => Err(error.into()),
@@ -140,7 +142,7 @@ async fn act(
     writer: &mut Writer,
     caller: &Caller,
     study: StudyId,
-    asked: &Asked,
+    asked: &MembersForm,
 ) -> Result<Option<(String, String)>, Error> {
     if asked.act != "remove" {
         consents::may_be_shown(writer, study).await?;

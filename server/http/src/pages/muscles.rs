@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::visible::Visible;
 use askama::Template;
@@ -40,19 +40,19 @@ type Typed = BTreeMap<String, String>;
 struct MusclesPage {
     subject: Subject,
     columns: [MuscleField; 7],
-    rows: Vec<Row>,
+    rows: Vec<MuscleRow>,
     scaled_to_body: bool,
     may_run: bool,
     refused: Option<FieldError>,
 }
 
-struct Row {
+struct MuscleRow {
     name: &'static str,
-    cells: Vec<Cell>,
+    cells: Vec<ParameterCell>,
 }
 
 /// One parameter of a muscle.
-struct Cell {
+struct ParameterCell {
     /// `sol_max_force_n`.
     field: String,
     label: String,
@@ -79,7 +79,7 @@ fn shown(
         let cell = |column: &MuscleField| {
             let field = format!("{kind}_{}", column.name);
             let kept = given.as_ref().and_then(column.given).map(|value| value.to_string());
-            Cell {
+            ParameterCell {
                 label: format!("{name}: {}", column.meaning),
                 typed: typed.map_or(kept, |typed| typed.get(&field).cloned()).unwrap_or_default(),
                 otherwise: otherwise.as_ref().and_then(column.value).map(format::number),
@@ -87,9 +87,9 @@ fn shown(
                 field,
             }
         };
-        Row { name, cells: MuscleOverride::FIELDS.iter().map(cell).collect() }
+        MuscleRow { name, cells: MuscleOverride::FIELDS.iter().map(cell).collect() }
     };
-    let rows: Vec<Row> = KINDS.iter().map(row).collect();
+    let rows: Vec<MuscleRow> = KINDS.iter().map(row).collect();
     let cell = rows.iter().flat_map(|row| &row.cells).find(|cell| cell.refused);
     let message = refused.as_ref().zip(cell).map(|(refused, cell)| form_errors::of_field(&cell.label, refused));
     let refused = refused.map(|refused| FieldError { message: message.unwrap_or(refused.message), ..refused });
@@ -106,7 +106,7 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<SubjectId, Read>,
-) -> Page {
+) -> PageResult {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let muscles = subjects::muscles(&mut reader, id).await?;

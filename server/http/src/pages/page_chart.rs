@@ -4,7 +4,7 @@ use gaitwright_charts::{Chart, Drawing, Figure, gait_tiles};
 
 /// A chart ready for the page.
 #[derive(Debug)]
-pub(super) struct Drawn {
+pub(super) struct PageChart {
     pub(super) title: String,
     pub(super) note: &'static str,
     pub(super) svg: String,
@@ -15,7 +15,7 @@ pub(super) struct Drawn {
     pub(super) files: Vec<(&'static str, String)>,
 }
 
-impl Drawn {
+impl PageChart {
     pub(super) fn new(chart: &Chart) -> Self {
         Self {
             title: chart.title.clone(),
@@ -51,7 +51,7 @@ impl Drawn {
 }
 
 /// Moves the legends of charts into one legend for all of them; empty if a key means different things in them.
-pub(super) fn shared_legend(charts: &mut [Drawn]) -> Vec<(String, String)> {
+pub(super) fn shared_legend(charts: &mut [PageChart]) -> Vec<(String, String)> {
     let mut shared: Vec<(String, String)> = Vec::new();
     for (class, label) in charts.iter().flat_map(|chart| &chart.legend) {
         match shared.iter().find(|(known, _)| known == class) {
@@ -73,9 +73,9 @@ pub(super) fn shared_legend(charts: &mut [Drawn]) -> Vec<(String, String)> {
 mod tests {
     use super::*;
 
-    fn with_legend(entries: &[(&str, &str)]) -> Drawn {
+    fn with_legend(entries: &[(&str, &str)]) -> PageChart {
         let legend = entries.iter().map(|(class, label)| ((*class).to_owned(), (*label).to_owned())).collect();
-        Drawn { legend, ..Drawn::new(&Chart::new("", "", "")) }
+        PageChart { legend, ..PageChart::new(&Chart::new("", "", "")) }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The pages of problem types, whose addresses are the `type` of problem documents.
 
-use crate::page_error::{Page, page};
-use crate::problem_kinds::{Entry, Kind};
+use crate::page_error::{PageResult, page};
+use crate::problem_kinds::{Entry, ProblemKind};
 use askama::Template;
 use axum::extract::Path;
 use gaitwright_service::error::Error;
@@ -15,12 +15,12 @@ struct ProblemsPage {
 }
 
 /// `GET /problems`.
-pub(super) async fn list() -> Page {
-    page(&ProblemsPage { entries: Kind::ALL.map(Kind::entry).to_vec(), one: false })
+pub(super) async fn list() -> PageResult {
+    page(&ProblemsPage { entries: ProblemKind::ALL.map(ProblemKind::entry).to_vec(), one: false })
 }
 
 /// `GET /problems/{name}`.
-pub(super) async fn get(Path(name): Path<String>) -> Page {
-    let kind = Kind::named(&name).ok_or(Error::NotFound { what: "kind of problem".to_owned(), id: name })?;
+pub(super) async fn get(Path(name): Path<String>) -> PageResult {
+    let kind = ProblemKind::named(&name).ok_or(Error::NotFound { what: "kind of problem".to_owned(), id: name })?;
     page(&ProblemsPage { entries: vec![kind.entry()], one: true })
 }

@@ -6,7 +6,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extractors::{Form, Params};
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::{Path, State};
@@ -38,7 +38,7 @@ struct RatePage {
     /// Whether a safety report about an answered pair was just given.
     reported: bool,
     /// The answer just given, or else the newest one that can be retracted.
-    saved: Option<Saved>,
+    saved: Option<SavedBlindAnswer>,
     /// Seconds that are left to undo the answer just given.
     undo: Option<f64>,
     /// Whether the caller may read the study, and so could know which gait is which.
@@ -68,7 +68,7 @@ const LOOK_AGAIN_S: u32 = 5;
 const READ_S: u32 = 2;
 
 /// An answer, read from the record.
-struct Saved {
+struct SavedBlindAnswer {
     study: StudyId,
     token: String,
     number: u32,
@@ -77,7 +77,7 @@ struct Saved {
     can_be_retracted: bool,
 }
 
-impl Saved {
+impl SavedBlindAnswer {
     /// Whether it was retracted.
     fn is_retracted(&self) -> bool {
         self.answer == Judgement::Retracted
@@ -96,11 +96,11 @@ struct PairPage {
     /// Whether the caller may read the study, and so could know which gait is which.
     not_blind: bool,
     /// The answer, if there is one.
-    saved: Option<Saved>,
+    saved: Option<SavedBlindAnswer>,
     /// Why the form was refused.
     refused: Option<String>,
     /// Both strides; `None` if they cannot be drawn.
-    strides: Option<[Stride; 2]>,
+    strides: Option<[ShownStride; 2]>,
 }
 
 impl PairPage {
@@ -111,14 +111,14 @@ impl PairPage {
 }
 
 /// One of the two gaits.
-struct Stride {
+struct ShownStride {
     /// Duration of the stride, s, rounded to 0.01 s, because more digits would identify the gait.
     seconds: String,
     /// The stride as pictures, for readers without scripts.
     picture: String,
 }
 
-impl Stride {
+impl ShownStride {
     fn of(figures: &[StickFigure]) -> Option<Self> {
         let seconds = figures.last()?.time_s - figures.first()?.time_s;
         Some(Self { seconds: format!("{seconds:.2}"), picture: gait_tiles(figures) })
@@ -127,7 +127,7 @@ impl Stride {
 
 /// The action that led to this page.
 #[derive(Debug, Deserialize)]
-pub(super) struct Before {
+pub(super) struct PrecedingAction {
     #[serde(default)]
     nothing: bool,
     /// The study that had no next pair.
@@ -142,8 +142,8 @@ pub(super) struct Before {
 pub(super) async fn list(
     authorized: Authorized<Rate>,
     State(app): State<AppState>,
-    Params(before): Params<Before>,
-) -> Page {
+    Params(before): Params<PrecedingAction>,
+) -> PageResult {
     let mut reader = app.read().await?;
     let is_answer = before.saved.is_some();
     let saved = match before.saved {
@@ -183,7 +183,7 @@ pub(super) async fn list(
 }
 
 /// A rater's newest answer, if it can be retracted.
-async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, Error> {
+async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlindAnswer>, Error> {
     let mut newest: Option<Presentation> = None;
     for study in studies::page(db, caller.reach(), &StudyFilter::newest(SEARCHED)).await? {
         if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
@@ -201,9 +201,9 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, E
     Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_retracted))
 }
 
-async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, Error> {
+async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<SavedBlindAnswer>, Error> {
     let can_be_retracted = blind::can_be_retracted(db, &shown.presentation).await?;
-    Ok(shown.answer().zip(shown.presentation.answered_at).map(|(judgement, at)| Saved {
+    Ok(shown.answer().zip(shown.presentation.answered_at).map(|(judgement, at)| SavedBlindAnswer {
         study: shown.presentation.study_id,
         answer: judgement,
         at,
@@ -232,11 +232,11 @@ pub(super) async fn pair(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
     Path(token): Path<String>,
-) -> Page {
+) -> PageResult {
     show(&mut app, &authorized.caller, &token, None).await
 }
 
-async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> Page {
+async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> PageResult {
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, token).await?;
     let (token, number) = (shown.presentation.token.clone(), shown.presentation.number);
@@ -258,7 +258,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
     let strides = app.compute(move |pool| {
         let stride = |gait: &Packed<Gait>| {
             let figures = blind_stride(&gait.unpack(pool).ok()?, phase).ok()?;
-            Stride::of(&figures)
+            ShownStride::of(&figures)
         };
         match &pair[..] {
             [first, second] => stride(first).zip(stride(second)).map(|(first, second)| [first, second]),
@@ -271,7 +271,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
 
 /// The form of a pair.
 #[derive(Debug, Deserialize)]
-pub(super) struct Submitted {
+pub(super) struct PairForm {
     answer: Judgement,
     #[serde(default)]
     note: String,
@@ -284,7 +284,7 @@ pub(super) async fn answer(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
     Path(token): Path<String>,
-    Form(form): Form<Submitted>,
+    Form(form): Form<PairForm>,
 ) -> Result<Response, PageError> {
     let given = RaterAnswer { answer: form.answer, response_ms: form.response_ms.trim().parse().ok(), note: form.note };
     let answered = async {

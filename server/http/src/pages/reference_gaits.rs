@@ -1,6 +1,6 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::page_chart::{Drawn, shared_legend};
+use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -8,7 +8,7 @@ use crate::extractors::{Form as Submitted, Params};
 use crate::figures::reference;
 use crate::form_errors;
 use crate::format;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
@@ -29,7 +29,7 @@ use std::str::FromStr;
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Fields {
+pub(super) struct ReferenceGaitFields {
     name: String,
     format: JointAngleFormat,
     recording: String,
@@ -44,7 +44,7 @@ pub(super) struct Fields {
     act: String,
 }
 
-impl Fields {
+impl ReferenceGaitFields {
     fn read(&self) -> Result<NewReferenceGait, Error> {
         let given = |text: &str| Some(text.trim().to_owned()).filter(|text| !text.is_empty());
         let size = |field, text: &str| given(text).map(|text| number(field, &text)).transpose();
@@ -84,7 +84,7 @@ struct ReferenceGaitsPage {
     /// The subject from whom distances are measured.
     nearest_to: Option<Subject>,
     may_run: bool,
-    fields: Fields,
+    fields: ReferenceGaitFields,
     refused: Option<FieldError>,
     /// The preview of the recording in the form.
     preview: Option<Preview>,
@@ -133,7 +133,7 @@ impl ReferenceGaitsPage {
             subjects,
             nearest_to,
             may_run,
-            fields: Fields::default(),
+            fields: ReferenceGaitFields::default(),
             refused: None,
             preview: None,
         })
@@ -161,7 +161,7 @@ pub(super) async fn list(
     State(app): State<AppState>,
     units: Units,
     Params(to): Params<To>,
-) -> Page {
+) -> PageResult {
     let may_run = authorized.caller.may(Run::NEEDED);
     page(&ReferenceGaitsPage::read(&mut *app.read().await?, units, to.subject, may_run).await?)
 }
@@ -171,7 +171,7 @@ pub(super) async fn import(
     authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     units: Units,
-    Submitted(fields): Submitted<Fields>,
+    Submitted(fields): Submitted<ReferenceGaitFields>,
 ) -> Result<Response, PageError> {
     if fields.act == "preview" {
         let preview = match fields.read() {
@@ -216,7 +216,7 @@ struct ReferenceGaitPage {
     /// Curves that differ from the built-in reference gait.
     warning: Option<String>,
     steps: Vec<String>,
-    charts: Vec<Drawn>,
+    charts: Vec<PageChart>,
 }
 
 impl ReferenceGaitPage {
@@ -231,7 +231,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     units: Units,
     Id(id, _): Id<ReferenceGaitId, Read>,
-) -> Page {
+) -> PageResult {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
         units,
@@ -239,7 +239,7 @@ pub(super) async fn get(
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
         charts: reference::of_reference(&reference.definition)
             .iter()
-            .map(|figure| Drawn::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
+            .map(|figure| PageChart::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
             .collect(),
         reference,
     })

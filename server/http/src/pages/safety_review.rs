@@ -9,7 +9,7 @@ use axum::extract::State;
 use axum::response::Redirect;
 use gaitwright_service::access;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::safety_report::{self, Report};
+use gaitwright_service::studies::safety_report::{self, NewSafetyReport};
 use gaitwright_service::studies::safety_review::{self, Decision};
 use gaitwright_store::safety_reviews::SafetyDecision;
 use gaitwright_store::{SafetyReportId, TrialId, commit};
@@ -58,7 +58,7 @@ pub(super) async fn report(
     authorized: Authorized<access::Answer>,
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, access::Answer>,
-    Form(form): Form<Report>,
+    Form(form): Form<NewSafetyReport>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
     safety_report::give(&mut writer, &authorized.caller, id, &form).await?;

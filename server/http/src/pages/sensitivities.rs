@@ -11,11 +11,11 @@ use gaitwright_service::studies::sensitivities::{BoundStep, PackedSolution, Stud
 pub(super) struct SensitivityTable {
     /// One sentence for each bound that matters, and one for the others.
     pub(super) sentences: Vec<String>,
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<SensitivityRow>,
 }
 
 /// A bound that the study tunes.
-pub(super) struct Row {
+pub(super) struct SensitivityRow {
     pub(super) bound: &'static str,
     /// One step of the grid.
     pub(super) step: String,
@@ -36,12 +36,13 @@ impl SensitivityTable {
         let computed = solution.and_then(|solution| solution.sensitivities(pool));
         let StudySensitivities { found, steps } = computed.map_err(|error| error.to_string())?;
         let rows = found.bounds.iter().zip(&steps);
-        let rows = rows.filter_map(|(bound, step)| Some(Row::new(bound, step.as_ref()?, found.cost_of_transport)));
+        let rows =
+            rows.filter_map(|(bound, step)| Some(SensitivityRow::new(bound, step.as_ref()?, found.cost_of_transport)));
         Ok(Self { sentences: found.sentences(), rows: rows.collect() })
     }
 }
 
-impl Row {
+impl SensitivityRow {
     fn new(bound: &BoundSensitivity, step: &BoundStep, cost_of_transport: f64) -> Self {
         let is_active = !bound.active.is_empty();
         let changes = |text: String| if is_active { text } else { "no change".to_owned() };

@@ -1,14 +1,14 @@
 //! The page that compares two studies in one chart and one table.
 
-use super::page_chart::Drawn;
+use super::page_chart::PageChart;
 use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::figures::{COURSE, Outcome, StudyResults, course, have_one_reference_gait};
+use crate::figures::{COURSE, StudyOutcome, StudyResults, course, have_one_reference_gait};
 use crate::format;
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
@@ -29,7 +29,7 @@ const OFFERED: u32 = 200;
 
 /// The two studies.
 #[derive(Debug, Deserialize)]
-pub(super) struct Choice {
+pub(super) struct StudiesQuery {
     a: Option<Named<StudyId>>,
     b: Option<Named<StudyId>>,
 }
@@ -54,7 +54,7 @@ struct Compared {
     b: Study,
     /// Whether the studies have the same reference gait; otherwise no Gait RMSE is shown.
     comparable: bool,
-    chart: Option<Drawn>,
+    chart: Option<PageChart>,
     /// Names of studies without a best action to draw.
     without_course: Vec<String>,
     /// The best gaits of both studies; empty if one has none.
@@ -67,8 +67,8 @@ struct Compared {
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Params(choice): Params<Choice>,
-) -> Page {
+    Params(choice): Params<StudiesQuery>,
+) -> PageResult {
     let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
     let shown: BTreeSet<SubjectId> =
@@ -123,7 +123,7 @@ async fn with_best_gaits(
 }
 
 /// The properties and results of a study.
-fn rows(study: &StudyResults, outcome: &Outcome, comparable: bool) -> Vec<(String, String)> {
+fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(String, String)> {
     let plan = &study.snapshot.study.plan;
     let best = outcome.best.and_then(|id| study.snapshot.trial(id));
     let seconds: f64 = study.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
@@ -166,7 +166,7 @@ fn compare(
     let chart = if comparable { course(&both) } else { None };
     let chart = chart.map(|chart| {
         let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
-        Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
+        PageChart::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
     });
     let properties = rows(&a, &of_a, comparable).into_iter().zip(rows(&b, &of_b, comparable));
     let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, outcome)| outcome.course().is_empty());

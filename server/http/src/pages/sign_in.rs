@@ -6,7 +6,7 @@ use crate::authorization::SignedIn;
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::{AppState, ClientAddress};
 use askama::Template;
 use axum::extract::{Path, State};
@@ -47,7 +47,7 @@ struct AccountPage {
 }
 
 /// `GET /sign-in`.
-pub(super) async fn get() -> Page {
+pub(super) async fn get() -> PageResult {
     page(&SignInPage { refused: None, name: String::new(), unsent: Unsent::default() })
 }
 
@@ -162,7 +162,7 @@ pub(super) async fn post(
 }
 
 /// `GET /sign-in/{link}`: a button, so that programs that only preview the link do not use it up.
-pub(super) async fn link(Path(link): Path<String>) -> Page {
+pub(super) async fn link(Path(link): Path<String>) -> PageResult {
     page(&LinkPage { link })
 }
 
@@ -215,7 +215,7 @@ pub(super) async fn out(
 }
 
 /// `GET /account`.
-pub(super) async fn account(State(app): State<AppState>, SignedIn(caller): SignedIn, headers: HeaderMap) -> Page {
+pub(super) async fn account(State(app): State<AppState>, SignedIn(caller): SignedIn, headers: HeaderMap) -> PageResult {
     if app.access.open && caller.as_ref().is_some_and(|caller| caller.user.is_none()) {
         return page(&NoAccountPage);
     }
@@ -292,7 +292,7 @@ pub(super) async fn set_password(
 
 /// The session to end.
 #[derive(Deserialize)]
-pub(super) struct Ended {
+pub(super) struct SessionToEnd {
     id: String,
 }
 
@@ -300,7 +300,7 @@ pub(super) struct Ended {
 pub(super) async fn end_session(
     State(app): State<AppState>,
     SignedIn(caller): SignedIn,
-    Form(form): Form<Ended>,
+    Form(form): Form<SessionToEnd>,
 ) -> Result<Response, PageError> {
     let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
     let missing = || Error::NotFound { what: "session".to_owned(), id: form.id.clone() };

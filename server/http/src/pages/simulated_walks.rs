@@ -21,13 +21,13 @@ use serde::Deserialize;
 /// The section: the newest report, and the state of a requested one.
 pub(super) struct SimulatedWalks {
     pub(super) state: Simulation,
-    pub(super) shown: Option<Shown>,
+    pub(super) shown: Option<ShownReport>,
     /// What the form suggests.
     pub(super) suggested: WalksAsked,
 }
 
 /// An execution report in words.
-pub(super) struct Shown {
+pub(super) struct ShownReport {
     pub(super) sentence: String,
     pub(super) grounds: Vec<GroundRow>,
     /// Label and value.
@@ -49,7 +49,7 @@ pub(super) struct GroundRow {
 
 impl SimulatedWalks {
     pub(super) fn new(state: Simulation, kept: Option<KeptReport>) -> Self {
-        Self { state, shown: kept.map(Shown::new), suggested: WalksAsked::default() }
+        Self { state, shown: kept.map(ShownReport::new), suggested: WalksAsked::default() }
     }
 
     /// Whether a report is queued or running.
@@ -66,7 +66,7 @@ impl SimulatedWalks {
     }
 }
 
-impl Shown {
+impl ShownReport {
     fn new(kept: KeptReport) -> Self {
         let KeptReport { simulated: GaitSimulated { walks, seed, program, report, .. }, created_at } = kept;
         let of_strides = |strides: u32| format!("{strides} of {}", report.strides);
@@ -121,14 +121,14 @@ impl GroundRow {
 
 /// The fields of the form.
 #[derive(Debug, Deserialize)]
-pub(super) struct Fields {
+pub(super) struct WalksFields {
     #[serde(default)]
     walks: String,
     #[serde(default)]
     seed: String,
 }
 
-impl Fields {
+impl WalksFields {
     fn asked(&self) -> Result<WalksAsked, Error> {
         let walks = self.walks.trim().parse();
         let seed = self.seed.trim().parse();
@@ -144,7 +144,7 @@ pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    Form(fields): Form<Fields>,
+    Form(fields): Form<WalksFields>,
 ) -> Result<Redirect, PageError> {
     let asked = fields.asked()?;
     let mut writer = app.write().await?;

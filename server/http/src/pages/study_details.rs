@@ -5,7 +5,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Form;
 use crate::form_errors;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::visible::Visible;
 use askama::Template;
@@ -26,7 +26,7 @@ const LABELS: &[(&str, &str)] = &[("name", "Name"), ("tags", "Tags"), ("notes", 
 #[template(path = "study_details.html")]
 struct DetailsPage {
     study: Study,
-    fields: Fields,
+    fields: StudyDetailsFields,
     may_run: bool,
     refused: Option<String>,
 }
@@ -41,7 +41,7 @@ impl DetailsPage {
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Fields {
+pub(super) struct StudyDetailsFields {
     act: String,
     #[serde(default)]
     name: String,
@@ -52,7 +52,7 @@ pub(super) struct Fields {
     notes: String,
 }
 
-impl Fields {
+impl StudyDetailsFields {
     fn of(study: &Study) -> Self {
         Self {
             act: String::new(),
@@ -84,13 +84,19 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-) -> Page {
+) -> PageResult {
     show(&app, &authorized.caller, id, None, None).await
 }
 
-async fn show(app: &AppState, caller: &Caller, id: StudyId, typed: Option<Fields>, refused: Option<String>) -> Page {
+async fn show(
+    app: &AppState,
+    caller: &Caller,
+    id: StudyId,
+    typed: Option<StudyDetailsFields>,
+    refused: Option<String>,
+) -> PageResult {
     let study = studies::get(&mut *app.read().await?, id).await?;
-    let fields = typed.unwrap_or_else(|| Fields::of(&study));
+    let fields = typed.unwrap_or_else(|| StudyDetailsFields::of(&study));
     page(&DetailsPage { study, fields, may_run: caller.may(Run::NEEDED), refused })
 }
 
@@ -99,7 +105,7 @@ pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    Form(fields): Form<Fields>,
+    Form(fields): Form<StudyDetailsFields>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
     match change(&mut writer, &authorized.caller, id, &fields).await {
@@ -120,7 +126,7 @@ pub(super) async fn post(
     }
 }
 
-async fn change(writer: &mut Writer, caller: &Caller, id: StudyId, fields: &Fields) -> Result<(), Error> {
+async fn change(writer: &mut Writer, caller: &Caller, id: StudyId, fields: &StudyDetailsFields) -> Result<(), Error> {
     let change = fields.change()?;
     if let Some(name) = change.name.as_deref().map(str::trim)
         && studies::is_named(writer, caller.reach(), name, Some(id)).await?

@@ -7,7 +7,7 @@ use crate::body_measures;
 use crate::extractors::{Form, Params};
 use crate::form_errors;
 use crate::format::{variant, words};
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::units::Units;
 use askama::Template;
@@ -33,11 +33,11 @@ const PAGE: u32 = 100;
 #[template(path = "subjects.html")]
 struct SubjectsPage {
     units: Units,
-    subjects: Vec<Row>,
+    subjects: Vec<SubjectRow>,
     /// The last subject of this page, if more follow.
     next: Option<SubjectId>,
     may_run: bool,
-    fields: Described,
+    fields: SubjectFields,
     /// Every refused field.
     refused: Vec<FieldError>,
 }
@@ -56,14 +56,14 @@ impl SubjectsPage {
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Described {
+pub(super) struct SubjectFields {
     pseudonym: String,
     height_m: String,
     body_mass_kg: String,
     notes: String,
 }
 
-impl Described {
+impl SubjectFields {
     fn read(&self) -> Result<NewSubject, Error> {
         let (height_m, body_mass_kg) = body_of(&self.height_m, &self.body_mass_kg)?;
         Ok(NewSubject { pseudonym: self.pseudonym.clone(), height_m, body_mass_kg, notes: self.notes.clone() })
@@ -76,7 +76,7 @@ fn body_of(height: &str, mass: &str) -> Result<(f64, f64), Error> {
 }
 
 /// Every field of a new subject that would be refused, in the order of the form.
-fn faults(fields: &Described) -> Vec<FieldError> {
+fn faults(fields: &SubjectFields) -> Vec<FieldError> {
     let mut repaired = fields.clone();
     let mut found: Vec<FieldError> = Vec::new();
     // Each field is refused once, and an acceptable value takes its place.
@@ -97,7 +97,7 @@ fn faults(fields: &Described) -> Vec<FieldError> {
     found
 }
 
-struct Row {
+struct SubjectRow {
     subject: Subject,
     consent: &'static str,
     withdrawn: bool,
@@ -158,7 +158,7 @@ impl Correcting {
 
 /// The entries of a refused form of the page.
 #[derive(Default)]
-enum Typed {
+enum RefusedForm {
     #[default]
     Nothing,
     Correction(Correcting),
@@ -182,7 +182,7 @@ struct SessionRow {
 
 /// Which subjects to show.
 #[derive(Debug, Deserialize)]
-pub(super) struct Before {
+pub(super) struct SubjectsBefore {
     before: Option<SubjectId>,
 }
 
@@ -191,9 +191,9 @@ pub(super) async fn list(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     units: Units,
-    Params(Before { before }): Params<Before>,
-) -> Page {
-    show_list(&app, units, before, authorized.caller.may(Run::NEEDED), Described::default(), Vec::new()).await
+    Params(SubjectsBefore { before }): Params<SubjectsBefore>,
+) -> PageResult {
+    show_list(&app, units, before, authorized.caller.may(Run::NEEDED), SubjectFields::default(), Vec::new()).await
 }
 
 /// `POST /subjects`: adds one, before it has a study.
@@ -201,7 +201,7 @@ pub(super) async fn add(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     units: Units,
-    Form(fields): Form<Described>,
+    Form(fields): Form<SubjectFields>,
 ) -> Result<Response, PageError> {
     let added = async {
         let new = fields.read()?;
@@ -229,9 +229,9 @@ async fn show_list(
     units: Units,
     before: Option<SubjectId>,
     may_run: bool,
-    fields: Described,
+    fields: SubjectFields,
     refused: Vec<FieldError>,
-) -> Page {
+) -> PageResult {
     let mut reader = app.read().await?;
     let mut found = subjects::page(&mut reader, before, PAGE + 1).await?;
     let more = found.len() > PAGE as usize;
@@ -242,7 +242,7 @@ async fn show_list(
         let consents = consents::of_subject(&mut reader, subject.id).await?;
         let last = consents.last();
         let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
-        rows.push(Row { subject, consent: last.map_or("not on record", |last| last.kind.as_str()), withdrawn });
+        rows.push(SubjectRow { subject, consent: last.map_or("not on record", |last| last.kind.as_str()), withdrawn });
     }
     page(&SubjectsPage { units, subjects: rows, next, may_run, fields, refused })
 }
@@ -253,8 +253,8 @@ pub(super) async fn get(
     State(app): State<AppState>,
     units: Units,
     Id(id, _): Id<SubjectId, Read>,
-) -> Page {
-    show(&app, units, id, &authorized.caller, None, Typed::Nothing).await
+) -> PageResult {
+    show(&app, units, id, &authorized.caller, None, RefusedForm::Nothing).await
 }
 
 async fn show(
@@ -263,8 +263,8 @@ async fn show(
     id: SubjectId,
     caller: &Caller,
     refused: Option<String>,
-    typed: Typed,
-) -> Page {
+    typed: RefusedForm,
+) -> PageResult {
     let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
@@ -282,9 +282,9 @@ async fn show(
     let corrected = corrections.last().map_or(0, |last| last.seq);
     let (mut correction, mut withdrawal_reason) = (Correcting::of(&subject), String::new());
     match typed {
-        Typed::Nothing => {}
-        Typed::Correction(typed) => correction = typed,
-        Typed::Withdrawal(reason) => withdrawal_reason = reason,
+        RefusedForm::Nothing => {}
+        RefusedForm::Correction(typed) => correction = typed,
+        RefusedForm::Withdrawal(reason) => withdrawal_reason = reason,
     }
     page(&SubjectPage {
         units,
@@ -345,7 +345,7 @@ pub(super) async fn consent(
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let done = give(&app, &authorized, id, form).await;
-    answer(&app, units, id, &authorized.caller, done, Typed::Nothing).await
+    answer(&app, units, id, &authorized.caller, done, RefusedForm::Nothing).await
 }
 
 async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
@@ -374,7 +374,7 @@ pub(super) async fn withdraw(
             "Nothing was changed. First tick the box to confirm that all studies of this subject stop.",
         ))
     };
-    answer(&app, units, id, &authorized.caller, done, Typed::Withdrawal(why.reason)).await
+    answer(&app, units, id, &authorized.caller, done, RefusedForm::Withdrawal(why.reason)).await
 }
 
 /// The form of a withdrawal.
@@ -421,7 +421,7 @@ pub(super) async fn correct(
         refused: true,
     };
     let done = set_right(&app, &authorized, id, form).await;
-    answer(&app, units, id, &authorized.caller, done, Typed::Correction(typed)).await
+    answer(&app, units, id, &authorized.caller, done, RefusedForm::Correction(typed)).await
 }
 
 async fn set_right(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
@@ -443,7 +443,7 @@ async fn answer(
     id: SubjectId,
     caller: &Caller,
     done: Result<(), Error>,
-    typed: Typed,
+    typed: RefusedForm,
 ) -> Result<Response, PageError> {
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::format::{duration, words};
-use crate::page_error::{Page, page};
+use crate::page_error::{PageResult, page};
 use crate::readiness;
 use crate::workers::Workers;
 use askama::Template;
@@ -38,7 +38,7 @@ struct SystemPage {
     totals: Totals,
     free_bytes: Option<u64>,
     record: String,
-    measured: [Option<trials::Measured>; 2],
+    measured: [Option<trials::SolveTimes>; 2],
     may_administer: bool,
 }
 
@@ -82,7 +82,7 @@ impl SystemPage {
 }
 
 /// `GET /system`.
-pub(super) async fn get(authorized: Authorized<Read>, State(app): State<AppState>) -> Page {
+pub(super) async fn get(authorized: Authorized<Read>, State(app): State<AppState>) -> PageResult {
     show(&app, &authorized.caller, None).await
 }
 
@@ -97,7 +97,7 @@ enum BackupNotice {
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
-pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): State<AppState>) -> Page {
+pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): State<AppState>) -> PageResult {
     let actor = &authorized.caller.actor;
     let mut writer = app.write().await?;
     let requested = app.backups.request(app.store(), &mut writer, actor).await?;
@@ -115,7 +115,7 @@ pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): 
     show(&app, &authorized.caller, Some(notice)).await
 }
 
-async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> Page {
+async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> PageResult {
     let workers = Workers::read(app).await?;
     let mut reader = app.read().await?;
     let totals = totals::read(&mut reader).await?;

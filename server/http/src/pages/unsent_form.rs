@@ -54,7 +54,7 @@ struct SendNowPage {
 }
 
 /// Shows the form for sending after signing in.
-pub(super) fn send_now(unsent: &Unsent) -> crate::page_error::Page {
+pub(super) fn send_now(unsent: &Unsent) -> crate::page_error::PageResult {
     page(&SendNowPage { to: unsent.to.clone(), fields: unsent.pairs() })
 }
 

@@ -6,7 +6,7 @@ use crate::client_address::Secure;
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::qr_code;
 use askama::Template;
@@ -18,7 +18,7 @@ use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Administer, Caller, Right, Role, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_store::sessions::Session;
-use gaitwright_store::sign_in_failures::Source;
+use gaitwright_store::sign_in_failures::NetworkFailures;
 use gaitwright_store::tokens::Token;
 use gaitwright_store::users::User;
 use gaitwright_store::{SessionId, TokenId, UserId, Writer, commit, sessions, sign_in_failures, tokens, users};
@@ -47,17 +47,17 @@ struct UsersPage {
     tokens: Vec<Token>,
     sessions: Vec<Session>,
     /// Networks with failed sign-ins.
-    failures: Vec<Source>,
+    failures: Vec<NetworkFailures>,
     roles: [Role; 3],
     scopes: [(Right, &'static str); 5],
-    outcome: Outcome,
-    refused: Option<Refused>,
+    outcome: ActionOutcome,
+    refused: Option<RefusedEntry>,
     /// The entries of a refused form. None of them is secret.
-    typed: Asked,
+    typed: UsersForm,
 }
 
 /// Why a form was refused.
-struct Refused {
+struct RefusedEntry {
     /// Which form.
     act: String,
     /// The refused field; `None` if no single field is at fault.
@@ -74,7 +74,7 @@ const FIELDS: [(&str, &str, &str); 5] = [
     ("scopes", "make_token", "Scopes"),
 ];
 
-impl Refused {
+impl RefusedEntry {
     fn of(error: &Error, act: &str) -> Self {
         let find = |name: &str| FIELDS.iter().find(|(field, form, _)| *field == name && *form == act);
         let (field, message) = match error {
@@ -129,7 +129,7 @@ impl UsersPage {
 
 /// The result of an action.
 #[derive(Default)]
-struct Outcome {
+struct ActionOutcome {
     done: Option<String>,
     /// A secret that is shown once: label and text.
     secret: Option<(&'static str, String)>,
@@ -137,7 +137,7 @@ struct Outcome {
 
 /// The fields of every form of the page.
 #[derive(Debug, Default, Deserialize)]
-pub(super) struct Asked {
+pub(super) struct UsersForm {
     act: String,
     #[serde(default)]
     id: String,
@@ -154,7 +154,7 @@ pub(super) struct Asked {
     device: Option<String>,
 }
 
-impl Asked {
+impl UsersForm {
     fn scopes(&self) -> Vec<Right> {
         let given: [_; SCOPES.len()] = [&self.read, &self.run, &self.answer, &self.rate, &self.device];
         SCOPES.iter().zip(given).filter(|(_, given)| given.is_some()).map(|((right, _), _)| *right).collect()
@@ -171,11 +171,11 @@ impl Asked {
 }
 
 /// `GET /users`.
-pub(super) async fn get(_: Authorized<Administer>, State(app): State<AppState>) -> Page {
-    show(&app, Outcome::default(), None, Asked::default()).await
+pub(super) async fn get(_: Authorized<Administer>, State(app): State<AppState>) -> PageResult {
+    show(&app, ActionOutcome::default(), None, UsersForm::default()).await
 }
 
-async fn show(app: &AppState, outcome: Outcome, refused: Option<Refused>, typed: Asked) -> Page {
+async fn show(app: &AppState, outcome: ActionOutcome, refused: Option<RefusedEntry>, typed: UsersForm) -> PageResult {
     let mut reader = app.read().await?;
     let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
     let now = app.access.clock.now(&mut reader).await?;
@@ -191,7 +191,7 @@ pub(super) async fn post(
     State(app): State<AppState>,
     secure: Secure,
     headers: HeaderMap,
-    Form(asked): Form<Asked>,
+    Form(asked): Form<UsersForm>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
     let origin = origin(secure, &headers);
@@ -200,13 +200,13 @@ pub(super) async fn post(
             commit(writer).await?;
             // Event streams check again whether their user still has access.
             app.scheduler.changed();
-            Ok(show(&app, outcome, None, Asked::default()).await?.into_response())
+            Ok(show(&app, outcome, None, UsersForm::default()).await?.into_response())
         }
         Err(error) if error.is_input() => {
             drop(writer);
             let status = StatusCode::from_u16(Problem::from(&error).status).unwrap_or(StatusCode::BAD_REQUEST);
-            let refused = Refused::of(&error, &asked.act);
-            Ok((status, show(&app, Outcome::default(), Some(refused), asked).await?).into_response())
+            let refused = RefusedEntry::of(&error, &asked.act);
+            Ok((status, show(&app, ActionOutcome::default(), Some(refused), asked).await?).into_response())
         }
         Err(error) => Err(error.into()),
     }
@@ -220,9 +220,9 @@ pub(super) fn origin(secure: Secure, headers: &HeaderMap) -> String {
     if host.is_empty() { String::new() } else { format!("{scheme}://{host}") }
 }
 
-async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) -> Result<Outcome, Error> {
+async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &UsersForm) -> Result<ActionOutcome, Error> {
     let actor = &caller.actor;
-    let done = |text: String| Outcome { done: Some(text), secret: None };
+    let done = |text: String| ActionOutcome { done: Some(text), secret: None };
     match asked.act.as_str() {
         "add_user" => {
             let user =
@@ -259,7 +259,7 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
             };
             let new = NewToken { name: asked.name.clone(), scopes: asked.scopes(), days };
             let (token, secret) = making::make(writer, actor, &new).await?;
-            Ok(Outcome { done: Some(format!("Created token {}.", token.name)), secret: Some(("Token", secret)) })
+            Ok(ActionOutcome { done: Some(format!("Created token {}.", token.name)), secret: Some(("Token", secret)) })
         }
         "revoke" => {
             let token = making::revoke(writer, actor, asked.id::<TokenId>()?).await?;
@@ -273,8 +273,8 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
     }
 }
 
-fn link(user: &User, origin: &str, secret: &str) -> Outcome {
-    Outcome {
+fn link(user: &User, origin: &str, secret: &str) -> ActionOutcome {
+    ActionOutcome {
         done: Some(format!("Created a sign-in link for {}. It works only once and expires after a day.", user.name)),
         secret: Some(("Sign-in link", format!("{origin}/sign-in/{secret}"))),
     }

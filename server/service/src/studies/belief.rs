@@ -95,9 +95,9 @@ type Recent<T> = Mutex<VecDeque<(StudyId, Arc<Mutex<T>>)>>;
 #[derive(Debug, Default)]
 pub struct Beliefs {
     learners: Recent<Learner>,
-    posteriors: Kept<LogVersion, Posterior>,
+    posteriors: StudyCache<LogVersion, Posterior>,
     // A safety report changes which gaits can be recommended.
-    shown: Kept<(LogVersion, SafetyVersion), Belief>,
+    shown: StudyCache<(LogVersion, SafetyVersion), Belief>,
     histories: Recent<UtilityHistory>,
 }
 
@@ -168,15 +168,15 @@ fn kept_or_new<T: Default>(list: &Recent<T>, study: StudyId, limit: usize) -> Ar
 
 /// A cache of values that derive from the log of a study.
 #[derive(Debug)]
-struct Kept<V, T>(Mutex<VecDeque<(StudyId, V, Arc<T>)>>);
+struct StudyCache<V, T>(Mutex<VecDeque<(StudyId, V, Arc<T>)>>);
 
-impl<V, T> Default for Kept<V, T> {
+impl<V, T> Default for StudyCache<V, T> {
     fn default() -> Self {
         Self(Mutex::default())
     }
 }
 
-impl<V: Copy + PartialEq, T> Kept<V, T> {
+impl<V: Copy + PartialEq, T> StudyCache<V, T> {
     fn get_or(
         &self,
         study: StudyId,

@@ -4,7 +4,7 @@ use super::belief::Beliefs;
 use super::snapshot::StudySnapshot;
 use super::trial_choice::ranking_to_show;
 use super::trial_jobs::TrialJob;
-use super::trial_queue::Order;
+use super::trial_queue::RequestOrder;
 use super::{certification, certified_best};
 use crate::error::Error;
 use crate::workers::Certify;
@@ -34,7 +34,7 @@ impl Certifier {
 impl TrialJob for Certifier {
     const NAME: &'static str = "certificate";
     /// People wait for the gaits of new trials, in a lab session or a comparison.
-    const ORDER: Order = Order::NewestTrial;
+    const ORDER: RequestOrder = RequestOrder::NewestTrial;
     type Request = ();
 
     async fn requested(&self) -> StoreResult<Vec<(TrialId, ())>> {

@@ -1,6 +1,6 @@
 //! Commands for studies (start, pause, resume, stop) and trials (cancel, retry), each in one transaction.
 
-use super::lifecycle::{self, Act};
+use super::lifecycle::{self, StudyTransition};
 use super::trial_result;
 use crate::error::Error;
 use crate::printable;
@@ -24,10 +24,16 @@ pub struct Done {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long or does not print, [`Error::Conflict`] with the possible
 /// commands.
-pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reason: &str) -> Result<Done, Error> {
+pub async fn act(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: StudyId,
+    act: StudyTransition,
+    reason: &str,
+) -> Result<Done, Error> {
     printable::note("reason", reason, 2000)?;
     let study = studies::get(writer, id).await?;
-    let cancelled = if act == Act::Stop {
+    let cancelled = if act == StudyTransition::Stop {
         stop(writer, &study, reason).await?
     } else {
         move_on(writer, &study, act, reason).await?;
@@ -49,11 +55,11 @@ pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Re
         trial_result::cancelled(writer, trial.id, "The study was stopped.").await?;
         cancelled.push(trial.id);
     }
-    move_on(writer, study, Act::Stop, reason).await?;
+    move_on(writer, study, StudyTransition::Stop, reason).await?;
     Ok(cancelled)
 }
 
-async fn move_on(writer: &mut Writer, study: &Study, act: Act, reason: &str) -> Result<(), Error> {
+async fn move_on(writer: &mut Writer, study: &Study, act: StudyTransition, reason: &str) -> Result<(), Error> {
     let state = lifecycle::after(study.state, act)?;
     if !studies::set_state(writer, study, state, reason).await? {
         return Err(Error::conflict("The study was changed at the same time. Try again."));

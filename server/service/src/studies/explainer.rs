@@ -1,7 +1,7 @@
 //! The job that explains a trial without a gait: requested ones, then those of ended studies whose best gaits are
 //! certified.
 
-use super::explanation::{self, Effort, Elapsed};
+use super::explanation::{self, Elapsed, ExplanationEffort};
 use super::trial_jobs::{TrialJob, behind};
 use super::trial_queue::TrialJobState;
 use crate::error::Error;
@@ -51,15 +51,15 @@ impl Explainer {
     }
 
     /// The state of the explanation of a trial. The record says what is queued.
-    pub(super) fn effort(&self, state: TrialJobState<()>) -> Effort {
+    pub(super) fn effort(&self, state: TrialJobState<()>) -> ExplanationEffort {
         match state {
-            TrialJobState::None | TrialJobState::Queued(()) => Effort::Ready,
-            TrialJobState::Running { since, .. } => Effort::Running(Elapsed {
+            TrialJobState::None | TrialJobState::Queued(()) => ExplanationEffort::Ready,
+            TrialJobState::Running { since, .. } => ExplanationEffort::Running(Elapsed {
                 seconds: since.elapsed().as_secs(),
                 usual_seconds: self.durations.lock().unwrap_or_else(PoisonError::into_inner).median(),
             }),
-            TrialJobState::Cancelled => Effort::Cancelled,
-            TrialJobState::Failed(reason) => Effort::Refused(reason),
+            TrialJobState::Cancelled => ExplanationEffort::Cancelled,
+            TrialJobState::Failed(reason) => ExplanationEffort::Refused(reason),
         }
     }
 }

@@ -29,7 +29,7 @@ pub enum ExplanationState {
 
 /// The state of the explanation of a trial in this process.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Effort {
+pub enum ExplanationEffort {
     /// This process explains no trials.
     None,
     /// This process explains trials, but is not explaining this one.
@@ -55,16 +55,16 @@ pub struct Elapsed {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn state(db: &mut Connection, trial: &Trial, effort: Effort) -> Result<ExplanationState, Error> {
+pub async fn state(db: &mut Connection, trial: &Trial, effort: ExplanationEffort) -> Result<ExplanationState, Error> {
     if let Some(made) = explanations::find(db, trial.id).await? {
         return Ok(ExplanationState::Made(Box::new(made)));
     }
     let ready = match effort {
-        Effort::Refused(reason) => return Ok(ExplanationState::Refused(reason)),
-        Effort::Running(_) => return Ok(ExplanationState::BeingMade),
-        Effort::Cancelled => return Ok(ExplanationState::NotAsked),
-        Effort::Ready => true,
-        Effort::None => false,
+        ExplanationEffort::Refused(reason) => return Ok(ExplanationState::Refused(reason)),
+        ExplanationEffort::Running(_) => return Ok(ExplanationState::BeingMade),
+        ExplanationEffort::Cancelled => return Ok(ExplanationState::NotAsked),
+        ExplanationEffort::Ready => true,
+        ExplanationEffort::None => false,
     };
     if explanations::is_requested(db, trial.id).await? {
         return Ok(ExplanationState::BeingMade);
@@ -84,7 +84,7 @@ pub async fn state(db: &mut Connection, trial: &Trial, effort: Effort) -> Result
 /// # Errors
 /// [`Error::Conflict`] if the trial cannot be explained or the subject withdrew consent, [`Error::NotFound`], errors of
 /// the database.
-pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: Effort) -> Result<bool, Error> {
+pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: ExplanationEffort) -> Result<bool, Error> {
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     match state(writer, &trial, effort).await? {

@@ -4,7 +4,7 @@
 
 use super::command;
 use super::execution::{self, Simulation};
-use super::explanation::{self, Effort, ExplanationState};
+use super::explanation::{self, ExplanationEffort, ExplanationState};
 use super::job::{JobId, JobState};
 use super::scheduler::Scheduler;
 use crate::access::{Caller, Reach, Right};
@@ -69,9 +69,9 @@ pub async fn find(db: &mut Connection, runners: Runners<'_>, id: JobId) -> Resul
 }
 
 /// State of a job, and the reason if it failed.
-type Found = Option<(JobState, Option<String>)>;
+type FoundState = Option<(JobState, Option<String>)>;
 
-fn solve(trial: &Trial) -> Found {
+fn solve(trial: &Trial) -> FoundState {
     if trial.asked_by.is_some() {
         // A script evaluates it.
         return None;
@@ -85,14 +85,14 @@ fn solve(trial: &Trial) -> Found {
     })
 }
 
-async fn certificate(db: &mut Connection, scheduler: &Scheduler, trial: TrialId) -> Result<Found, Error> {
+async fn certificate(db: &mut Connection, scheduler: &Scheduler, trial: TrialId) -> Result<FoundState, Error> {
     if certificates::find(db, trial).await?.is_some() {
         return Ok(Some((JobState::Done, None)));
     }
     Ok(scheduler.certifying(trial))
 }
 
-async fn execution_report(db: &mut Connection, scheduler: &Scheduler, trial: TrialId) -> Result<Found, Error> {
+async fn execution_report(db: &mut Connection, scheduler: &Scheduler, trial: TrialId) -> Result<FoundState, Error> {
     Ok(match scheduler.simulating(trial) {
         Simulation::Queued(_) => Some((JobState::Queued, None)),
         Simulation::Running { .. } => Some((JobState::Running, None)),
@@ -110,10 +110,10 @@ fn progress(scheduler: &Scheduler, id: JobId) -> Option<f64> {
     }
 }
 
-async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) -> Result<Found, Error> {
+async fn explanation(db: &mut Connection, scheduler: &Scheduler, trial: &Trial) -> Result<FoundState, Error> {
     let effort = scheduler.explaining(trial.id);
-    let running = matches!(effort, Effort::Running(_));
-    if effort == Effort::Cancelled {
+    let running = matches!(effort, ExplanationEffort::Running(_));
+    if effort == ExplanationEffort::Cancelled {
         return Ok(Some((JobState::Cancelled, None)));
     }
     Ok(match explanation::state(db, trial, effort).await? {
@@ -148,7 +148,10 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
     }
     for (trial, study) in explanations::requested(db, reach).await? {
         let id = JobId::Explanation(trial);
-        let is_open = matches!(runners.scheduler.explaining(trial), Effort::Ready | Effort::None | Effort::Running(_));
+        let is_open = matches!(
+            runners.scheduler.explaining(trial),
+            ExplanationEffort::Ready | ExplanationEffort::None | ExplanationEffort::Running(_)
+        );
         if is_open && all.iter().all(|job| job.id != id) {
             // Requests since the running explanation began.
             all.push(status(id, Some(study), JobState::Queued, None));

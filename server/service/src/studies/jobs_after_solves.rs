@@ -4,7 +4,7 @@ use super::belief::Beliefs;
 use super::certifier::Certifier;
 use super::execution::{Simulation, WalksAsked};
 use super::explainer::Explainer;
-use super::explanation::Effort;
+use super::explanation::ExplanationEffort;
 use super::job::{JobId, JobState};
 use super::trial_jobs::TrialJobs;
 use super::trial_queue::TrialJobState;
@@ -65,7 +65,7 @@ impl JobsAfterSolves {
     }
 
     /// The state of the explanation of a trial.
-    pub(super) fn explaining(&self, trial: TrialId) -> Effort {
+    pub(super) fn explaining(&self, trial: TrialId) -> ExplanationEffort {
         self.explanations.job().effort(self.explanations.state(trial))
     }
 

@@ -12,7 +12,7 @@ use gaitwright_store::studies::StudyState;
 
 /// A transition of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Act {
+pub enum StudyTransition {
     /// A person starts the study.
     Start,
     /// The study needs a preference from a person before it can continue.
@@ -31,7 +31,7 @@ pub enum Act {
     Extend,
 }
 
-impl Act {
+impl StudyTransition {
     /// Every transition.
     pub const ALL: [Self; 8] =
         [Self::Start, Self::Ask, Self::Answered, Self::Pause, Self::Resume, Self::Finish, Self::Stop, Self::Extend];
@@ -58,7 +58,7 @@ pub struct NotPossible {
     /// The state of the study.
     pub state: StudyState,
     /// The requested transition.
-    pub act: Act,
+    pub act: StudyTransition,
 }
 
 impl From<NotPossible> for Error {
@@ -76,30 +76,37 @@ pub fn in_words(state: StudyState) -> &'static str {
 ///
 /// # Errors
 /// [`NotPossible`] if the state does not allow the transition.
-pub fn after(state: StudyState, act: Act) -> Result<StudyState, NotPossible> {
+pub fn after(state: StudyState, act: StudyTransition) -> Result<StudyState, NotPossible> {
     use StudyState::{Draft, Finished, Paused, Running, Stopped, Waiting};
     match (state, act) {
-        (Draft, Act::Start) | (Waiting, Act::Answered) | (Paused, Act::Resume) | (Finished | Stopped, Act::Extend) => {
-            Ok(Running)
-        }
-        (Running, Act::Ask) => Ok(Waiting),
-        (Running | Waiting, Act::Pause) => Ok(Paused),
-        (Running | Waiting, Act::Finish) => Ok(Finished),
-        (Draft | Running | Waiting | Paused, Act::Stop) => Ok(Stopped),
+        (Draft, StudyTransition::Start)
+        | (Waiting, StudyTransition::Answered)
+        | (Paused, StudyTransition::Resume)
+        | (Finished | Stopped, StudyTransition::Extend) => Ok(Running),
+        (Running, StudyTransition::Ask) => Ok(Waiting),
+        (Running | Waiting, StudyTransition::Pause) => Ok(Paused),
+        (Running | Waiting, StudyTransition::Finish) => Ok(Finished),
+        (Draft | Running | Waiting | Paused, StudyTransition::Stop) => Ok(Stopped),
         _ => Err(NotPossible { state, act }),
     }
 }
 
 /// The transitions that people can request in this state.
-pub fn acts_of_people(state: StudyState) -> Vec<Act> {
-    [Act::Start, Act::Pause, Act::Resume, Act::Stop, Act::Extend]
-        .into_iter()
-        .filter(|act| after(state, *act).is_ok())
-        .collect()
+pub fn acts_of_people(state: StudyState) -> Vec<StudyTransition> {
+    [
+        StudyTransition::Start,
+        StudyTransition::Pause,
+        StudyTransition::Resume,
+        StudyTransition::Stop,
+        StudyTransition::Extend,
+    ]
+    .into_iter()
+    .filter(|act| after(state, *act).is_ok())
+    .collect()
 }
 
 fn possible(state: StudyState) -> String {
-    acts_of_people(state).into_iter().map(Act::as_str).collect::<Vec<_>>().join(", ")
+    acts_of_people(state).into_iter().map(StudyTransition::as_str).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -107,8 +114,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn any_act() -> impl Strategy<Value = Act> {
-        (0..Act::ALL.len()).prop_map(|i| Act::ALL[i])
+    fn any_act() -> impl Strategy<Value = StudyTransition> {
+        (0..StudyTransition::ALL.len()).prop_map(|i| StudyTransition::ALL[i])
     }
 
     proptest! {
@@ -122,7 +129,7 @@ mod tests {
                         prop_assert_ne!(next, before);
                         prop_assert_ne!(next, StudyState::Draft);
                         if matches!(before, StudyState::Finished | StudyState::Stopped) {
-                            prop_assert_eq!(act, Act::Extend);
+                            prop_assert_eq!(act, StudyTransition::Extend);
                         }
                         state = next;
                     }

@@ -2,7 +2,7 @@
 
 use super::belief::Beliefs;
 use super::comparison::{self, Question};
-use super::lifecycle::Act;
+use super::lifecycle::StudyTransition;
 use super::snapshot::StudySnapshot;
 use super::trial_choice;
 use crate::error::Error;
@@ -18,35 +18,37 @@ use std::collections::HashSet;
 const FAILURES_IN_A_ROW: usize = 3;
 
 /// What a study needs next.
-pub(super) enum Step {
+pub(super) enum PlanningStep {
     Nothing,
-    Act(Act, String),
+    StudyTransition(StudyTransition, String),
     Try(NewTrial),
 }
 
 /// Decides the next step from the snapshot alone; `beliefs` is a cache.
-pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<Step, Error> {
+pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<PlanningStep, Error> {
     let study = &snapshot.study;
     if study.plan.feedback_mode == FeedbackMode::Human {
         match (study.state, comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
             (StudyState::Running, Question::Pair(_)) => {
-                return Ok(Step::Act(Act::Ask, "A comparison needs an answer.".into()));
+                return Ok(PlanningStep::Act(StudyTransition::Ask, "A comparison needs an answer.".into()));
             }
-            (StudyState::Waiting, Question::None) => return Ok(Step::Act(Act::Answered, String::new())),
+            (StudyState::Waiting, Question::None) => {
+                return Ok(PlanningStep::Act(StudyTransition::Answered, String::new()));
+            }
             // The comparison follows as soon as the gait is certified. No trial is proposed before.
-            (_, Question::AfterCertificate(_)) => return Ok(Step::Nothing),
+            (_, Question::AfterCertificate(_)) => return Ok(PlanningStep::Nothing),
             _ => {}
         }
     }
     if study.state != StudyState::Running {
-        return Ok(Step::Nothing);
+        return Ok(PlanningStep::Nothing);
     }
     let ended_in_a_row = snapshot.trials.iter().rev().filter(|trial| !trial.state.is_open());
     let failed = ended_in_a_row.take(FAILURES_IN_A_ROW).filter(|trial| trial.state == TrialState::Failed).count();
     if failed == FAILURES_IN_A_ROW {
         let message = snapshot.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
         let reason = format!("{failed} trials in a row failed. The last one: {}", message.unwrap_or_default());
-        return Ok(Step::Act(Act::Pause, reason));
+        return Ok(PlanningStep::Act(StudyTransition::Pause, reason));
     }
     let open = snapshot.open();
     let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
@@ -55,20 +57,20 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
             1 => "The only trial is done.".to_owned(),
             all => format!("All {all} trials are done."),
         };
-        let finished = Step::Act(Act::Finish, reason);
-        return Ok(if open == 0 { finished } else { Step::Nothing });
+        let finished = PlanningStep::Act(StudyTransition::Finish, reason);
+        return Ok(if open == 0 { finished } else { PlanningStep::Nothing });
     }
     if let Some(reason) = snapshot.is_enough() {
-        return Ok(if open == 0 { Step::Act(Act::Finish, reason) } else { Step::Nothing });
+        return Ok(if open == 0 { PlanningStep::Act(StudyTransition::Finish, reason) } else { PlanningStep::Nothing });
     }
     if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
-        return Ok(Step::Nothing);
+        return Ok(PlanningStep::Nothing);
     }
     let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;
     match trial_choice::next_trial(pool, snapshot, &belief) {
-        Ok(new) => Ok(Step::Try(new)),
-        Err(e) if e.is_exhausted() && open == 0 => Ok(Step::Act(Act::Finish, all_known(snapshot))),
-        Err(e) if e.is_exhausted() => Ok(Step::Nothing),
+        Ok(new) => Ok(PlanningStep::Try(new)),
+        Err(e) if e.is_exhausted() && open == 0 => Ok(PlanningStep::Act(StudyTransition::Finish, all_known(snapshot))),
+        Err(e) if e.is_exhausted() => Ok(PlanningStep::Nothing),
         Err(trial_choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
         Err(trial_choice::ChoiceError::Bounds(e)) => Err(e.into()),
     }
@@ -110,7 +112,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             retraction: None,
         });
         // Posteriors of hypothetical answers must not enter the cache.
-        if let Step::Try(new) = next_step(pool, &then, &Beliefs::default())?
+        if let PlanningStep::Try(new) = next_step(pool, &then, &Beliefs::default())?
             && !likely
                 .iter()
                 .any(|other| (other.action_index, other.warm_started_from) == (new.action_index, new.warm_started_from))

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::printable;
 use gait_optimizer::ReferenceGait as Definition;
-use gait_optimizer::reference::{AngleUnit, HeelStrikes, MotionRecording, Walker};
+use gait_optimizer::reference::{AngleUnit, HeelStrikes, MeasuredPerson, MotionRecording};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
 use gaitwright_store::{Store, Writer};
@@ -161,7 +161,7 @@ impl NewReferenceGait {
     /// Cuts a recording at heel strikes and averages the strides.
     pub(super) fn definition_of(&self, recording: &MotionRecording) -> Result<Definition, Error> {
         let name = printable::name("name", &self.name, LONGEST_NAME)?;
-        let walker = Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
+        let walker = MeasuredPerson { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
         let definition = recording.reference(name, &self.heel_strikes(), walker)?;
         if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
             let allowed = format!("a file with at most {LONGEST_PROVENANCE_BYTES} bytes of comments above its columns");

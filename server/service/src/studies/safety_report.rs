@@ -16,7 +16,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(as = NewSafetyReport)]
-pub struct Report {
+pub struct NewSafetyReport {
     /// Who reports: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     #[serde(default)]
     pub source: Option<Source>,
@@ -35,7 +35,12 @@ pub struct Report {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial has no converged gait or
 /// the subject withdrew consent.
-pub async fn give(writer: &mut Writer, caller: &Caller, id: TrialId, report: &Report) -> Result<SafetyReportId, Error> {
+pub async fn give(
+    writer: &mut Writer,
+    caller: &Caller,
+    id: TrialId,
+    report: &NewSafetyReport,
+) -> Result<SafetyReportId, Error> {
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     if trial.state != TrialState::Converged {

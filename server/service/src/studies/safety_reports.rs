@@ -190,7 +190,7 @@ impl SafetyReports {
             });
         }
         for session in lab_sessions::of_study(db, study).await? {
-            if session.done(lab_sessions::Act::Unblinded).is_some() {
+            if session.done(lab_sessions::SessionStep::Unblinded).is_some() {
                 // After unblinding its answers are assessments or preferences.
                 continue;
             }

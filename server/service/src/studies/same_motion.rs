@@ -21,7 +21,7 @@ pub struct GaitMotion {
 #[derive(Debug, Clone, PartialEq)]
 enum KnownBy {
     /// The optimiser computed the gait, and these figures of its report identify it.
-    Figures(Figures),
+    MotionFigures(MotionFigures),
     /// A lab script evaluated the bounds with a tool of its own, so nothing but the bounds identifies the gait.
     Bounds,
 }
@@ -29,7 +29,8 @@ enum KnownBy {
 impl GaitMotion {
     /// The motion of a trial; `None` if the trial has no gait.
     pub fn of(trial: &Trial) -> Option<Self> {
-        let known_by = trial.report.as_ref().map_or(KnownBy::Bounds, |report| KnownBy::Figures(Figures::of(report)));
+        let known_by =
+            trial.report.as_ref().map_or(KnownBy::Bounds, |report| KnownBy::Figures(MotionFigures::of(report)));
         (trial.state == TrialState::Converged).then_some(Self { known_by, bounds: trial.action })
     }
 
@@ -59,14 +60,14 @@ impl GaitMotion {
 
 /// Figures of a report that identify a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Figures {
+struct MotionFigures {
     cost_of_transport: f64,
     stride_length_m: f64,
     vhip_m_s: [f64; 4],
     durations_s: [f64; 8],
 }
 
-impl Figures {
+impl MotionFigures {
     fn of(report: &SolveReport) -> Self {
         let SolveReport { cost_of_transport, stride_length_m, vhip_m_s, durations_s, .. } = *report;
         Self { cost_of_transport, stride_length_m, vhip_m_s, durations_s }
@@ -90,8 +91,8 @@ pub fn is_same_gait(one: &Trial, other: &Trial) -> bool {
 mod tests {
     use super::*;
 
-    const FIGURES: Figures =
-        Figures { cost_of_transport: 0.07, stride_length_m: 1.31, vhip_m_s: [1.0; 4], durations_s: [0.1; 8] };
+    const FIGURES: MotionFigures =
+        MotionFigures { cost_of_transport: 0.07, stride_length_m: 1.31, vhip_m_s: [1.0; 4], durations_s: [0.1; 8] };
 
     fn motion(known_by: KnownBy, a1: f64) -> GaitMotion {
         GaitMotion { known_by, bounds: TunedBounds { a1, ..TunedBounds::default() } }
@@ -100,7 +101,7 @@ mod tests {
     #[test]
     fn computed_motions_differ_beyond_the_tolerance_in_any_figure_whatever_their_bounds() {
         let one = motion(KnownBy::Figures(FIGURES), 15.0);
-        let scales: [fn(&mut Figures, f64); 4] = [
+        let scales: [fn(&mut MotionFigures, f64); 4] = [
             |figures, factor| figures.cost_of_transport *= factor,
             |figures, factor| figures.stride_length_m *= factor,
             |figures, factor| figures.vhip_m_s[3] *= factor,

@@ -1,6 +1,6 @@
 //! Changes a study: its name, tags, notes and limits, its trial budget, or a fork of it. For pages and REST.
 
-use super::lifecycle::{self, Act};
+use super::lifecycle::{self, StudyTransition};
 use super::study_plan;
 use crate::error::{Error, FieldError};
 use crate::printable;
@@ -148,7 +148,7 @@ pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Exte
     let least = i64::from(study.plan.trial_budget) + 1;
     study_plan::check_range("trial_budget", i64::from(more.trial_budget), least, 10_000)?;
     let state = match study.state {
-        ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, Act::Extend)?,
+        ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, StudyTransition::Extend)?,
         other => other,
     };
     raise_budget(writer, &study, more.trial_budget, state).await?;

@@ -4,7 +4,7 @@
 //! continue after a crash.
 
 use super::job::JobState;
-use super::trial_queue::{Order, Running, TrialJobState, TrialQueue};
+use super::trial_queue::{RequestOrder, RunningJob, TrialJobState, TrialQueue};
 use crate::error::Error;
 use gait_optimizer::CancelToken;
 use gaitwright_compute::priority::behind_solves;
@@ -20,7 +20,7 @@ pub(super) trait TrialJob: Send + Sync {
     /// The name in the log.
     const NAME: &'static str;
     /// Which request is next.
-    const ORDER: Order = Order::OldestRequest;
+    const ORDER: RequestOrder = RequestOrder::OldestRequest;
     /// Whether [`Self::requested`] is read with every change of the record. If not, it is read once, and
     /// [`TrialJobs::ask`] announces later requests.
     const READS_REQUESTS: bool = false;
@@ -184,7 +184,7 @@ impl<J: TrialJob> TrialJobs<J> {
 
     /// The next job, which is running from now on. The newest study comes first, because somebody is likely to look at
     /// it soon.
-    async fn next(&self, through: &impl Fn(StudyId)) -> Result<Option<Running<J::Request>>, Error> {
+    async fn next(&self, through: &impl Fn(StudyId)) -> Result<Option<RunningJob<J::Request>>, Error> {
         loop {
             let (study, skipped) = {
                 let mut queue = self.queue();
@@ -212,8 +212,8 @@ impl<J: TrialJob> TrialJobs<J> {
     }
 
     /// Carries out a job until it is done, it is cancelled or the subject withdraws consent.
-    async fn carry_out(&self, running: Running<J::Request>, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
-        let Running { trial, request, cancelled, .. } = running;
+    async fn carry_out(&self, running: RunningJob<J::Request>, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
+        let RunningJob { trial, request, cancelled, .. } = running;
         let study = trials::get(&mut *self.store.read().await?, trial).await?.study_id;
         let mut work = std::pin::pin!(self.job.carry_out(trial, request));
         let result = loop {

@@ -11,7 +11,7 @@ const RETRY: Duration = Duration::from_mins(1);
 
 /// Which request is next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
+pub(super) enum RequestOrder {
     /// The oldest one.
     OldestRequest,
     /// The one for the newest trial.
@@ -26,7 +26,7 @@ pub(super) enum TrialJobState<R> {
     /// Queued.
     Queued(R),
     /// Running.
-    Running {
+    RunningJob {
         /// The request.
         request: R,
         /// Start of the job.
@@ -42,7 +42,7 @@ pub(super) enum TrialJobState<R> {
 pub(super) struct TrialQueue<R> {
     /// Requests in order, without the running one.
     requested: Vec<(TrialId, R)>,
-    running: Option<Running<R>>,
+    running: Option<RunningJob<R>>,
     /// Ended studies that may have trials to work on.
     studies: BTreeSet<StudyId>,
     cancelled: BTreeSet<TrialId>,
@@ -53,7 +53,7 @@ pub(super) struct TrialQueue<R> {
 
 /// A running job.
 #[derive(Clone)]
-pub(super) struct Running<R> {
+pub(super) struct RunningJob<R> {
     pub(super) trial: TrialId,
     pub(super) request: R,
     /// Start of the job.
@@ -128,7 +128,8 @@ impl<R: Clone> TrialQueue<R> {
 
     /// The state of the job of a trial.
     pub(super) fn state(&self, trial: TrialId) -> TrialJobState<R> {
-        if let Some(Running { request, since, .. }) = self.running.as_ref().filter(|running| running.trial == trial) {
+        if let Some(RunningJob { request, since, .. }) = self.running.as_ref().filter(|running| running.trial == trial)
+        {
             return TrialJobState::Running { request: request.clone(), since: *since };
         }
         if let Some((_, request)) = self.requested.iter().find(|(queued, _)| *queued == trial) {
@@ -158,24 +159,24 @@ impl<R: Clone> TrialQueue<R> {
     }
 
     /// Begins the next requested job that is not postponed.
-    pub(super) fn begin_requested(&mut self, order: Order, now: Instant) -> Option<Running<R>> {
+    pub(super) fn begin_requested(&mut self, order: RequestOrder, now: Instant) -> Option<RunningJob<R>> {
         self.postponed.retain(|_, until| *until > now);
         let ready = self.requested.iter().enumerate().filter(|(_, (trial, _))| !self.postponed.contains_key(trial));
         let (place, _) = match order {
-            Order::OldestRequest => ready.min_by_key(|(place, _)| *place),
-            Order::NewestTrial => ready.max_by_key(|(_, (trial, _))| *trial),
+            RequestOrder::OldestRequest => ready.min_by_key(|(place, _)| *place),
+            RequestOrder::NewestTrial => ready.max_by_key(|(_, (trial, _))| *trial),
         }?;
         let (trial, request) = self.requested.remove(place);
         self.begin(trial, request)
     }
 
     /// Begins the job of a trial, unless it is cancelled, failed or postponed.
-    pub(super) fn begin(&mut self, trial: TrialId, request: R) -> Option<Running<R>> {
+    pub(super) fn begin(&mut self, trial: TrialId, request: R) -> Option<RunningJob<R>> {
         if self.skipped().contains(&trial) {
             return None;
         }
         self.requested.retain(|(queued, _)| *queued != trial);
-        let running = Running { trial, request, since: Instant::now(), cancelled: CancellationToken::new() };
+        let running = RunningJob { trial, request, since: Instant::now(), cancelled: CancellationToken::new() };
         Some(self.running.insert(running).clone())
     }
 
@@ -230,7 +231,7 @@ mod tests {
         trials
     }
 
-    fn begun(queue: &mut TrialQueue<u32>, order: Order) -> Option<(TrialId, u32)> {
+    fn begun(queue: &mut TrialQueue<u32>, order: RequestOrder) -> Option<(TrialId, u32)> {
         let running = queue.begin_requested(order, Instant::now());
         queue.end();
         running.map(|running| (running.trial, running.request))
@@ -239,7 +240,8 @@ mod tests {
     #[test]
     fn requests_are_served_in_the_order_of_the_kind_of_job() {
         let [old, middle, new] = trials();
-        for (order, expected) in [(Order::OldestRequest, [middle, new, old]), (Order::NewestTrial, [new, middle, old])]
+        for (order, expected) in
+            [(RequestOrder::OldestRequest, [middle, new, old]), (RequestOrder::NewestTrial, [new, middle, old])]
         {
             let mut queue = TrialQueue::default();
             for (trial, request) in [(middle, 1), (new, 2), (old, 3), (new, 4)] {
@@ -256,7 +258,7 @@ mod tests {
         let [trial, other, _] = trials();
         let mut queue = TrialQueue::default();
         queue.ask(trial, 1);
-        let running = queue.begin_requested(Order::OldestRequest, Instant::now()).unwrap();
+        let running = queue.begin_requested(RequestOrder::OldestRequest, Instant::now()).unwrap();
         assert_eq!(queue.open(), [(trial, JobState::Running)]);
         queue.cancel(trial);
         assert!(running.cancelled.is_cancelled());
@@ -273,14 +275,14 @@ mod tests {
         let [trial, ..] = trials();
         let mut queue = TrialQueue::default();
         queue.ask(trial, 1);
-        queue.begin_requested(Order::OldestRequest, Instant::now()).unwrap();
+        queue.begin_requested(RequestOrder::OldestRequest, Instant::now()).unwrap();
         queue.fail(trial, "no gait".to_owned());
         queue.ask(trial, 2);
         assert_eq!(queue.state(trial), TrialJobState::Failed("no gait".to_owned()));
-        assert!(queue.skipped().contains(&trial) && begun(&mut queue, Order::OldestRequest).is_none());
+        assert!(queue.skipped().contains(&trial) && begun(&mut queue, RequestOrder::OldestRequest).is_none());
         queue.forget(trial);
         queue.ask(trial, 3);
-        assert_eq!(begun(&mut queue, Order::OldestRequest), Some((trial, 3)));
+        assert_eq!(begun(&mut queue, RequestOrder::OldestRequest), Some((trial, 3)));
     }
 
     #[test]
@@ -289,11 +291,14 @@ mod tests {
         let mut queue = TrialQueue::default();
         queue.ask(trial, 1);
         queue.ask(other, 2);
-        queue.begin_requested(Order::OldestRequest, Instant::now()).unwrap();
+        queue.begin_requested(RequestOrder::OldestRequest, Instant::now()).unwrap();
         queue.postpone(trial, 1);
-        assert_eq!(begun(&mut queue, Order::OldestRequest), Some((other, 2)));
-        assert_eq!((begun(&mut queue, Order::OldestRequest), queue.state(trial)), (None, TrialJobState::Queued(1)));
+        assert_eq!(begun(&mut queue, RequestOrder::OldestRequest), Some((other, 2)));
+        assert_eq!(
+            (begun(&mut queue, RequestOrder::OldestRequest), queue.state(trial)),
+            (None, TrialJobState::Queued(1))
+        );
         let due = queue.next_retry().unwrap();
-        assert_eq!(queue.begin_requested(Order::OldestRequest, due).map(|running| running.trial), Some(trial));
+        assert_eq!(queue.begin_requested(RequestOrder::OldestRequest, due).map(|running| running.trial), Some(trial));
     }
 }

@@ -20,4 +20,4 @@ pub use dispatch::{Assignment, Attempt, Dispatch, Finding, News, Receipt};
 pub use evaluate::{Evaluate, GaitSolver};
 pub use explain::{Explain, GaitExplainer, Unexplained};
 pub use in_process::{IN_PROCESS, InProcess, LEASE};
-pub use solve_progress::{Board, Progress, Track};
+pub use solve_progress::{Board, SolveProgress, Track};

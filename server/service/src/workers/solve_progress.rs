@@ -9,7 +9,7 @@ use tokio::sync::broadcast;
 
 /// One iteration of a running solve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Progress {
+pub struct SolveProgress {
     /// Identifier of the study.
     pub study_id: StudyId,
     /// Identifier of the trial.
@@ -36,7 +36,7 @@ pub struct Track {
 #[derive(Debug)]
 pub struct Board {
     tracks: Mutex<HashMap<TrialId, Track>>,
-    changes: broadcast::Sender<Progress>,
+    changes: broadcast::Sender<SolveProgress>,
 }
 
 impl Default for Board {
@@ -48,7 +48,7 @@ impl Default for Board {
 
 impl Board {
     /// Subscribes to all further iterations.
-    pub fn listen(&self) -> broadcast::Receiver<Progress> {
+    pub fn listen(&self) -> broadcast::Receiver<SolveProgress> {
         self.changes.subscribe()
     }
 
@@ -69,7 +69,7 @@ impl Board {
     pub(crate) fn add(&self, trial: TrialId, record: IterationRecord) {
         let progress = self.tracks().get_mut(&trial).map(|track| {
             track.records.push(record);
-            Progress { study_id: track.study, trial_id: trial, number: track.number, record }
+            SolveProgress { study_id: track.study, trial_id: trial, number: track.number, record }
         });
         if let Some(progress) = progress {
             // Fails only without listeners.

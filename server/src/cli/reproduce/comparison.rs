@@ -1,7 +1,7 @@
 //! Compares studies with and without muscles for each subject and seed, as tables and as text.
 
 use gait_optimizer::{Gait, ReferenceGait};
-use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
+use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_service::studies::certified_best::CertificateState;
 use gaitwright_service::studies::history::Milestone;
 
@@ -27,7 +27,7 @@ impl Curve {
 
 /// The results of a study.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Outcome {
+pub(super) struct ReproducedStudy {
     pub(super) subject: u32,
     pub(super) muscles: bool,
     pub(super) seed: u64,
@@ -55,7 +55,7 @@ pub(super) struct Outcome {
     pub(super) reference: ReferenceGait,
 }
 
-impl Outcome {
+impl ReproducedStudy {
     /// Joint angles of the best gait.
     pub(super) fn curve(&self) -> Option<Curve> {
         self.gait.as_ref().map(Curve::of)
@@ -129,9 +129,10 @@ impl PairComparison {
 }
 
 /// One comparison for each pair of studies.
-pub(super) fn pair_comparisons(outcomes: &[Outcome]) -> Vec<PairComparison> {
-    let partner =
-        |plain: &Outcome| outcomes.iter().find(|o| o.muscles && (o.subject, o.seed) == (plain.subject, plain.seed));
+pub(super) fn pair_comparisons(outcomes: &[ReproducedStudy]) -> Vec<PairComparison> {
+    let partner = |plain: &ReproducedStudy| {
+        outcomes.iter().find(|o| o.muscles && (o.subject, o.seed) == (plain.subject, plain.seed))
+    };
     outcomes
         .iter()
         .filter(|outcome| !outcome.muscles)
@@ -198,12 +199,12 @@ fn spread(pair_comparisons: &[PairComparison]) -> String {
     }
 }
 
-fn variant(outcome: &Outcome) -> Vec<Cell> {
+fn variant(outcome: &ReproducedStudy) -> Vec<CsvCell> {
     cells![outcome.subject, outcome.seed, if outcome.muscles { "on" } else { "off" }]
 }
 
 /// Gait RMSE of the best action by iteration.
-pub(super) fn iterations_csv(outcomes: &[Outcome]) -> String {
+pub(super) fn iterations_csv(outcomes: &[ReproducedStudy]) -> String {
     let mut table = CsvTable::new(["subject", "seed", "muscles", "iteration", "best_gait_rmse_rad"]);
     for outcome in outcomes {
         for (index, rmse) in outcome.by_iteration.iter().enumerate() {
@@ -214,7 +215,7 @@ pub(super) fn iterations_csv(outcomes: &[Outcome]) -> String {
 }
 
 /// One row for each study.
-pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
+pub(super) fn studies_csv(outcomes: &[ReproducedStudy]) -> String {
     let mut table = CsvTable::new([
         "subject",
         "seed",
@@ -250,13 +251,13 @@ pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
 }
 
 /// Final joint angles, and the reference gait with its standard deviation, if it has one.
-pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
+pub(super) fn angles_csv(outcomes: &[ReproducedStudy]) -> String {
     let columns = COORDINATES.map(|name| format!("{name}_rad"));
     let first = ["subject", "seed", "muscles", "percent"].map(str::to_owned);
     let mut table = CsvTable::new(first.into_iter().chain(columns));
-    let mut rows = |who: &[Cell], curve: &[[f64; 5]]| {
+    let mut rows = |who: &[CsvCell], curve: &[[f64; 5]]| {
         for (percent, angles) in curve.iter().enumerate() {
-            let values = cells![percent].into_iter().chain(angles.iter().map(Cell::from));
+            let values = cells![percent].into_iter().chain(angles.iter().map(CsvCell::from));
             table.row(who.iter().cloned().chain(values));
         }
     };
@@ -279,8 +280,8 @@ pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
 mod tests {
     use super::*;
 
-    fn outcome(muscles: bool, seed: u64, by_iteration: Vec<Option<f64>>) -> Outcome {
-        Outcome {
+    fn outcome(muscles: bool, seed: u64, by_iteration: Vec<Option<f64>>) -> ReproducedStudy {
+        ReproducedStudy {
             subject: 1,
             muscles,
             seed,

@@ -11,7 +11,7 @@ use super::output::{data, tell};
 use super::problem_flags::reference_of;
 use super::unattended::{self, Lines};
 use clap::{Args, ValueEnum};
-use comparison::Outcome;
+use comparison::ReproducedStudy;
 use gait_optimizer::{ReferenceGait, Subject};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Reach;
@@ -119,7 +119,7 @@ impl Reproduce {
         &self,
         store: &mut Store,
         reference: &ReferenceGait,
-    ) -> Result<Option<(Vec<Outcome>, Vec<String>)>, Error> {
+    ) -> Result<Option<(Vec<ReproducedStudy>, Vec<String>)>, Error> {
         let (mut outcomes, mut failures) = (Vec::new(), Vec::new());
         for seed in self.seed..self.seed + self.seeds {
             for &subject in self.subject.numbers() {
@@ -198,7 +198,7 @@ async fn outcome(
     beliefs: &Arc<Beliefs>,
     judged: Judged,
     reference: &ReferenceGait,
-) -> Result<Outcome, Error> {
+) -> Result<ReproducedStudy, Error> {
     let (there, beliefs) = (snapshot.clone(), Arc::clone(beliefs));
     let choose = move |pool: &OnPool| best_trial(&there, &*beliefs.posterior(pool, &there)?);
     let best = store.compute(choose).await?.map_err(Error::Learner)?;
@@ -211,7 +211,7 @@ async fn outcome(
         }
         None => None,
     };
-    Ok(Outcome {
+    Ok(ReproducedStudy {
         subject,
         muscles,
         seed,

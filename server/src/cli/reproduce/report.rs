@@ -1,6 +1,6 @@
 //! The report of `gaitwright reproduce`: one self-contained HTML file.
 
-use super::comparison::{Outcome, PairComparison, conclusion, pair_comparisons};
+use super::comparison::{PairComparison, ReproducedStudy, conclusion, pair_comparisons};
 use super::statements::{Statement, statements};
 use askama::Template;
 use gait_optimizer::Gait;
@@ -11,7 +11,7 @@ use gaitwright_service::error::Error;
 
 #[derive(Template)]
 #[template(path = "reproduce.html")]
-struct Report<'a> {
+struct ReproduceReport<'a> {
     style: &'static str,
     version: &'static str,
     trials: u32,
@@ -26,22 +26,22 @@ struct Report<'a> {
     /// Name of the reference gait, and the meaning of its band.
     reference: Option<(&'a str, &'static str)>,
     pair_comparisons: Vec<PairComparison>,
-    outcomes: &'a [Outcome],
-    pairs: Vec<Pair>,
+    outcomes: &'a [ReproducedStudy],
+    pairs: Vec<SubjectFigures>,
 }
 
 /// The figures of a subject and seed.
-struct Pair {
+struct SubjectFigures {
     title: String,
     /// Figures 3b and 3c of the paper.
-    course_and_angles: Vec<Drawn>,
+    course_and_angles: Vec<ReportChart>,
     /// Figure 4: variant and tiles.
     tiles: Vec<(&'static str, String)>,
     /// Figure 5.
-    orbits: Vec<Drawn>,
+    orbits: Vec<ReportChart>,
 }
 
-struct Drawn {
+struct ReportChart {
     title: String,
     svg: String,
     legend: Vec<(String, String)>,
@@ -51,10 +51,10 @@ struct Drawn {
 ///
 /// # Errors
 /// When the template cannot be rendered.
-pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
+pub(super) fn html(outcomes: &[ReproducedStudy], trials: u32) -> Result<String, Error> {
     let pair_comparisons = pair_comparisons(outcomes);
     let pairs = pair_comparisons.iter().map(|comparison| pair(comparison, outcomes)).collect::<Result<_, Error>>()?;
-    let report = Report {
+    let report = ReproduceReport {
         style: STYLE_SHEET,
         version: env!("CARGO_PKG_VERSION"),
         trials,
@@ -62,7 +62,7 @@ pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
         statements: statements(outcomes, &pair_comparisons),
         solve_seconds: outcomes.iter().map(|outcome| outcome.solve_seconds).sum(),
         wall_seconds: outcomes.iter().map(|outcome| outcome.wall_seconds).sum(),
-        failures: outcomes.iter().filter_map(Outcome::failure_in_words).collect(),
+        failures: outcomes.iter().filter_map(ReproducedStudy::failure_in_words).collect(),
         reference: outcomes.first().map(|o| (o.reference.name.as_str(), band_in_words(&o.reference))),
         pair_comparisons,
         outcomes,
@@ -71,8 +71,8 @@ pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
     report.render().map_err(|e| Error::Internal(e.to_string()))
 }
 
-fn pair(comparison: &PairComparison, outcomes: &[Outcome]) -> Result<Pair, Error> {
-    let pair: Vec<&Outcome> =
+fn pair(comparison: &PairComparison, outcomes: &[ReproducedStudy]) -> Result<SubjectFigures, Error> {
+    let pair: Vec<&ReproducedStudy> =
         outcomes.iter().filter(|o| (o.subject, o.seed) == (comparison.subject, comparison.seed)).collect();
     let gaits: Vec<(&'static str, &Gait)> =
         pair.iter().filter_map(|outcome| Some((label(outcome), outcome.gait.as_ref()?))).collect();
@@ -84,7 +84,7 @@ fn pair(comparison: &PairComparison, outcomes: &[Outcome]) -> Result<Pair, Error
     for (name, gait) in &gaits {
         tiles.push((*name, gait_tiles(&stick_figures(gait)?)));
     }
-    Ok(Pair {
+    Ok(SubjectFigures {
         title: format!("Subject {}, seed {}", comparison.subject, comparison.seed),
         course_and_angles,
         tiles,
@@ -92,21 +92,21 @@ fn pair(comparison: &PairComparison, outcomes: &[Outcome]) -> Result<Pair, Error
     })
 }
 
-fn drawn(chart: &Chart) -> Drawn {
-    Drawn { title: chart.title.clone(), svg: chart.svg(), legend: chart.legend() }
+fn drawn(chart: &Chart) -> ReportChart {
+    ReportChart { title: chart.title.clone(), svg: chart.svg(), legend: chart.legend() }
 }
 
-fn label(outcome: &Outcome) -> &'static str {
+fn label(outcome: &ReproducedStudy) -> &'static str {
     if outcome.muscles { "with muscles" } else { "without muscles" }
 }
 
 /// Colour and stroke of the variant; without muscles comes first.
-fn look(outcome: &Outcome) -> (usize, Stroke) {
+fn look(outcome: &ReproducedStudy) -> (usize, Stroke) {
     if outcome.muscles { (1, Stroke::DashedSteps) } else { (0, Stroke::Steps) }
 }
 
 /// Figure 3b of the paper.
-fn rmse_chart(pair: &[&Outcome]) -> Chart {
+fn rmse_chart(pair: &[&ReproducedStudy]) -> Chart {
     let mut chart = Chart::new("Gait RMSE of the best action", "iteration", "Gait RMSE, rad");
     chart.whole_x = true;
     for outcome in pair {

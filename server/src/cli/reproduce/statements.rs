@@ -1,6 +1,6 @@
 //! The statements of the paper about its experiment, each with the result of this comparison.
 
-use super::comparison::{Outcome, PairComparison};
+use super::comparison::{PairComparison, ReproducedStudy};
 use gaitwright_service::studies::certified_best::CertificateState;
 
 /// A statement of the paper.
@@ -15,7 +15,7 @@ pub(super) struct Statement {
 }
 
 /// Every statement of the paper, in its order.
-pub(super) fn statements(outcomes: &[Outcome], pair_comparisons: &[PairComparison]) -> Vec<Statement> {
+pub(super) fn statements(outcomes: &[ReproducedStudy], pair_comparisons: &[PairComparison]) -> Vec<Statement> {
     let mut subjects: Vec<u32> = pair_comparisons.iter().map(|comparison| comparison.subject).collect();
     subjects.sort_unstable();
     subjects.dedup();
@@ -51,7 +51,7 @@ fn lower_rmse(subject: u32, pair_comparisons: &[PairComparison]) -> Statement {
     }
 }
 
-fn stable(outcomes: &[Outcome]) -> Statement {
+fn stable(outcomes: &[ReproducedStudy]) -> Statement {
     let with_gait = outcomes.iter().filter(|outcome| outcome.best_trial.is_some()).count();
     let passed = outcomes.iter().filter(|outcome| outcome.certificate == CertificateState::Passed).count();
     let fallback = outcomes.iter().filter(|outcome| outcome.passing.is_some()).count();

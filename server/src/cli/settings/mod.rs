@@ -24,14 +24,14 @@ const FILE_VARIABLE: &str = "GAITWRIGHT_CONFIG";
 
 /// The origin of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Origin {
+enum ValueOrigin {
     Flag,
     Environment(String),
     File(PathBuf),
     Default,
 }
 
-impl std::fmt::Display for Origin {
+impl std::fmt::Display for ValueOrigin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Flag => write!(f, "flag"),
@@ -44,7 +44,7 @@ impl std::fmt::Display for Origin {
 
 /// Every setting, as text, with its origin.
 #[derive(Debug)]
-pub(super) struct Settings(BTreeMap<&'static str, (String, Origin)>);
+pub(super) struct Settings(BTreeMap<&'static str, (String, ValueOrigin)>);
 
 impl Settings {
     /// Reads flags, environment and file.
@@ -66,13 +66,13 @@ impl Settings {
         for &(name, default, _) in KNOWN {
             let variable = format!("GAITWRIGHT_{}", name.to_uppercase());
             let value = if let Some(value) = flags.get(name) {
-                (value, Origin::Flag)
+                (value, ValueOrigin::Flag)
             } else if let Some(value) = environment(&variable) {
-                (value, Origin::Environment(variable))
+                (value, ValueOrigin::Environment(variable))
             } else if let Some(value) = file.get(name) {
-                (value.clone(), Origin::File(path.clone()))
+                (value.clone(), ValueOrigin::File(path.clone()))
             } else {
-                (default.to_owned(), Origin::Default)
+                (default.to_owned(), ValueOrigin::Default)
             };
             found.insert(name, value);
         }
@@ -89,7 +89,7 @@ impl Settings {
 
     /// The error for a setting, with its origin.
     pub(super) fn refused(&self, name: &str, allowed: &str) -> Error {
-        let origin = self.0.get(name).map_or(&Origin::Default, |(_, origin)| origin);
+        let origin = self.0.get(name).map_or(&ValueOrigin::Default, |(_, origin)| origin);
         Error::invalid(&format!("{name} ({origin})"), self.text(name), allowed)
     }
 
@@ -143,10 +143,13 @@ mod tests {
         let flags = Flags { record: record.into(), workers: Some(5), ..Flags::default() };
         let found = settings(&flags, &[("GAITWRIGHT_WORKERS", "4"), ("GAITWRIGHT_DATABASE", "env.db")]).unwrap();
         assert_eq!(found.workers().unwrap(), Some(5));
-        assert_eq!(found.0["workers"].1, Origin::Flag);
-        assert_eq!(found.0["database"], ("env.db".to_owned(), Origin::Environment("GAITWRIGHT_DATABASE".to_owned())));
-        assert_eq!(found.0["idle_minutes"], ("15".to_owned(), Origin::File(file)));
-        assert_eq!(found.0["listen"].1, Origin::Default);
+        assert_eq!(found.0["workers"].1, ValueOrigin::Flag);
+        assert_eq!(
+            found.0["database"],
+            ("env.db".to_owned(), ValueOrigin::Environment("GAITWRIGHT_DATABASE".to_owned()))
+        );
+        assert_eq!(found.0["idle_minutes"], ("15".to_owned(), ValueOrigin::File(file)));
+        assert_eq!(found.0["listen"].1, ValueOrigin::Default);
         assert_eq!(
             found.session_limits().unwrap(),
             SessionLimits { idle_seconds: 900.0, lifetime_seconds: 12.0 * 3600.0 }

@@ -3,7 +3,7 @@
 mod progress;
 mod state;
 
-pub use progress::{Measured, TrialCounts, counts, improvements, measured};
+pub use progress::{SolveTimes, TrialCounts, counts, improvements, measured};
 pub use state::TrialState;
 
 use super::many_rows::read_many;

@@ -69,7 +69,7 @@ pub async fn improvements(db: &mut Connection, study: StudyId) -> StoreResult<Ve
 
 /// Solve times.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measured {
+pub struct SolveTimes {
     /// Number of solves.
     pub solves: usize,
     /// Median of their wall times, s.
@@ -80,7 +80,7 @@ pub struct Measured {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<Measured>> {
+pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<SolveTimes>> {
     let rows = sqlx::query(
         "select seconds_total from (select t.seconds_total from trials t join studies s on s.id = t.study_id \
          where s.muscles = ? and t.seconds_total is not null and t.state in ('converged', 'not_converged') \
@@ -90,5 +90,5 @@ pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<
     .fetch_all(db)
     .await?;
     let Some(middle) = rows.get(rows.len() / 2) else { return Ok(None) };
-    Ok(Some(Measured { solves: rows.len(), median_seconds: middle.try_get(0)? }))
+    Ok(Some(SolveTimes { solves: rows.len(), median_seconds: middle.try_get(0)? }))
 }

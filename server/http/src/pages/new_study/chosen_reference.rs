@@ -1,6 +1,6 @@
 //! The chosen reference gait in the form for a new study: its chart, and whether another one is nearer to the subject.
 
-use super::super::page_chart::Drawn;
+use super::super::page_chart::PageChart;
 use askama::Template;
 use gaitwright_charts::{Chart, Stroke};
 use gaitwright_service::error::Error;
@@ -18,16 +18,16 @@ struct ChosenReference {
     nearest: String,
     /// Whether the distance of at least one reference gait is known.
     measured: bool,
-    chart: Drawn,
+    chart: PageChart,
 }
 
 /// Every reference gait with its distance from the subject of a study, and the chosen one.
-pub(super) struct Choice {
+pub(super) struct ReferenceChoice {
     matches: Vec<ReferenceGaitMatch>,
     chosen: ReferenceGaitId,
 }
 
-impl Choice {
+impl ReferenceChoice {
     pub(super) async fn read(db: &mut Connection, plan: &StudyPlan) -> Result<Self, Error> {
         let matches = match &plan.body {
             Some(body) => nearest_reference::matches(db, body).await?,
@@ -40,7 +40,7 @@ impl Choice {
     pub(super) fn shown(&self) -> Result<String, Error> {
         let chosen = self.matches.iter().find(|found| found.reference_gait.id == self.chosen);
         let Some(chosen) = chosen else { return Ok(String::new()) };
-        let chart = Drawn::new(&chart(&chosen.reference_gait));
+        let chart = PageChart::new(&chart(&chosen.reference_gait));
         let measured = self.matches.iter().any(|found| found.distance.is_some());
         let part = ChosenReference { nearest: nearest(&self.matches, chosen), measured, chart };
         part.render().map_err(|e| Error::Internal(e.to_string()))

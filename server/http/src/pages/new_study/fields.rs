@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Deserialize)]
-pub(crate) struct Fields {
+pub(crate) struct NewStudyFields {
     /// The study whose set-up applies to everything that the form does not show.
     #[serde(default)]
     pub(super) like: String,
@@ -57,7 +57,7 @@ fn linecospar() -> String {
     LEARNERS[0].0.to_owned()
 }
 
-impl Default for Fields {
+impl Default for NewStudyFields {
     fn default() -> Self {
         let text = str::to_owned;
         Self {
@@ -88,7 +88,7 @@ impl Default for Fields {
 /// The option of the learner that keeps the settings of the cloned study, which the form cannot show.
 pub(super) const KEPT: &str = "kept";
 
-impl Fields {
+impl NewStudyFields {
     /// The set-up of a study, for a clone that can be changed. A restricted study has restricted clones by default.
     pub(super) fn of_clone(study: &Study, restricted: bool) -> Self {
         let plan = &study.plan;
@@ -278,7 +278,7 @@ fn label(field: &str) -> String {
 }
 
 /// Converts an error about a field into a refusal; other errors pass.
-pub(super) fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
+pub(super) fn as_refusal(error: Error, fields: &NewStudyFields) -> Result<FieldError, Error> {
     match error {
         Error::Invalid(refused) => {
             // A bound has one row in the table, whatever part of the study refuses it.
@@ -310,7 +310,7 @@ mod tests {
             ("fixed_a6", "0.1"),
         ];
         let space = entries.iter().map(|(name, value)| (text(name), text(value))).collect();
-        let mut fields = Fields { space, ..Fields::default() };
+        let mut fields = NewStudyFields { space, ..NewStudyFields::default() };
         fields.relax("a5=0.03,a7=30,a6=0.2").unwrap();
         assert_eq!(fields.space["values_a5"], "0, 0.02, 0.03", "a lower bound is looser where it is smaller");
         assert!(!fields.space.contains_key("tuned_a7"), "one value is not tuned");
@@ -320,7 +320,7 @@ mod tests {
 
     #[test]
     fn every_field_of_the_form_can_be_repaired() {
-        let mut fields = Fields { subject: NEW_SUBJECT.to_owned(), ..Fields::default() };
+        let mut fields = NewStudyFields { subject: NEW_SUBJECT.to_owned(), ..NewStudyFields::default() };
         for field in ["name", "pseudonym", "height_m", "seed", "values_a5", "tuned_a1", "a3"] {
             assert!(fields.repair(field), "{field}");
         }

@@ -5,8 +5,8 @@ mod fields;
 mod planning;
 mod space_editor;
 
-use self::chosen_reference::Choice;
-use self::fields::{DESCRIPTION, Fields, KEPT, LEARNERS, NEW_SUBJECT, as_refusal};
+use self::chosen_reference::ReferenceChoice;
+use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal};
 use self::planning::{cloned, faults, make};
 use self::space_editor::SpaceEditor;
 use crate::AppState;
@@ -14,7 +14,7 @@ use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::format;
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::units::Units;
 use askama::Template;
 use axum::Json;
@@ -33,14 +33,14 @@ use gaitwright_store::{Connection, StudyId, SubjectId, commit, consents, devices
 use serde::{Deserialize, Serialize};
 
 /// The choices of the form, and measured solve times.
-struct Offered {
+struct FormChoices {
     subjects: Vec<Subject>,
     devices: Vec<Device>,
     references: Vec<ReferenceGait>,
-    measured: [Option<trials::Measured>; 2],
+    measured: [Option<trials::SolveTimes>; 2],
 }
 
-impl Offered {
+impl FormChoices {
     async fn read(db: &mut Connection) -> Result<Self, Error> {
         // The first device is the default: the built-in one.
         let built_in = gait_optimizer::Device::ampro3()?;
@@ -59,9 +59,9 @@ impl Offered {
 #[template(path = "study_new.html")]
 struct NewStudyPage {
     units: Units,
-    offered: Offered,
+    offered: FormChoices,
     learners: &'static [(&'static str, &'static str, &'static str)],
-    fields: Fields,
+    fields: NewStudyFields,
     editor: SpaceEditor,
     /// Every refused field.
     refused: Vec<FieldError>,
@@ -114,9 +114,10 @@ impl NewStudyPage {
 
     /// Whether an expert setting was changed or refused, so that they have to be shown.
     fn expert(&self) -> bool {
-        let (typed, default) = (&self.fields, Fields::default());
-        let fields = |fields: &Fields| {
-            let Fields { learner, unchanged_limit, parallel_trials, seed, basin_within_percent, .. } = fields.clone();
+        let (typed, default) = (&self.fields, NewStudyFields::default());
+        let fields = |fields: &NewStudyFields| {
+            let NewStudyFields { learner, unchanged_limit, parallel_trials, seed, basin_within_percent, .. } =
+                fields.clone();
             [learner, unchanged_limit, parallel_trials, seed, basin_within_percent]
         };
         fields(typed) != fields(&default) || typed.repeat_results.is_some()
@@ -124,7 +125,7 @@ impl NewStudyPage {
 
     /// Measured solve times, with and without muscles.
     fn measured(&self) -> String {
-        let words = |measured: &Option<trials::Measured>, variant: &str| {
+        let words = |measured: &Option<trials::SolveTimes>, variant: &str| {
             measured.as_ref().map(|m| format!("{:.1} s {variant} muscles (median of {})", m.median_seconds, m.solves))
         };
         let [with, without] = &self.offered.measured;
@@ -157,15 +158,15 @@ pub(super) async fn get(
     State(app): State<AppState>,
     units: Units,
     Params(preset): Params<Preset>,
-) -> Page {
+) -> PageResult {
     let mut reader = app.read().await?;
     let mut fields = match accessible(&mut reader, authorized.caller.reach(), preset.like).await? {
         Some(id) => {
             consents::may_be_shown(&mut reader, id).await?;
             let study = studies::get(&mut reader, id).await?;
-            Fields::of_clone(&study, members::is_restricted(&mut reader, id).await?)
+            NewStudyFields::of_clone(&study, members::is_restricted(&mut reader, id).await?)
         }
-        None => Fields::default(),
+        None => NewStudyFields::default(),
     };
     if let Some(subject) = preset.subject {
         fields.subject = subject.to_string();
@@ -181,15 +182,15 @@ async fn show(
     app: &AppState,
     units: Units,
     authorized: &Authorized<Run>,
-    fields: Fields,
+    fields: NewStudyFields,
     refused: Vec<FieldError>,
     plan: Option<StudyPlan>,
-) -> Page {
+) -> PageResult {
     let mut reader = app.read().await?;
-    let offered = Offered::read(&mut reader).await?;
+    let offered = FormChoices::read(&mut reader).await?;
     let cloned = cloned(&mut reader, authorized.caller.reach(), &fields).await?;
     let reference = match plan {
-        Some(plan) => Choice::read(&mut reader, &plan).await?.shown()?,
+        Some(plan) => ReferenceChoice::read(&mut reader, &plan).await?.shown()?,
         None => String::new(),
     };
     drop(reader);
@@ -202,7 +203,7 @@ pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     units: Units,
-    Form(fields): Form<Fields>,
+    Form(fields): Form<NewStudyFields>,
 ) -> Result<Response, PageError> {
     let editor = SpaceEditor::typed(&fields.space)?;
     let mut writer = app.write().await?;
@@ -234,7 +235,7 @@ pub(super) async fn sample(authorized: Authorized<Run>, State(app): State<AppSta
 
 /// The check of a form that is still being filled in.
 #[derive(Debug, Serialize)]
-pub(super) struct Checked {
+pub(super) struct CheckedForm {
     /// The fields that would be refused, with the reasons.
     faults: Vec<Fault>,
     /// The size and duration of the study; empty if a field would be refused.
@@ -255,8 +256,8 @@ struct Fault {
 pub(super) async fn check(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
-    Form(fields): Form<Fields>,
-) -> Result<Json<Checked>, PageError> {
+    Form(fields): Form<NewStudyFields>,
+) -> Result<Json<CheckedForm>, PageError> {
     let mut reader = app.read().await?;
     let (found, plan) = faults(&mut reader, authorized.caller.reach(), &fields).await?;
     let text = match &plan {
@@ -264,12 +265,12 @@ pub(super) async fn check(
         _ => String::new(),
     };
     let choice = match &plan {
-        Some(plan) => Some(Choice::read(&mut reader, plan).await?),
+        Some(plan) => Some(ReferenceChoice::read(&mut reader, plan).await?),
         None => None,
     };
     drop(reader);
     let faults = found.into_iter().map(|fault| Fault { field: fault.field, text: fault.message }).collect();
-    Ok(Json(Checked { faults, text, reference: choice.map(|choice| choice.shown()).transpose()? }))
+    Ok(Json(CheckedForm { faults, text, reference: choice.map(|choice| choice.shown()).transpose()? }))
 }
 
 /// The size of the study and its expected duration.
@@ -278,7 +279,7 @@ async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error>
     let size = format!("The study tries {} of {combinations} combinations of bounds", plan.trial_budget);
     let people = format::besides_solves(plan.feedback_mode);
     // Parallel trials share the machine, so they are not counted as faster.
-    let took = |measured: trials::Measured| measured.median_seconds * f64::from(plan.trial_budget);
+    let took = |measured: trials::SolveTimes| measured.median_seconds * f64::from(plan.trial_budget);
     Ok(match trials::measured(db, plan.muscles).await?.map(took) {
         Some(seconds) => format!("{size} and takes about {}{people}.", format::duration(seconds)),
         None => format!(

@@ -1,6 +1,6 @@
 //! The study that the form describes: checked, planned and created.
 
-use super::fields::{DESCRIPTION, Fields, KEPT, LEARNERS, NEW_SUBJECT, as_refusal, learner, place_in_form};
+use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal, learner, place_in_form};
 use super::space_editor::SpaceEditor;
 use crate::accessible::Named;
 use crate::body_measures;
@@ -14,7 +14,7 @@ use gaitwright_store::{Connection, SubjectId, Writer, consents};
 use std::str::FromStr;
 
 /// The study to clone, if the caller can access it and its subject has not withdrawn consent.
-pub(super) async fn cloned(db: &mut Connection, reach: Reach, fields: &Fields) -> Result<Option<Study>, Error> {
+pub(super) async fn cloned(db: &mut Connection, reach: Reach, fields: &NewStudyFields) -> Result<Option<Study>, Error> {
     let Some(named) = fields.cloned()? else { return Ok(None) };
     let id = Named::from(named).accessible(db, reach).await?;
     consents::may_be_shown(db, id).await?;
@@ -25,13 +25,13 @@ pub(super) async fn cloned(db: &mut Connection, reach: Reach, fields: &Fields) -
 pub(super) async fn make(
     writer: &mut Writer,
     caller: &Caller,
-    fields: &Fields,
+    fields: &NewStudyFields,
     editor: &SpaceEditor,
 ) -> Result<Study, Error> {
     let like = cloned(writer, caller.reach(), fields).await?;
     let subject = match subject_of(fields)? {
-        Chosen::New(new) => subject::add(writer, &caller.actor, &new).await?.id,
-        Chosen::Known(id) => id,
+        StudySubject::New(new) => subject::add(writer, &caller.actor, &new).await?.id,
+        StudySubject::Known(id) => id,
     };
     let mut new = study_of(fields, editor, subject, like.as_ref())?;
     let plan = study_plan::checked(writer, new.clone()).await?;
@@ -40,14 +40,19 @@ pub(super) async fn make(
 }
 
 /// The study that [`make`] would create.
-async fn planned(db: &mut Connection, reach: Reach, fields: &Fields, editor: &SpaceEditor) -> Result<StudyPlan, Error> {
+async fn planned(
+    db: &mut Connection,
+    reach: Reach,
+    fields: &NewStudyFields,
+    editor: &SpaceEditor,
+) -> Result<StudyPlan, Error> {
     let like = cloned(db, reach, fields).await?;
     let plan = match subject_of(fields)? {
-        Chosen::New(new) => {
+        StudySubject::New(new) => {
             let study = study_of(fields, editor, SubjectId::fresh(), like.as_ref())?;
             study_plan::checked_for_new(db, &new, study).await?
         }
-        Chosen::Known(id) => {
+        StudySubject::Known(id) => {
             consents::has_not_withdrawn(db, id).await?;
             study_plan::checked(db, study_of(fields, editor, id, like.as_ref())?).await?
         }
@@ -60,7 +65,7 @@ async fn planned(db: &mut Connection, reach: Reach, fields: &Fields, editor: &Sp
 pub(super) async fn faults(
     db: &mut Connection,
     reach: Reach,
-    fields: &Fields,
+    fields: &NewStudyFields,
 ) -> Result<(Vec<FieldError>, Option<StudyPlan>), Error> {
     let mut repaired = fields.clone();
     let mut found: Vec<FieldError> = Vec::new();
@@ -85,7 +90,12 @@ pub(super) async fn faults(
 
 /// The name of the study. A typed name must differ from those of the studies that the caller can see; the default name
 /// gets a number if it is taken.
-async fn name_of(db: &mut Connection, reach: Reach, fields: &Fields, plan: &StudyPlan) -> Result<String, Error> {
+async fn name_of(
+    db: &mut Connection,
+    reach: Reach,
+    fields: &NewStudyFields,
+    plan: &StudyPlan,
+) -> Result<String, Error> {
     let free = study_plan::free_name(db, reach, &plan.name).await?;
     if fields.name.trim().is_empty() || free == plan.name {
         return Ok(free);
@@ -94,17 +104,17 @@ async fn name_of(db: &mut Connection, reach: Reach, fields: &Fields, plan: &Stud
 }
 
 /// The subject of the study.
-enum Chosen {
+enum StudySubject {
     New(NewSubject),
     Known(SubjectId),
 }
 
-fn subject_of(fields: &Fields) -> Result<Chosen, Error> {
+fn subject_of(fields: &NewStudyFields) -> Result<StudySubject, Error> {
     if fields.subject != NEW_SUBJECT {
         nothing_described(fields)?;
-        return Ok(Chosen::Known(number("subject", &fields.subject, "a subject from the list")?));
+        return Ok(StudySubject::Known(number("subject", &fields.subject, "a subject from the list")?));
     }
-    Ok(Chosen::New(NewSubject {
+    Ok(StudySubject::New(NewSubject {
         pseudonym: fields.pseudonym.clone(),
         height_m: body_measures::height_m("height_m", &fields.height_m)?,
         body_mass_kg: body_measures::mass_kg("body_mass_kg", &fields.body_mass_kg)?,
@@ -114,7 +124,7 @@ fn subject_of(fields: &Fields) -> Result<Chosen, Error> {
 
 /// What the form does not show comes from the cloned study.
 fn study_of(
-    fields: &Fields,
+    fields: &NewStudyFields,
     editor: &SpaceEditor,
     subject: SubjectId,
     like: Option<&Study>,
@@ -158,7 +168,7 @@ fn study_of(
 }
 
 /// `None` if only the lowest objective counts.
-fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
+fn basin_choice(fields: &NewStudyFields) -> Result<BasinChoice, Error> {
     let field = "basin_within_percent";
     let allowed = "0 to 100, or empty";
     let Some(within_percent) = optional(field, &fields.basin_within_percent, allowed)? else {
@@ -170,7 +180,7 @@ fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
 }
 
 /// Refuses a new subject that is entered but not chosen, instead of ignoring it.
-fn nothing_described(fields: &Fields) -> Result<(), Error> {
+fn nothing_described(fields: &NewStudyFields) -> Result<(), Error> {
     for (field, text) in DESCRIPTION.into_iter().zip([&fields.pseudonym, &fields.height_m, &fields.body_mass_kg]) {
         if !text.trim().is_empty() {
             let allowed = "empty, because a subject from the list is chosen. To add this subject, choose \u{201c}A new subject, entered below\u{201d}";

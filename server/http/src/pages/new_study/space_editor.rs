@@ -7,7 +7,7 @@ use gaitwright_service::studies::search_space::TABLE_I;
 use std::collections::BTreeMap;
 
 /// The entries of one bound.
-pub(super) struct BoundRow {
+pub(super) struct BoundEntries {
     pub(super) name: &'static str,
     pub(super) meaning: &'static str,
     pub(super) allowed: String,
@@ -19,7 +19,7 @@ pub(super) struct BoundRow {
 
 /// The entries of the editor.
 pub(super) struct SpaceEditor {
-    pub(super) rows: Vec<BoundRow>,
+    pub(super) rows: Vec<BoundEntries>,
 }
 
 impl SpaceEditor {
@@ -43,7 +43,7 @@ impl SpaceEditor {
             let (values, lengthscale) = TABLE_I[bound];
             let text = |part: &str, preset: String| fields.get(&format!("{part}_{name}")).cloned().unwrap_or(preset);
             let preset: Vec<String> = values.iter().map(f64::to_string).collect();
-            BoundRow {
+            BoundEntries {
                 name,
                 meaning: TunedBounds::MEANINGS[bound],
                 allowed: format!("{low} to {high}"),

@@ -8,19 +8,19 @@ mod without_gait;
 
 use self::answers::{AnswerRow, answers};
 pub(super) use self::answers::{answer_in_words, assessment_in_words};
-use self::recommended_walker::Walker;
+use self::recommended_walker::RecommendedGait;
 use self::time_left::time_left;
-use self::trials_table::{Choice, TrialRow, TrialsTable};
+use self::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use self::without_gait::WithoutGait;
 use super::certainty::certainty;
-use super::page_chart::Drawn;
+use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
-use crate::figures::{COURSE, Outcome, course, utility, warm_starts};
+use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
 use crate::format::{self, Bound};
-use crate::page_error::{Page, PageError, page};
+use crate::page_error::{PageError, PageResult, page};
 use crate::units::Units;
 use crate::visible::Visible;
 use askama::Template;
@@ -37,7 +37,7 @@ use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
 use gaitwright_service::studies::certified_best::{self, CertificateState, Judged};
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
-use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
+use gaitwright_service::studies::lifecycle::{StudyTransition, acts_of_people};
 use gaitwright_service::studies::safety_reports::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_change::{self, Extend};
@@ -120,21 +120,21 @@ struct Live {
     /// Why the next solve has not started; empty if one runs.
     queued: String,
     running: Vec<RunningRow>,
-    best: Option<Best>,
+    best: Option<BestGait>,
     /// How sure the recommendation is; `None` without one, and for a large study.
     certainty: Option<String>,
     /// The recommended gait, or its place.
-    walker: Walker,
+    walker: RecommendedGait,
     unanswered: bool,
     /// Whether only people answer comparisons.
     people_answer: bool,
     /// The utility of the recommended gait over the answers of people.
-    utility: Option<Drawn>,
+    utility: Option<PageChart>,
     /// Gait RMSE of the best action by iteration.
-    chart: Option<Drawn>,
+    chart: Option<PageChart>,
     table: TrialsTable,
     /// Warm-start tree.
-    tree: Option<Drawn>,
+    tree: Option<PageChart>,
     answers: Vec<AnswerRow>,
     unsafe_gaits: Vec<UnsafeGait>,
     question: bool,
@@ -180,10 +180,10 @@ struct RunningRow {
     id: TrialId,
     number: u32,
     text: String,
-    chart: Option<Drawn>,
+    chart: Option<PageChart>,
 }
 
-struct Best {
+struct BestGait {
     id: TrialId,
     number: u32,
     rmse: String,
@@ -200,7 +200,7 @@ struct Best {
     passing: Option<Passing>,
 }
 
-impl Best {
+impl BestGait {
     fn failed(&self) -> bool {
         self.judged.certificate == CertificateState::Failed
     }
@@ -242,8 +242,8 @@ pub(super) async fn get(
     State(mut app): State<AppState>,
     units: Units,
     Id(id, _): Id<StudyId, Read>,
-    Params(choice): Params<Choice>,
-) -> Page {
+    Params(choice): Params<TrialsQuery>,
+) -> PageResult {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
@@ -286,15 +286,15 @@ pub(super) async fn live(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    Params(choice): Params<Choice>,
-) -> Page {
+    Params(choice): Params<TrialsQuery>,
+) -> PageResult {
     page(&read_live(&mut app, &authorized.caller, id, choice).await?)
 }
 
 /// The progress of a running solve.
 #[derive(Template)]
 #[template(path = "running.html")]
-struct Running {
+struct RunningPage {
     row: RunningRow,
 }
 
@@ -306,7 +306,7 @@ pub(super) async fn running(
 ) -> Result<Response, PageError> {
     let trial = trials::get(&mut *app.read().await?, id).await?;
     let Some(track) = app.scheduler.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
-    Ok(page(&Running { row: running_row(&trial, Some(&track)) })?.into_response())
+    Ok(page(&RunningPage { row: running_row(&trial, Some(&track)) })?.into_response())
 }
 
 /// The form of a button.
@@ -325,12 +325,12 @@ pub(super) async fn post(
     Id(id, _): Id<StudyId, Run>,
     Form(form): Form<Do>,
 ) -> Result<Redirect, PageError> {
-    let act = lifecycle::Act::ALL
+    let act = lifecycle::StudyTransition::ALL
         .into_iter()
         .find(|act| act.as_str() == form.act && acts_for_pages(*act))
         .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop or extend"))?;
     let mut writer = app.write().await?;
-    let cancelled = if act == Act::Extend {
+    let cancelled = if act == StudyTransition::Extend {
         let refused =
             || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
         let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
@@ -348,21 +348,28 @@ pub(super) async fn post(
 }
 
 /// Whether the page has a button for it.
-fn acts_for_pages(act: Act) -> bool {
-    matches!(act, Act::Start | Act::Pause | Act::Resume | Act::Stop | Act::Extend)
+fn acts_for_pages(act: StudyTransition) -> bool {
+    matches!(
+        act,
+        StudyTransition::Start
+            | StudyTransition::Pause
+            | StudyTransition::Resume
+            | StudyTransition::Stop
+            | StudyTransition::Extend
+    )
 }
 
 /// Acts that need no confirmation.
-fn button(act: Act) -> Option<ActButton> {
+fn button(act: StudyTransition) -> Option<ActButton> {
     match act {
-        Act::Start => Some(ActButton { act: "start", label: "Start" }),
-        Act::Pause => Some(ActButton { act: "pause", label: "Pause" }),
-        Act::Resume => Some(ActButton { act: "resume", label: "Resume" }),
+        StudyTransition::Start => Some(ActButton { act: "start", label: "Start" }),
+        StudyTransition::Pause => Some(ActButton { act: "pause", label: "Pause" }),
+        StudyTransition::Resume => Some(ActButton { act: "resume", label: "Resume" }),
         _ => None,
     }
 }
 
-async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Choice) -> Result<Live, Error> {
+async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: TrialsQuery) -> Result<Live, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
@@ -409,7 +416,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let mut answers = answers(&snapshot, &assessments);
     answers.truncate(ANSWERS);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let found = Found { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait };
+    let found = StudyFindings { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait };
     let pace = time_left(&snapshot, counts.results(), app.scheduler.workers());
     // The newest trials do not say it of all.
     let inactive = if large { Vec::new() } else { never_active(&snapshot) };
@@ -417,7 +424,7 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     live.never_active = inactive.join(", ");
     live.pace = pace;
     let best = live.best.as_ref().map(|best| (best.id, best.number, best.has_gait));
-    live.walker = Walker::read(app, &live.study, best, &shown).await?;
+    live.walker = RecommendedGait::read(app, &live.study, best, &shown).await?;
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
         live.queued = waits_for_a_worker(jobs::depth_of_others(&mut *app.read().await?, id).await?);
     }
@@ -426,13 +433,13 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
 
 /// What the learner says of a study.
 struct Learned {
-    outcome: Outcome,
+    outcome: StudyOutcome,
     certainty: Option<String>,
     utility: Option<Figure>,
 }
 
 fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, beliefs: &Beliefs) -> Result<Learned, LearnerError> {
-    let outcome = Outcome::of(pool, snapshot, large, beliefs)?;
+    let outcome = StudyOutcome::of(pool, snapshot, large, beliefs)?;
     if large || outcome.best.is_none() {
         return Ok(Learned { outcome, certainty: None, utility: None });
     }
@@ -456,13 +463,13 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
         number: trial.number,
         text,
         chart: gait_charts::solve(records)
-            .map(|figure| Drawn::of(&figure, &format!("/api/v1/trials/{}/figures", trial.id), "")),
+            .map(|figure| PageChart::of(&figure, &format!("/api/v1/trials/{}/figures", trial.id), "")),
     }
 }
 
 /// What a study has found, and what the record says of it.
-struct Found {
-    outcome: Outcome,
+struct StudyFindings {
+    outcome: StudyOutcome,
     certainty: Option<String>,
     utility: Option<Figure>,
     /// The states of the certificates.
@@ -477,14 +484,14 @@ struct Found {
 fn view(
     snapshot: StudySnapshot,
     counts: TrialCounts,
-    found: Found,
+    found: StudyFindings,
     running: Vec<RunningRow>,
     table: TrialsTable,
     answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
-    let Found { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait } = found;
-    let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| Best {
+    let StudyFindings { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait } = found;
+    let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| BestGait {
         id: trial.id,
         number: trial.number,
         rmse: format::figure(trial.gait_rmse_rad),
@@ -511,8 +518,8 @@ fn view(
     let acts = if may_run { acts_of_people(snapshot.study.state) } else { Vec::new() };
     Live {
         state: lifecycle::in_words(snapshot.study.state).to_owned(),
-        may_stop: acts.contains(&Act::Stop),
-        may_extend: acts.contains(&Act::Extend),
+        may_stop: acts.contains(&StudyTransition::Stop),
+        may_extend: acts.contains(&StudyTransition::Extend),
         acts: acts.into_iter().filter_map(button).collect(),
         pace: String::new(),
         queued: String::new(),
@@ -523,13 +530,13 @@ fn view(
         running,
         best,
         certainty,
-        walker: Walker::None,
+        walker: RecommendedGait::None,
         unanswered: outcome.unanswered,
         people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
-        utility: utility.map(|figure| Drawn::of(&figure, &files, "")),
-        chart: course(&[(&snapshot, &outcome)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
+        utility: utility.map(|figure| PageChart::of(&figure, &files, "")),
+        chart: course(&[(&snapshot, &outcome)]).map(|chart| PageChart::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
-        tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| Drawn::of(&figure, &files, "")),
+        tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| PageChart::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
         question: outcome.question && snapshot.study.state != StudyState::Stopped,

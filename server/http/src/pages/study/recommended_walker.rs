@@ -9,7 +9,7 @@ use gaitwright_store::studies::{Evaluation, Study};
 use gaitwright_store::{TrialId, gaits, reference_gaits};
 
 /// The recommended gait on the page.
-pub(super) enum Walker {
+pub(super) enum RecommendedGait {
     /// No gait is or will be stored.
     None,
     /// A trial that is still to converge.
@@ -19,7 +19,7 @@ pub(super) enum Walker {
     Walks(RecommendedWalker),
 }
 
-impl Walker {
+impl RecommendedGait {
     /// The best trial of a study, with its number and whether its gait is stored; drawn unless the page shows it already.
     pub(super) async fn read(
         app: &mut AppState,

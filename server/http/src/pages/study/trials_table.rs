@@ -5,7 +5,7 @@ use crate::format::{self, words};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_store::trials::{TrialCounts, TrialState};
-use gaitwright_store::trials_table::{self, Listed, Listing, SORTS};
+use gaitwright_store::trials_table::{self, ListedTrial, Listing, SORTS};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ const DESCENDING: &str = "descending";
 /// The query string of the table.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default)]
-pub(crate) struct Choice {
+pub(crate) struct TrialsQuery {
     pub(super) sort: String,
     pub(super) order: String,
     state: String,
@@ -27,7 +27,7 @@ pub(crate) struct Choice {
     pub(super) shown: String,
 }
 
-impl Default for Choice {
+impl Default for TrialsQuery {
     fn default() -> Self {
         Self {
             sort: SORTS[0].to_owned(),
@@ -40,7 +40,7 @@ impl Default for Choice {
     }
 }
 
-impl Choice {
+impl TrialsQuery {
     fn listing(&self) -> Result<Listing, Error> {
         let sort = SORTS.into_iter().find(|sort| *sort == self.sort);
         let state = match self.state.as_str() {
@@ -105,7 +105,7 @@ pub(super) struct TrialRow {
 /// The visible part of the table.
 pub(super) struct TrialsTable {
     pub(super) any: bool,
-    pub(super) choice: Choice,
+    pub(super) choice: TrialsQuery,
     pub(super) states: Vec<StateChoice>,
     pub(super) figures: Vec<Column>,
     pub(super) bounds: Vec<Column>,
@@ -121,13 +121,13 @@ impl TrialsTable {
         db: &mut Connection,
         study: StudyId,
         counts: TrialCounts,
-        choice: Choice,
+        choice: TrialsQuery,
     ) -> Result<Self, Error> {
         let listing = choice.listing()?;
         let listed = trials_table::of_study(db, study, &listing).await?;
         let matching = listed.first().map_or(0, |row| row.matching);
         let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
-        let page = |page: u32| Choice { page, ..choice.clone() }.link();
+        let page = |page: u32| TrialsQuery { page, ..choice.clone() }.link();
         let more = listing.offset + shown < matching;
         Ok(Self {
             any: counts.total > 0,
@@ -166,7 +166,7 @@ fn extent(shown: u32, offset: u32, matching: u32, total: u32) -> String {
     }
 }
 
-fn columns(choice: &Choice, listing: &Listing, bounds: bool) -> Result<Vec<Column>, Error> {
+fn columns(choice: &TrialsQuery, listing: &Listing, bounds: bool) -> Result<Vec<Column>, Error> {
     SORTS
         .into_iter()
         .filter(|sort| TunedBounds::NAMES.contains(sort) == bounds)
@@ -174,7 +174,8 @@ fn columns(choice: &Choice, listing: &Listing, bounds: bool) -> Result<Vec<Colum
             let current = sort == listing.sort;
             let descending = current && !listing.descending;
             let order = if descending { DESCENDING } else { "ascending" };
-            let link = Choice { sort: sort.to_owned(), order: order.to_owned(), page: 1, ..choice.clone() }.link()?;
+            let link =
+                TrialsQuery { sort: sort.to_owned(), order: order.to_owned(), page: 1, ..choice.clone() }.link()?;
             let (label, meaning) = heading(sort);
             let sorted = if current { choice.order.clone() } else { String::new() };
             Ok(Column { label, meaning, numeric: sort != "state", link, sorted })
@@ -194,7 +195,7 @@ fn heading(sort: &'static str) -> (&'static str, &'static str) {
     }
 }
 
-fn trial_row(listed: Listed) -> TrialRow {
+fn trial_row(listed: ListedTrial) -> TrialRow {
     TrialRow {
         id: listed.id,
         number: listed.number,

@@ -37,22 +37,22 @@ struct RowLine<'a> {
 
 #[derive(Serialize)]
 struct EndLine<'a> {
-    end: &'a End,
+    end: &'a LastLine,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Line {
+struct ArchiveLine {
     table: Option<String>,
     sha256: Option<String>,
     row: Option<Row>,
-    end: Option<End>,
+    end: Option<LastLine>,
 }
 
 /// The last line.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct End {
+struct LastLine {
     /// Number of rows.
     rows: u64,
     /// SHA-256 over the lines of all rows.
@@ -100,7 +100,7 @@ impl<W: Write> Packer<W> {
         let Self { mut out, hash, rows } = self;
         let sha256 = hex::encode(hash.finalize());
         let signature = key.map(|key| key.sign(&message(&sha256)));
-        let end = End { rows, sha256, signed_by: key.map(|key| key.public().to_string()), signature };
+        let end = LastLine { rows, sha256, signed_by: key.map(|key| key.public().to_string()), signature };
         serde_json::to_writer(&mut out, &EndLine { end: &end })?;
         out.write_all(b"\n")?;
         let mut out = out.finish()?;
@@ -157,7 +157,7 @@ pub(super) fn refuse(reason: impl std::fmt::Display) -> Error {
 /// The next part of an archive.
 pub(super) enum Next {
     Row(&'static str, Row),
-    End(ArchiveFacts),
+    LastLine(ArchiveFacts),
 }
 
 impl<R: Read> Unpacker<R> {
@@ -193,9 +193,9 @@ impl<R: Read> Unpacker<R> {
         if text.pop() != Some(b'\n') {
             return Err(refuse("it is truncated"));
         }
-        let line: Line = serde_json::from_slice(&text).map_err(|e| refuse(format!("row {row}: {e}")))?;
+        let line: ArchiveLine = serde_json::from_slice(&text).map_err(|e| refuse(format!("row {row}: {e}")))?;
         match line {
-            Line { table: Some(name), sha256: Some(sha256), row: Some(found), end: None } => {
+            ArchiveLine { table: Some(name), sha256: Some(sha256), row: Some(found), end: None } => {
                 self.hash.update(&text);
                 self.hash.update(b"\n");
                 self.rows = row;
@@ -219,12 +219,12 @@ impl<R: Read> Unpacker<R> {
                 }
                 Ok(Next::Row(table, found))
             }
-            Line { table: None, sha256: None, row: None, end: Some(end) } => self.end(&end).map(Next::End),
+            ArchiveLine { table: None, sha256: None, row: None, end: Some(end) } => self.end(&end).map(Next::End),
             _ => Err(refuse(format!("line {row} is neither a row nor the end"))),
         }
     }
 
-    fn end(&mut self, end: &End) -> Result<ArchiveFacts, Error> {
+    fn end(&mut self, end: &LastLine) -> Result<ArchiveFacts, Error> {
         let sha256 = hex::encode(std::mem::take(&mut self.hash).finalize());
         if end.rows != self.rows || end.sha256 != sha256 {
             return Err(refuse("its rows were changed: they do not match the hash at its end"));

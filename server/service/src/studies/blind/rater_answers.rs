@@ -15,7 +15,7 @@ use crate::studies::walkable;
 use gaitwright_store::allocations::{self, Lot, Sided};
 use gaitwright_store::audit;
 use gaitwright_store::feedback::{self, Attribution, Source};
-use gaitwright_store::presentations::{self, Judgement, Kind, NewAnswer, NewPresentation, Presentation};
+use gaitwright_store::presentations::{self, Judgement, Kind, NewPairAnswer, NewPresentation, Presentation};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{
     Connection, Instant, LentWriter, PresentationId, Store, StudyId, TrialId, Writer, consents, events, members,
@@ -149,7 +149,7 @@ async fn is_answered(
 }
 
 async fn cancel(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
-    let retracted = NewAnswer {
+    let retracted = NewPairAnswer {
         judgement: Judgement::Retracted,
         response_ms: None,
         note: "",
@@ -209,8 +209,13 @@ pub async fn answer(
         preference::record(writer, statement).await.map_err(without_gaits)?
     };
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
-    let row =
-        NewAnswer { judgement, response_ms: given.response_ms, note: &given.note, feedback: heard, could_have_known };
+    let row = NewPairAnswer {
+        judgement,
+        response_ms: given.response_ms,
+        note: &given.note,
+        feedback: heard,
+        could_have_known,
+    };
     if !presentations::answer(writer, shown.id, row).await? {
         return Err(Error::conflict(answered_already(sided.answer())));
     }

@@ -16,7 +16,7 @@ use crate::studies::safety_reports::SafetyReports;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::feedback::{Attribution, Source};
 use gaitwright_store::lab_answers::{self, LabAnswer};
-use gaitwright_store::lab_sessions::{Act, LabSession};
+use gaitwright_store::lab_sessions::{LabSession, SessionStep};
 use gaitwright_store::presentations::Judgement;
 use gaitwright_store::{LabSessionId, Writer, audit, events, lab_sessions, studies, subjects};
 use serde::Deserialize;
@@ -138,7 +138,7 @@ async fn add(
         return Err(Error::conflict("Another answer was recorded at the same time."));
     }
     let session = lab_sessions::get(writer, id).await?;
-    if session.done(Act::Unblinded).is_some() {
+    if session.done(SessionStep::Unblinded).is_some() {
         record_answer(writer, &session).await?;
     }
     let detail = json!({ "number": number, "answer": new.answer, "note": new.note });

@@ -28,5 +28,6 @@ pub use session::{
 };
 pub use unblinding::unblind;
 pub use upload::{
-    Checked, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, brought, check_kept, keep,
+    CheckedFile, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, brought, check_kept,
+    keep,
 };

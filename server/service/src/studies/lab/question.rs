@@ -4,7 +4,7 @@
 use gaitwright_store::Instant;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::lab_answers::LabAnswer;
-use gaitwright_store::lab_sessions::{Act, LabSession};
+use gaitwright_store::lab_sessions::{LabSession, SessionStep};
 use gaitwright_store::presentations::Judgement;
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -34,7 +34,7 @@ pub struct AnswerView {
 
 impl AnswerView {
     pub(super) fn of(session: &LabSession, row: &LabAnswer) -> Self {
-        let unblinded = session.done(Act::Unblinded).is_some_and(|done| done.at <= row.at);
+        let unblinded = session.done(SessionStep::Unblinded).is_some_and(|done| done.at <= row.at);
         Self {
             number: row.number,
             answer: row.judgement,
@@ -48,12 +48,13 @@ impl AnswerView {
 
 /// The next walk to record, if any.
 pub(super) fn next_walk(session: &LabSession) -> Option<u8> {
-    (1..=WALKS).find(|walk| session.done(Act::Walk(*walk)).is_none())
+    (1..=WALKS).find(|walk| session.done(SessionStep::Walk(*walk)).is_none())
 }
 
 /// The number of the answer that is asked for now, if any.
 pub(super) fn asked_answer(session: &LabSession) -> Option<u32> {
-    let open = session.done(Act::Closed).is_none() && next_walk(session).is_none() && session.answer().is_none();
+    let open =
+        session.done(SessionStep::Closed).is_none() && next_walk(session).is_none() && session.answer().is_none();
     open.then(|| next_number(session))
 }
 
@@ -70,7 +71,7 @@ pub(super) fn next_number(session: &LabSession) -> u32 {
 
 /// Whether the current answer can be retracted: the session is blinded, and it is not a safety report.
 pub(super) fn can_be_retracted(session: &LabSession) -> bool {
-    let open = session.done(Act::Closed).is_none() && session.done(Act::Unblinded).is_none();
+    let open = session.done(SessionStep::Closed).is_none() && session.done(SessionStep::Unblinded).is_none();
     open && session.answer().is_some_and(|answer| !answer.judgement.is_about_safety())
 }
 

@@ -8,9 +8,9 @@ use crate::studies::same_motion::is_same_gait;
 use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, ControllerFileDownload, Lot};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::lab_sessions::{self, Act, LabSession, LabSessionStep};
+use gaitwright_store::lab_sessions::{self, LabSession, LabSessionStep, SessionStep};
 use gaitwright_store::trials::{self, Trial, TrialState};
-use gaitwright_store::trials_table::{self, Listed, Listing};
+use gaitwright_store::trials_table::{self, ListedTrial, Listing};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -69,9 +69,9 @@ impl LabSessionState {
     }
 
     fn of(session: &LabSession) -> Self {
-        if session.done(Act::Closed).is_some() {
+        if session.done(SessionStep::Closed).is_some() {
             Self::Closed
-        } else if session.done(Act::Walk(1)).is_some() {
+        } else if session.done(SessionStep::Walk(1)).is_some() {
             Self::UnderWay
         } else {
             Self::Planned
@@ -132,9 +132,9 @@ impl From<&LabSession> for LabSessionView {
     fn from(session: &LabSession) -> Self {
         let walk = |number| {
             let place = |act| session.acts.iter().position(|(known, _)| *known == act);
-            let recorded = session.done(Act::Walk(number));
-            let unblinded_before = place(Act::Unblinded)
-                .zip(place(Act::Walk(number)))
+            let recorded = session.done(SessionStep::Walk(number));
+            let unblinded_before = place(SessionStep::Unblinded)
+                .zip(place(SessionStep::Walk(number)))
                 .is_some_and(|(unblinded, walked)| unblinded < walked);
             WalkView {
                 number,
@@ -154,10 +154,10 @@ impl From<&LabSession> for LabSessionView {
             notes: session.notes.clone(),
             walks: (1..=WALKS).map(walk).collect(),
             answer: session.answer().map(|answer| AnswerView::of(session, answer)),
-            unblinded: session.done(Act::Unblinded).cloned(),
+            unblinded: session.done(SessionStep::Unblinded).cloned(),
             allocation_included: session.allocation.included,
             controller_files: session.allocation.files.clone(),
-            closed: session.done(Act::Closed).cloned(),
+            closed: session.done(SessionStep::Closed).cloned(),
             planned_by: session.actor.clone(),
             created_at: session.created_at,
         }
@@ -234,7 +234,7 @@ pub(super) fn not_included() -> Error {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<Listed>> {
+pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<ListedTrial>> {
     let listing = Listing {
         sort: "gait_rmse_rad",
         descending: false,
@@ -244,7 +244,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
         offset: 0,
     };
     let grounds = Grounds::read(db, study).await?;
-    let mut kept: Vec<(Listed, Trial)> = Vec::new();
+    let mut kept: Vec<(ListedTrial, Trial)> = Vec::new();
     for listed in trials_table::of_study(db, study, &listing).await? {
         let trial = trials::get(db, listed.id).await?;
         if grounds.admit(&trial).is_ok() && !kept.iter().any(|(_, other)| is_same_gait(other, &trial)) {
@@ -265,7 +265,7 @@ pub async fn gaits_to_walk_with(
     walk: u8,
 ) -> Result<(WalkableGait, WalkableGait), Error> {
     checked_device_walk(walk)?;
-    if session.done(Act::Closed).is_some() {
+    if session.done(SessionStep::Closed).is_some() {
         return Err(Error::conflict("The session is closed."));
     }
     both_walkable(db, session).await
@@ -357,12 +357,12 @@ impl LabSessionProgress {
 /// [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent; errors of the database.
 pub async fn session_progress(db: &mut Connection, id: LabSessionId) -> Result<LabSessionProgress, Error> {
     let session = still_shown(db, id).await?;
-    let closed = session.done(Act::Closed).is_some();
+    let closed = session.done(SessionStep::Closed).is_some();
     Ok(LabSessionProgress {
         session: id,
         walk: next_walk(&session).filter(|_| !closed && session.answer().is_none()),
         walks: WALKS,
-        last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(Act::Walk(walk))).map(|done| done.at),
+        last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(SessionStep::Walk(walk))).map(|done| done.at),
         answer_number: asked_answer(&session),
         report_number: takes_report(&session),
         answer: session.answer().map(|answer| AnswerView::of(&session, answer)),
@@ -405,7 +405,7 @@ pub async fn record_walk(
     if walk > 1 {
         both_walkable(writer, &session).await?;
     }
-    lab_sessions::act(writer, actor, id, Act::Walk(walk), &walked.note).await?;
+    lab_sessions::act(writer, actor, id, SessionStep::Walk(walk), &walked.note).await?;
     let detail = json!({ "walk": walk, "note": walked.note });
     audit::append(writer, actor, "lab_session.walk", &format!("lab session {id}"), &detail).await?;
     session_progress(writer, id).await
@@ -417,7 +417,7 @@ pub async fn record_walk(
 /// [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent; errors of the database.
 pub async fn was_recorded(db: &mut Connection, id: LabSessionId, walked: &RecordedWalk) -> Result<bool, Error> {
     let session = still_shown(db, id).await?;
-    Ok(session.done(Act::Walk(walked.walk)).is_some_and(|done| done.note == walked.note))
+    Ok(session.done(SessionStep::Walk(walked.walk)).is_some_and(|done| done.note == walked.note))
 }
 
 /// The session, unless its subject withdrew consent.
@@ -436,7 +436,7 @@ pub(super) async fn still_shown(db: &mut Connection, id: LabSessionId) -> Result
 /// [`Error::NotFound`], [`Error::Conflict`] if it is closed or the subject withdrew consent.
 pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSession, Error> {
     let session = still_shown(writer, id).await?;
-    if session.done(Act::Closed).is_some() {
+    if session.done(SessionStep::Closed).is_some() {
         return Err(Error::conflict("The session is closed and accepts no more data."));
     }
     Ok(session)
@@ -449,7 +449,7 @@ pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSess
 pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &str) -> Result<LabSession, Error> {
     printable::note("note", note, LONGEST_NOTE)?;
     still_open(writer, id).await?;
-    lab_sessions::act(writer, actor, id, Act::Closed, note).await?;
+    lab_sessions::act(writer, actor, id, SessionStep::Closed, note).await?;
     let detail = json!({ "note": note });
     audit::append(writer, actor, "lab_session.close", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)

@@ -5,7 +5,7 @@ use super::session::{not_included, still_shown};
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::lab_sessions::{self, Act, LabSession};
+use gaitwright_store::lab_sessions::{self, LabSession, SessionStep};
 use gaitwright_store::{LabSessionId, Writer};
 use serde_json::json;
 
@@ -20,7 +20,7 @@ pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reaso
     if !still_shown(writer, id).await?.allocation.included {
         return Err(not_included());
     }
-    if !lab_sessions::act(writer, actor, id, Act::Unblinded, reason).await? {
+    if !lab_sessions::act(writer, actor, id, SessionStep::Unblinded, reason).await? {
         return Err(Error::conflict("This session is already unblinded."));
     }
     let detail = json!({ "reason": reason });

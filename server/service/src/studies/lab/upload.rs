@@ -9,7 +9,7 @@ use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope, strid
 use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::lab_sessions::Act;
+use gaitwright_store::lab_sessions::SessionStep;
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind, PackedFile};
 use gaitwright_store::{Connection, LabSessionId, MeasurementFileId, PackedText, Store, Writer};
 use serde::{Deserialize, Serialize};
@@ -251,7 +251,7 @@ fn check_file_name(name: Option<&str>) -> Result<(), Error> {
 
 /// A checked measurement file, ready to be stored.
 #[derive(Debug)]
-pub struct Checked {
+pub struct CheckedFile {
     walk: u8,
     packed: PackedFile,
 }
@@ -261,12 +261,12 @@ impl NewEmg {
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
-    pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
+    pub async fn checked(self, store: &mut Store) -> Result<CheckedFile, Error> {
         let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
             let packed = PackedFile::new(pool, MeasurementKind::Emg, &self.reading, &self.recording)?;
-            Ok(Checked { walk, packed })
+            Ok(CheckedFile { walk, packed })
         };
         store.compute(check).await?
     }
@@ -277,12 +277,12 @@ impl NewMotion {
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
-    pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
+    pub async fn checked(self, store: &mut Store) -> Result<CheckedFile, Error> {
         let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
             let packed = PackedFile::new(pool, MeasurementKind::Motion, &self.reading, &self.recording)?;
-            Ok(Checked { walk, packed })
+            Ok(CheckedFile { walk, packed })
         };
         store.compute(check).await?
     }
@@ -341,11 +341,11 @@ pub async fn keep(
     writer: &mut Writer,
     actor: &Actor,
     id: LabSessionId,
-    checked: &Checked,
+    checked: &CheckedFile,
 ) -> Result<MeasurementFile, Error> {
     writer.room()?;
     let walk = checked.walk;
-    if still_open(writer, id).await?.done(Act::Walk(walk)).is_none() {
+    if still_open(writer, id).await?.done(SessionStep::Walk(walk)).is_none() {
         return Err(Error::conflict(format!("Walk {walk} is not recorded yet. Record it in the lab session first.")));
     }
     let brought = measurement_files::of_session(writer, id).await?;

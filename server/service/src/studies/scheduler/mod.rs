@@ -11,7 +11,7 @@ mod prefetch_loop;
 
 use super::belief::Beliefs;
 use super::execution::{Simulation, WalksAsked};
-use super::explanation::Effort;
+use super::explanation::ExplanationEffort;
 use super::job::{JobId, JobState};
 use super::jobs_after_solves::JobsAfterSolves;
 use super::prefetch::Prefetches;
@@ -181,8 +181,8 @@ impl Scheduler {
     }
 
     /// The state of the explanation of a trial in this process.
-    pub fn explaining(&self, trial: TrialId) -> Effort {
-        self.0.after_solves.as_ref().map_or(Effort::None, |jobs| jobs.explaining(trial))
+    pub fn explaining(&self, trial: TrialId) -> ExplanationEffort {
+        self.0.after_solves.as_ref().map_or(ExplanationEffort::None, |jobs| jobs.explaining(trial))
     }
 
     /// The certificates, explanations and execution reports that are queued or running, with their trials.

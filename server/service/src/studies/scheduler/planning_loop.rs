@@ -1,7 +1,7 @@
 //! The planning loop: proposes trials for every running study, and hands out jobs when workers are free.
 
-use super::super::lifecycle::{self, Act};
-use super::super::next_step::{Step, next_step};
+use super::super::lifecycle::{self, StudyTransition};
+use super::super::next_step::{PlanningStep, next_step};
 use super::super::planning_tasks::Plans;
 use super::super::snapshot::StudySnapshot;
 use super::{HEARTBEATS_PER_LEASE, Scheduler};
@@ -108,12 +108,12 @@ impl Scheduler {
             };
             let (snapshot, step) = store.compute(decide).await?;
             match step? {
-                Step::Nothing => return Ok(Some(snapshot).filter(|s| s.study.state == StudyState::Waiting)),
-                Step::Act(act, reason) => match self.act(&snapshot.study, act, &reason).await? {
+                PlanningStep::Nothing => return Ok(Some(snapshot).filter(|s| s.study.state == StudyState::Waiting)),
+                PlanningStep::Act(act, reason) => match self.act(&snapshot.study, act, &reason).await? {
                     Some(changed) => study = changed,
                     None => return Ok(None),
                 },
-                Step::Try(new) => {
+                PlanningStep::Try(new) => {
                     if !self.propose(&snapshot, &new).await? {
                         return Ok(None);
                     }
@@ -134,10 +134,10 @@ impl Scheduler {
     /// Pauses a study that cannot be planned, and records the reason.
     pub(super) async fn hold(&self, study: &Study, error: &Error) -> Result<(), Error> {
         tracing::error!(study = %study.id, %error, "cannot plan a study; pausing it");
-        self.act(study, Act::Pause, &format!("Planning failed: {error}")).await.map(drop)
+        self.act(study, StudyTransition::Pause, &format!("Planning failed: {error}")).await.map(drop)
     }
 
-    pub(super) async fn act(&self, study: &Study, act: Act, reason: &str) -> Result<Option<Study>, Error> {
+    pub(super) async fn act(&self, study: &Study, act: StudyTransition, reason: &str) -> Result<Option<Study>, Error> {
         let state = lifecycle::after(study.state, act)?;
         let mut writer = self.0.store.write().await?;
         if !studies::set_state(&mut writer, study, state, reason).await? {

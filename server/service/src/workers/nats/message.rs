@@ -18,7 +18,7 @@ pub(super) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
 /// A job.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub struct Order {
+pub struct SolveOrder {
     /// Version of the program that sent it.
     pub program: String,
     /// The solve.
@@ -94,10 +94,10 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
-            let _ = unpack::<Order>(&bytes);
+            let _ = unpack::<SolveOrder>(&bytes);
             let _ = unpack::<ResultMessage>(&bytes);
             let packed = zstd::encode_all(&bytes[..], 1).unwrap();
-            prop_assert!(unpack::<Order>(&packed).is_err());
+            prop_assert!(unpack::<SolveOrder>(&packed).is_err());
             prop_assert!(unpack::<ResultMessage>(&packed).is_err());
         }
 

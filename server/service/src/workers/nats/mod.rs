@@ -12,5 +12,5 @@ mod worker;
 
 pub use broker_connection::reach;
 pub use engine::JetStream;
-pub use message::{Order, ResultMessage, Sign, pack, unpack};
+pub use message::{ResultMessage, Sign, SolveOrder, pack, unpack};
 pub use worker::Worker;

@@ -1,7 +1,7 @@
 //! The remote worker: pulls jobs from the broker, solves them on its own threads, and publishes heartbeats and results.
 
 use super::broker_connection::{AGAIN, BrokerConnection, unreachable};
-use super::message::{Order, PROGRAM, ResultMessage, Sign, pack, unpack};
+use super::message::{PROGRAM, ResultMessage, Sign, SolveOrder, pack, unpack};
 use crate::dispatch_error::DispatchError;
 use crate::workers::dispatch::{Attempt, Dispatch, Finding, News};
 use crate::workers::{Evaluate, InProcess};
@@ -42,7 +42,7 @@ pub struct Worker {
 }
 
 /// A job that this worker holds.
-struct Held {
+struct HeldJob {
     number: u32,
     acker: Acker,
     /// Iterations that are not sent yet.
@@ -79,7 +79,7 @@ impl Worker {
     /// # Errors
     /// When the broker refuses the subscription to cancellations.
     pub async fn run(&self, stop: CancellationToken) -> Result<(), DispatchError> {
-        let mut held: HashMap<TrialId, Held> = HashMap::new();
+        let mut held: HashMap<TrialId, HeldJob> = HashMap::new();
         let (sender, mut jobs) = mpsc::channel(1);
         let mut cancels =
             self.link.context.client().subscribe(self.link.cancel_subject()).await.map_err(unreachable)?;
@@ -138,9 +138,9 @@ impl Worker {
         batch.next().await.transpose().map_err(unreachable)
     }
 
-    async fn take(&self, held: &mut HashMap<TrialId, Held>, (message, permit): Job) {
+    async fn take(&self, held: &mut HashMap<TrialId, HeldJob>, (message, permit): Job) {
         let (message, acker) = message.split();
-        let order = match unpack::<Order>(&message.payload) {
+        let order = match unpack::<SolveOrder>(&message.payload) {
             Ok(order) => order,
             Err(error) => {
                 tracing::error!(%error, "ignoring a malformed job");
@@ -164,11 +164,11 @@ impl Worker {
             return answer(&acker, AckKind::Nak(Some(AGAIN))).await;
         }
         let now = Instant::now();
-        let job = Held { number: attempt.number, acker, untold: Vec::new(), lived: now, told: now, permit };
+        let job = HeldJob { number: attempt.number, acker, untold: Vec::new(), lived: now, told: now, permit };
         held.insert(attempt.trial, job);
     }
 
-    async fn hear(&self, held: &mut HashMap<TrialId, Held>, news: News) {
+    async fn hear(&self, held: &mut HashMap<TrialId, HeldJob>, news: News) {
         match news {
             News::Started { attempt, .. } => self.tell(attempt, Vec::new()).await,
             News::Iterated { attempt, record } => {
@@ -201,8 +201,8 @@ impl Worker {
     }
 
     /// Returns jobs whose solve makes no progress.
-    async fn give_up_hanging(&self, held: &mut HashMap<TrialId, Held>) {
-        let hangs = |job: &Held| job.lived.elapsed() > self.link.ack_wait();
+    async fn give_up_hanging(&self, held: &mut HashMap<TrialId, HeldJob>) {
+        let hangs = |job: &HeldJob| job.lived.elapsed() > self.link.ack_wait();
         let hanging: Vec<TrialId> = held.iter().filter(|(_, job)| hangs(job)).map(|(trial, _)| *trial).collect();
         for trial in hanging {
             tracing::warn!(%trial, "a solve is hanging; returning its job");
@@ -210,7 +210,7 @@ impl Worker {
         }
     }
 
-    async fn drop_job(&self, held: &mut HashMap<TrialId, Held>, trial: TrialId, kind: AckKind) {
+    async fn drop_job(&self, held: &mut HashMap<TrialId, HeldJob>, trial: TrialId, kind: AckKind) {
         if let Some(job) = held.remove(&trial) {
             self.engine.cancel(trial).await;
             answer(&job.acker, kind).await;
@@ -234,8 +234,8 @@ impl Worker {
 
 /// Publishes a result, with retries, then acknowledges the job. A result that cannot be published is dropped: its slot
 /// is freed and its job left to other workers.
-async fn bring(link: BrokerConnection, pool: Pool, worker: String, attempt: Attempt, finding: Finding, job: Held) {
-    let Held { acker, permit, .. } = job;
+async fn bring(link: BrokerConnection, pool: Pool, worker: String, attempt: Attempt, finding: Finding, job: HeldJob) {
+    let HeldJob { acker, permit, .. } = job;
     let brought = ResultMessage { attempt, worker, finding };
     let bytes = pool.run(move |_| {
         let fits = |bytes: Vec<u8>| link.fits("a result", &bytes).map(|()| bytes);

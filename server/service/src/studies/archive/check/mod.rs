@@ -77,7 +77,7 @@ pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
 
 /// The result of the checks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Checked {
+pub(super) struct CheckedArchive {
     /// The study.
     pub(super) study: StudyId,
     /// Number of trials whose Gait RMSE could not be computed again.
@@ -98,7 +98,7 @@ fn at<T, E: std::fmt::Display>(what: impl std::fmt::Display, result: Result<T, E
 }
 
 /// Checks everything in quarantine.
-pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Checked, Error> {
+pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<CheckedArchive, Error> {
     if let Some(parent) = quarantine.forked_from() {
         at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is not an identifier")))?;
     }
@@ -153,7 +153,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     let by_id: HashMap<TrialId, &Trial> = trials.iter().map(|trial| (trial.id, trial)).collect();
     let sessions = lab(db, pool, id, &by_id).await?;
     answers::answers(db, &context.study, &by_id, (subject.pseudonym.as_str(), &sessions[..])).await?;
-    Ok(Checked { study: id, unchecked_rmse })
+    Ok(CheckedArchive { study: id, unchecked_rmse })
 }
 
 /// Checks a definition against its stored name and hash.
