@@ -3,6 +3,7 @@
 mod answers;
 mod recommended_walker;
 mod time_left;
+mod transitions;
 mod trials_table;
 mod without_gait;
 
@@ -10,6 +11,8 @@ use self::answers::{AnswerRow, answers};
 pub(super) use self::answers::{answer_in_words, assessment_in_words};
 use self::recommended_walker::RecommendedGait;
 use self::time_left::time_left;
+pub(super) use self::transitions::post;
+use self::transitions::{ActButton, acts_for_pages, button};
 use self::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use self::without_gait::WithoutGait;
 use super::certainty::certainty;
@@ -17,7 +20,7 @@ use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extractors::{Form, Params};
+use crate::extractors::Params;
 use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
 use crate::format::{self, Bound, words};
 use crate::page_error::{PageError, PageResult, page};
@@ -25,12 +28,12 @@ use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
-use axum::response::{IntoResponse, Redirect, Response};
+use axum::response::{IntoResponse, Response};
 use gait_learner::LearnerError;
 use gaitwright_charts::Figure;
 use gaitwright_charts::gait_charts;
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
+use gaitwright_service::access::{Administer, Caller, Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
 use gaitwright_service::studies::certified_best::{self, CertificateState, Judged};
@@ -39,9 +42,8 @@ use gaitwright_service::studies::execution;
 use gaitwright_service::studies::lifecycle::{StudyTransition, acts_of_people};
 use gaitwright_service::studies::safety_reports::Closed;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::study_change::{self, Extend};
+use gaitwright_service::studies::study_change::Extend;
 use gaitwright_service::studies::trial_choice::MANY;
-use gaitwright_service::studies::{command, lifecycle};
 use gaitwright_service::workers::Track;
 use gaitwright_store::assessments::{self};
 use gaitwright_store::devices::{self, Device};
@@ -51,10 +53,9 @@ use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
 use gaitwright_store::{
-    Instant, LabSessionId, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, lab_sessions,
+    Instant, LabSessionId, StudyId, TrialId, consents, events, explanations, gaits, jobs, lab_sessions,
     reference_gaits, studies, trials,
 };
-use serde::Deserialize;
 use std::sync::Arc;
 
 #[derive(Template)]
@@ -151,11 +152,6 @@ impl Live {
     fn is_unsafe(&self, row: &TrialRow) -> bool {
         self.unsafe_gaits.iter().any(|gait| gait.id == row.id)
     }
-}
-
-struct ActButton {
-    act: &'static str,
-    label: &'static str,
 }
 
 struct RunningRow {
@@ -284,66 +280,6 @@ pub(super) async fn running(
     let trial = trials::get(&mut *app.read().await?, id).await?;
     let Some(track) = app.scheduler.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
     Ok(page(&RunningPage { row: running_row(&trial, Some(&track)) })?.into_response())
-}
-
-/// The form of a button.
-#[derive(Debug, Deserialize)]
-pub(super) struct Do {
-    act: String,
-    /// The new total number of trials, for an extension.
-    #[serde(default)]
-    trial_budget: String,
-}
-
-/// `POST /studies/{id}/do`.
-pub(super) async fn post(
-    authorized: Authorized<Run>,
-    State(app): State<AppState>,
-    Id(id, _): Id<StudyId, Run>,
-    Form(form): Form<Do>,
-) -> Result<Redirect, PageError> {
-    let act = lifecycle::StudyTransition::ALL
-        .into_iter()
-        .find(|act| act.as_str() == form.act && acts_for_pages(*act))
-        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop or extend"))?;
-    let mut writer = app.write().await?;
-    let cancelled = if act == StudyTransition::Extend {
-        let refused =
-            || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
-        let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
-        study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
-        Vec::new()
-    } else {
-        command::act(&mut writer, &authorized.caller.actor, id, act, "").await?.cancelled
-    };
-    commit(writer).await?;
-    for trial in cancelled {
-        app.scheduler.cancel_solve(trial).await;
-    }
-    app.scheduler.changed();
-    Ok(Redirect::to(&format!("/studies/{id}")))
-}
-
-/// Whether the page has a button for it.
-fn acts_for_pages(act: StudyTransition) -> bool {
-    matches!(
-        act,
-        StudyTransition::Start
-            | StudyTransition::Pause
-            | StudyTransition::Resume
-            | StudyTransition::Stop
-            | StudyTransition::Extend
-    )
-}
-
-/// Acts that need no confirmation.
-fn button(act: StudyTransition) -> Option<ActButton> {
-    match act {
-        StudyTransition::Start => Some(ActButton { act: "start", label: "Start" }),
-        StudyTransition::Pause => Some(ActButton { act: "pause", label: "Pause" }),
-        StudyTransition::Resume => Some(ActButton { act: "resume", label: "Resume" }),
-        _ => None,
-    }
 }
 
 async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: TrialsQuery) -> Result<Live, Error> {
