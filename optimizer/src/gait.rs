@@ -7,8 +7,14 @@ use crate::subject::Subject;
 use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};
 
+mod kept_clearance;
 pub(crate) mod motion;
+mod phase_progress;
+pub mod stick_figure;
 mod validation;
+
+pub use kept_clearance::kept_clearance_m;
+pub use phase_progress::{PhaseProgress, progress, progress_error_m};
 
 /// Version of the layout of [`Gait`].
 pub(crate) const FORMAT_VERSION: u32 = 1;

@@ -4,14 +4,10 @@ pub mod bezier;
 pub mod domain;
 mod foot_clearance;
 pub mod impact;
-pub mod phase;
-mod progress;
-pub mod stick_figure;
+pub mod phase_variable;
 
 pub use bezier::{BEZIER_COEFFICIENTS, BEZIER_DEGREE, basis};
 pub use domain::{CYCLE, ContactRow, Domain, DomainKind};
 pub(crate) use foot_clearance::clearance_profile;
-pub use foot_clearance::kept_clearance_m;
 pub use impact::{Impact, impact, kinetic_energy};
-pub use phase::phase_gradient;
-pub use progress::{PhaseProgress, progress, progress_error_m};
+pub use phase_variable::phase_gradient;

@@ -91,7 +91,7 @@ fn each_violated_limit_is_detected() {
     let changes: [(&str, Change); 6] = [
         ("C3 friction cone of heel strikes", |gait| gait.settings.limits.impact_friction = 0.1),
         ("C3 impulses beyond their limit", |gait| gait.settings.limits.impulse_max_n_s = 10.0),
-        ("C4 forward hip velocity in SS1", |gait| gait.settings.limits.phase_rate_min_m_s = 1.0),
+        ("C3 forward hip velocity in SS1", |gait| gait.settings.limits.phase_rate_min_m_s = 1.0),
         ("C5-C8 activations, fibre lengths", |gait| gait.settings.limits.fibre_length_min = 0.7),
         ("C3 load of contacts before they lift off", |gait| gait.settings.naturalness.trailing_load_share = 0.5),
         ("C3 load of contacts before they lift off", |gait| gait.settings.limits.liftoff_force_n = 200.0),

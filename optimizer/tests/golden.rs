@@ -5,9 +5,10 @@
 mod golden_gaits;
 
 use gait_optimizer::activation_alternations::activation_alternations;
+use gait_optimizer::gait::{kept_clearance_m, progress};
 use gait_optimizer::gait_problem::gait_of;
 use gait_optimizer::gait_rmse::gait_rmse;
-use gait_optimizer::walking::{CYCLE, kept_clearance_m, progress};
+use gait_optimizer::walking::CYCLE;
 use gait_optimizer::{
     CancelToken, GaitProblem, GaitSettings, InitialGuess, SolveOptions, SolveStatus, Subject, solve_from_guesses,
 };

@@ -1,4 +1,4 @@
-//! Exact error messages of malformed recordings. `cargo test -p gait-optimizer --test malformed_recordings --
+//! Exact error messages of malformed recordings. `cargo test --workspace --locked --test malformed_recordings --
 //! --nocapture` prints them as a table.
 
 #![allow(clippy::unwrap_used)]

@@ -5,9 +5,9 @@
 use gait_optimizer::body::{Axis, Side};
 use gait_optimizer::certificate::certify;
 use gait_optimizer::explanation::explain;
+use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::settings::Naturalness;
 use gait_optimizer::solve::StartedFrom;
-use gait_optimizer::walking::progress_error_m;
 use gait_optimizer::{
     CancelToken, Gait, GaitFigures, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject,
     TunedBounds, WarmStart, solve,

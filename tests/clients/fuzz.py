@@ -69,9 +69,9 @@ for gait in (trial, other, third):
         time.sleep(0.5)
 answer = {"trial_a": trial, "trial_b": other, "answer": "a"}
 preference = call("POST", f"{v1}/studies/{study}/preferences", answer)["id"]
-noted = {"first": other, "second": third, "answer": "cannot_tell"}
+noted = {"trial_a": other, "trial_b": third, "answer": "cannot_tell"}
 assessment = call("POST", f"{v1}/studies/{study}/assessments", noted)["id"]
-session = call("POST", f"{v1}/studies/{study}/lab-sessions", {"gait_one": trial, "gait_two": other})["id"]
+session = call("POST", f"{v1}/studies/{study}/lab-sessions", {"trial_a": trial, "trial_b": other})["id"]
 backup = call("POST", f"{v1}/backups")["id"]
 device = call("GET", f"{v1}/devices")["items"][0]["id"]
 reference = call("GET", f"{v1}/reference-gaits")["items"][0]["id"]

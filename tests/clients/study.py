@@ -20,7 +20,7 @@ from gaitwright_client.api.studies import (
     get_recommendation,
     get_study,
     get_study_archive,
-    get_study_history,
+    list_study_history,
 )
 from gaitwright_client.api.subjects import create_subject, get_subject
 from gaitwright_client.api.trials import get_certificate, list_trials, request_certificate
@@ -111,7 +111,7 @@ def by_script(client: Client, subject: UUID) -> None:
     new = NewStudy(subject_id=subject, name="python", evaluation=Evaluation.SCRIPT, trial_budget=BUDGET)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new))
     while True:
-        asked = ask_for_trial.sync_detailed(study.id, client=client, body=Ask(worker="treadmill"))
+        asked = ask_for_trial.sync_detailed(study.id, client=client, body=Ask(script="treadmill"))
         if asked.status_code == HTTPStatus.CONFLICT:
             break
         trial = given(Trial, asked.parsed)
@@ -124,7 +124,7 @@ def by_script(client: Client, subject: UUID) -> None:
         given(Trial, tell_outcome.sync(trial.id, client=client, body=told))
     trials = trials_of(client, study.id)
     assert [trial.number for trial in trials] == list(range(1, BUDGET + 1)), trials
-    best = given(MilestonePage, get_study_history.sync(study.id, client=client)).items[-1]
+    best = given(MilestonePage, list_study_history.sync(study.id, client=client)).items[-1]
     wait_until(client, study.id, StudyState.FINISHED)
     print(f"python: {len(trials)} trials, best: trial {best.number}, {best.gait_rmse_rad:.4f} rad")
 

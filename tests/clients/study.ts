@@ -79,7 +79,7 @@ async function byScript(subject_id: string): Promise<void> {
   for (;;) {
     const asked = await client.POST("/api/v1/studies/{id}/ask", {
       params: { path: { id } },
-      body: { worker: "treadmill" },
+      body: { script: "treadmill" },
     });
     if (asked.response.status === 409) break;
     const trial = given(asked);

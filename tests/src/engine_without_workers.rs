@@ -1,7 +1,8 @@
 //! An engine without workers: it accepts jobs and starts none.
 
 use futures_util::future::BoxFuture;
-use gaitwright_service::workers::{Assignment, Attempt, Dispatch, DispatchError, News};
+use gaitwright_service::dispatch_error::DispatchError;
+use gaitwright_service::workers::{Assignment, Attempt, Dispatch, News};
 use gaitwright_store::TrialId;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

@@ -3,8 +3,8 @@
 use gaitwright_store::{LabSessionId, Store, StudyId, TrialId};
 use sqlx::Row;
 
-/// Whether walk 2 of a session is with gait one.
-pub async fn gait_one_first(store: &Store, session: LabSessionId) -> bool {
+/// Whether walk 2 of a session is with gait A.
+pub async fn gait_a_first(store: &Store, session: LabSessionId) -> bool {
     let row = sqlx::query("select gait_one_first from lab_allocations where session_id = ?").bind(session);
     row.fetch_one(&mut **store.read().await.unwrap()).await.unwrap().get(0)
 }

@@ -7,7 +7,7 @@ use serde_json::json;
 
 /// Asks for a trial of a study and reports that it converged.
 pub async fn trial(service: &Service, study: StudyId) -> Trial {
-    let asked = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({"worker": "rig"})).await;
+    let asked = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({"script": "rig"})).await;
     assert!(asked.status.is_success(), "{}", asked.text);
     let id = asked.json()["id"].as_str().unwrap().to_owned();
     let told = json!({"outcome": "converged", "gait_rmse_rad": 0.5});

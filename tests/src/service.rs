@@ -17,7 +17,7 @@ use gaitwright_service::workers::{AfterSolves, Certify, Dispatch, Evaluate, Expl
 use gaitwright_store::audit::Actor;
 use gaitwright_store::certificates::{self, CertificateOnRecord};
 use gaitwright_store::feedback::FeedbackRow;
-use gaitwright_store::studies::{Chosen, Study, StudyState};
+use gaitwright_store::studies::{Study, StudyFilter, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{
     ReferenceGaitId, Store, StudyId, SubjectId, commit, feedback, reference_gaits, studies, subjects, trials,
@@ -335,7 +335,7 @@ impl Service {
 async fn pass_every_gait(store: &Store) -> bool {
     let Ok(mut reader) = store.read().await else { return false };
     let mut waiting = Vec::new();
-    for study in studies::page(&mut reader, Reach::Every, Chosen::newest(1000)).await.unwrap() {
+    for study in studies::page(&mut reader, Reach::Every, &StudyFilter::newest(1000)).await.unwrap() {
         let found = certificates::of_study(&mut reader, study.id).await.unwrap();
         waiting.extend(found.into_iter().filter(|(_, found)| *found == CertificateOnRecord::NotCertified));
     }

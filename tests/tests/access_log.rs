@@ -256,7 +256,7 @@ async fn every_spelling_of_an_identifier_every_refused_form_and_every_second_sub
         assert_eq!(found, expected, "{path}");
     }
     let before = rows(&service).await.len();
-    let refused = service.post_text(&format!("/studies/{second}/lab"), FORM, "gait_one=x&gait_two=y").await;
+    let refused = service.post_text(&format!("/studies/{second}/lab"), FORM, "trial_a=x&trial_b=y").await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
     let all = rows(&service).await;
     assert_eq!(all.len(), before + 1);

@@ -17,7 +17,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, signed_in, token};
 use gaitwright_tests::consistent_gaits::Consistent;
-use gaitwright_tests::read_allocations::{gait_one_first, sides};
+use gaitwright_tests::read_allocations::{gait_a_first, sides};
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::skipped::skipped;
 use gaitwright_tests::sources;
@@ -101,7 +101,7 @@ async fn one_service() -> (TempDir, Service) {
 }
 
 fn session_of((study, one, two): (StudyId, TrialId, TrialId)) -> (StudyId, NewLabSession) {
-    (study, NewLabSession { gait_one: one, gait_two: two, notes: String::new() })
+    (study, NewLabSession { trial_a: one, trial_b: two, notes: String::new() })
 }
 
 /// Plans a session of each study, and unblinds it before the next one is planned: the orders.
@@ -111,7 +111,7 @@ async fn planned_in_turn(writer: &mut Writer, studies: &[(StudyId, TrialId, Tria
         let (study, new) = session_of(planned);
         let session = lab::plan(writer, &Actor::program(), study, &new).await.unwrap();
         let unblinded = lab::unblind(writer, &Actor::program(), session.id, "walked").await.unwrap();
-        orders.push(unblinded.allocation.gait_one_first.unwrap());
+        orders.push(unblinded.allocation.gait_a_first.unwrap());
     }
     orders
 }
@@ -178,7 +178,7 @@ async fn allocations_of_10_000_sessions_are_balanced_in_any_order_of_unblinding(
     let mut coins = Vec::new();
     for id in concealed {
         let unblinded = lab::unblind(&mut writer, &Actor::program(), id, "walked").await.unwrap();
-        coins.push(unblinded.allocation.gait_one_first.unwrap());
+        coins.push(unblinded.allocation.gait_a_first.unwrap());
     }
     drop(writer);
     let ones = |orders: &[bool]| orders.iter().filter(|first| **first).count();
@@ -207,7 +207,7 @@ async fn unblinded_session_reveals_nothing_about_a_concealed_one() {
         let mut orders = Vec::new();
         for id in &planned {
             let unblinded = lab::unblind(&mut writer, &Actor::program(), *id, "walked").await.unwrap();
-            orders.push(unblinded.allocation.gait_one_first.unwrap());
+            orders.push(unblinded.allocation.gait_a_first.unwrap());
         }
         opposite += usize::from(orders[0] != orders[1]);
         // The order that would even out the other three.
@@ -236,7 +236,7 @@ async fn sides_of_10_000_pairs_are_balanced_and_independent_of_earlier_pairs() {
             kind: Kind::New,
             pair: (trials[1].id, trials[0].id),
             repeats: None,
-            unblinded: false,
+            could_have_known: false,
         };
         let id = presentations::insert(&mut writer, &new).await.unwrap();
         allocations::of_pair(&mut writer, id, None, Lot::draw().unwrap()).await.unwrap();
@@ -262,9 +262,9 @@ async fn allocations_do_not_depend_on_the_seed() {
     for _ in 0..24 {
         // Seed 1, as every study by default.
         let (study, trials) = finished(&service).await;
-        let body = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+        let body = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
         let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &body).await.json();
-        first_sessions.push(gait_one_first(&service.store, planned["id"].as_str().unwrap().parse().unwrap()).await);
+        first_sessions.push(gait_a_first(&service.store, planned["id"].as_str().unwrap().parse().unwrap()).await);
     }
     // Each of the two uniform outcomes of 24 coins has a probability of 1 in 17 million.
     let ones = first_sessions.iter().filter(|first| **first).count();
@@ -360,7 +360,7 @@ async fn program_that_reads_everything_else_guesses_1_000_allocations_at_chance(
     }
     let mut truth = Vec::new();
     for id in &ids {
-        truth.push(gait_one_first(&service.store, *id).await);
+        truth.push(gait_a_first(&service.store, *id).await);
     }
     let seen = Seen::of(&service.store).await;
     assert_eq!(seen.tables["lab_sessions"].len(), 1000);
@@ -578,7 +578,7 @@ async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() 
     }
     let mut sessions = Vec::new();
     for answer in ["first", "unsafe_second"] {
-        let plan = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+        let plan = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
         let path = format!("/api/v1/studies/{study}/lab-sessions");
         let planned = post(&service, &callers[1], &path, &plan).await;
         let id = planned.json()["id"].as_str().unwrap().to_owned();
@@ -625,7 +625,7 @@ async fn archive_omits_concealed_allocations_and_a_session_without_one_cannot_be
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let (study, trials) = finished(&service).await;
-    let body = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let body = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
     let mut ids: Vec<LabSessionId> = Vec::new();
     for _ in 0..2 {
         let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &body).await.json();
@@ -634,7 +634,7 @@ async fn archive_omits_concealed_allocations_and_a_session_without_one_cannot_be
     let unblind = format!("/api/v1/lab-sessions/{}/unblind", ids[0]);
     assert_eq!(service.post(&unblind, &json!({"reason": "walked"})).await.status, StatusCode::OK);
     let file = exported(&service.store, study).await;
-    let first = gait_one_first(&service.store, ids[0]).await;
+    let first = gait_a_first(&service.store, ids[0]).await;
     service.stop().await;
 
     let other = folder.path().join("b.db");
@@ -642,9 +642,9 @@ async fn archive_omits_concealed_allocations_and_a_session_without_one_cannot_be
     import(&store, &file).await.unwrap();
     let mut reader = store.read().await.unwrap();
     let of = async |reader: &mut Connection, id| lab_sessions::get(reader, id).await.unwrap().allocation;
-    assert_eq!(of(&mut reader, ids[0]).await.gait_one_first, Some(first));
+    assert_eq!(of(&mut reader, ids[0]).await.gait_a_first, Some(first));
     let blind = of(&mut reader, ids[1]).await;
-    assert_eq!((blind.included, blind.gait_one_first), (false, None));
+    assert_eq!((blind.included, blind.gait_a_first), (false, None));
     drop(reader);
     let device = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
     let mut writer = store.write().await.unwrap();
@@ -672,7 +672,7 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_d
     let clinician = signed_in(&service, Role::Clinician).await;
     let (device, reader) =
         (token(&service, &[Right::Device]).await, token(&service, &[Right::Device, Right::Rate]).await);
-    let plan = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let plan = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
     let path = format!("/api/v1/studies/{study}/lab-sessions");
     let id = post(&service, &clinician, &path, &plan).await.json()["id"].as_str().unwrap().to_owned();
     let mut writer = service.store.write().await.unwrap();
@@ -684,7 +684,7 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_d
     let gait = lab::for_device(&mut writer, &device_caller, row, 2).await.unwrap();
     let other = lab::for_device(&mut writer, &reading_caller, row, 3).await.unwrap();
     commit(writer).await.unwrap();
-    assert_eq!(gait == lab::GaitOfWalk::One, gait_one_first(&service.store, row).await);
+    assert_eq!(gait == lab::GaitOfWalk::A, gait_a_first(&service.store, row).await);
     assert_ne!(gait, other, "walk 3 is with the other gait");
 
     let session = get(&service, &clinician, &format!("/api/v1/lab-sessions/{id}")).await.json();
@@ -726,7 +726,7 @@ async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
     let script = gaitwright_service::access::Caller::token(TokenId::fresh(), "script", &[Right::Device, Right::Read]);
     let device = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
     for (fetched_by, could_have_known) in [(&script, true), (&device, false)] {
-        let new = NewLabSession { gait_one: trials[0].id, gait_two: trials[1].id, notes: String::new() };
+        let new = NewLabSession { trial_a: trials[0].id, trial_b: trials[1].id, notes: String::new() };
         let mut writer = service.store.write().await.unwrap();
         let id = lab::plan(&mut writer, &Actor::program(), study, &new).await.unwrap().id;
         lab::for_device(&mut writer, fetched_by, id, 2).await.unwrap();
@@ -751,7 +751,7 @@ async fn answers_of_a_person_who_fetched_a_controller_file_are_recorded_as_not_b
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = post(&service, &program, &next, &json!({})).await.json()["pair"].clone();
     let drawn = sides(&service.store, study).await;
-    let plan = NewLabSession { gait_one: drawn[0].0, gait_two: drawn[0].1, notes: String::new() };
+    let plan = NewLabSession { trial_a: drawn[0].0, trial_b: drawn[0].1, notes: String::new() };
     let mut writer = service.store.write().await.unwrap();
     let session = lab::plan(&mut writer, &Actor::program(), study, &plan).await.unwrap();
     let caller =
@@ -761,7 +761,7 @@ async fn answers_of_a_person_who_fetched_a_controller_file_are_recorded_as_not_b
     let path = format!("/rate/pair/{}", pair["token"].as_str().unwrap());
     let said = send(&service, &program, &Method::POST, &path, FORM, "answer=first").await;
     assert!(said.status.is_redirection(), "{}", said.text);
-    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
+    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
     service.stop().await;
 }
 
@@ -769,7 +769,7 @@ async fn answers_of_a_person_who_fetched_a_controller_file_are_recorded_as_not_b
 async fn refused_controller_file_does_not_reveal_which_gait_is_unsafe() {
     let (_folder, service) = one_service().await;
     let (study, trials) = finished(&service).await;
-    let plan = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let plan = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
     let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await.json();
     let file = |walk| format!("/api/v1/lab-sessions/{}/controller.json?walk={walk}", planned["id"].as_str().unwrap());
     let (two, three) = (service.fetch(&file(2)).await, service.fetch(&file(3)).await);

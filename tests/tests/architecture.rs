@@ -18,14 +18,37 @@ const CRATES: [&str; 9] = [
     "server/src",
 ];
 
-/// Crates, and folders of them whose files must not import from other folders of the same crate.
-const WALLS: [(&str, &str, &[&str]); 6] = [
+/// Crates, and folders and files of them, with what these must not import from the same crate: ARCHITECTURE.md draws the
+/// arrows.
+const WALLS: [(&str, &str, &[&str]); 16] = [
     ("server/http/src", "api/", &["pages/"]),
     ("server/http/src", "pages/", &["api/"]),
     ("server/http/src", "figures/", &["api/", "pages/"]),
+    ("server/http/src", "format.rs", &["api/", "pages/", "figures/"]),
     ("server/service/src", "access/", &["studies/", "workers/"]),
     ("server/service/src", "workers/", &["access/", "studies/"]),
-    ("optimizer/src", "body/", &["gait_problem/", "solve/", "certificate/", "execution/"]),
+    ("server/service/src", "error.rs", &["access/", "studies/", "workers/"]),
+    (
+        "learner/src",
+        "inference/",
+        &["gaussian_process", "posterior", "acquisition/", "learner.rs", "propose", "comparisons"],
+    ),
+    ("learner/src", "posterior", &["acquisition/", "learner.rs", "propose", "comparisons"]),
+    ("learner/src", "acquisition/", &["propose", "comparisons"]),
+    ("optimizer/src", "body/", &["walking", "gait", "solve", "certificate", "execution"]),
+    ("optimizer/src", "walking/", &["gait", "solve", "certificate", "execution"]),
+    ("optimizer/src", "gait/", &["gait_problem", "initial_guess", "solve", "certificate", "execution"]),
+    (
+        "optimizer/src",
+        "gait_problem/",
+        &["initial_guess", "solve", "explanation", "sensitivity", "certificate", "execution"],
+    ),
+    (
+        "optimizer/src",
+        "certificate/",
+        &["gait_problem", "initial_guess", "solve", "explanation", "sensitivity", "execution"],
+    ),
+    ("optimizer/src", "solve/", &["explanation", "sensitivity", "certificate", "execution"]),
 ];
 
 #[test]
@@ -42,7 +65,7 @@ fn modules_do_not_import_across_the_walls_of_the_architecture() {
     for (crate_folder, folder, forbidden) in WALLS {
         let imports = imports::of_crate(&sources::below(crate_folder));
         let behind: Vec<_> = imports.iter().filter(|(file, _)| file.starts_with(folder)).collect();
-        assert!(behind.len() > 3, "{crate_folder}/{folder} has moved");
+        assert!(!behind.is_empty(), "{crate_folder}/{folder} has moved");
         for (file, others) in behind {
             let crossed = others.iter().find(|other| forbidden.iter().any(|folder| other.starts_with(folder)));
             assert_eq!(crossed, None, "{file}");

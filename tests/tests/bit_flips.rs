@@ -1,8 +1,8 @@
 //! `audit verify` detects single flipped bits of a record on the disk.
 //!
 //! A flip counts when it changes what a reader finds: a row of any table, the schema, or whether the file can be read.
-//! Bits without effect (free space of pages, counters of the header) are skipped. `GAITWRIGHT_FLIPS=200 cargo test -p
-//! gaitwright-tests --test bit_flips -- --nocapture` flips more bits.
+//! Bits without effect (free space of pages, counters of the header) are skipped.
+//! `GAITWRIGHT_FLIPS=200 cargo test --workspace --locked --test bit_flips -- --nocapture` flips more bits.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

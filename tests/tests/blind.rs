@@ -141,7 +141,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let feedback = service.feedback(study).await;
     let heard: Vec<_> = feedback.iter().filter(|row| row.by_rater).collect();
     assert_eq!(heard.len(), shown.len());
-    assert!(heard.iter().all(|row| !row.unblinded), "a rater who may not read answers blindly");
+    assert!(heard.iter().all(|row| !row.could_have_known), "a rater who may not read answers blindly");
     let repeats = shown.iter().filter(|p| p.kind == Kind::Repeat).count();
     assert!(repeats > 0 && shown.iter().all(|p| p.kind != Kind::Null), "{repeats} repeats of {}", shown.len());
 
@@ -150,7 +150,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     assert_eq!(before[0]["first_preferred"], Value::Null, "before unblinding it would tell the order of pairs");
     assert_eq!(before[0]["repeats_agree"]["of"], json!(repeats));
     let unblind = json!({"rater": "a rater", "reason": "the study has ended"}).to_string();
-    let path = format!("/api/v1/studies/{study}/unblind");
+    let path = format!("/api/v1/studies/{study}/raters/unblind");
     let told = send(&service, &admin, &Method::POST, &path, "application/json", &unblind).await;
     assert_eq!(told.status, StatusCode::OK, "{}", told.text);
     let after = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
@@ -266,10 +266,11 @@ async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() 
         let said = send(&service, who, &Method::POST, &path, "application/json", "{\"answer\": \"second\"}").await;
         assert_eq!(said.status, StatusCode::OK, "{}", said.text);
         let heard = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
-        assert_eq!(heard.unblinded, unblinded, "{who:?}");
+        assert_eq!(heard.could_have_known, unblinded, "{who:?}");
     }
     let figures = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
-    let marked: Vec<_> = figures.items().as_array().unwrap().iter().map(|rater| rater["unblinded"].clone()).collect();
+    let marked: Vec<_> =
+        figures.items().as_array().unwrap().iter().map(|rater| rater["could_have_known"].clone()).collect();
     assert_eq!(marked, [json!(1), json!(1), json!(1), json!(0)], "by name: {}", figures.text);
     service.stop().await;
 }
@@ -296,7 +297,7 @@ async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
     }
     let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, "application/json", "{\"answer\": \"first\"}").await;
-    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
+    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
     service.stop().await;
 }
 
@@ -310,10 +311,10 @@ async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, json_of, "{}").await.json()["pair"].clone();
     let unblind = json!({"rater": "a rater", "reason": "adverse event"}).to_string();
-    send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/unblind"), json_of, &unblind).await;
+    send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/raters/unblind"), json_of, &unblind).await;
     let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, json_of, "{\"answer\": \"first\"}").await;
-    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
+    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
     service.stop().await;
 }
 
@@ -372,7 +373,7 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let pair = post(&rater, &next, json!({})).await.json()["pair"].clone();
     let token = pair["token"].as_str().unwrap();
     post(&rater, &format!("/api/v1/blind-pairs/{token}/answer"), json!({"answer": "second"})).await;
-    let path = format!("/api/v1/studies/{study}/unblind");
+    let path = format!("/api/v1/studies/{study}/raters/unblind");
     let refused = post(&admin, &path, json!({"rater": "a rater", "reason": " "})).await;
     assert_eq!(refused.json()["field"], "reason");
     let unknown = post(&admin, &path, json!({"rater": "nobody", "reason": "r"})).await;
@@ -390,7 +391,7 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
         }
     }
     let shown = shown(&service, study).await;
-    assert_eq!(shown.iter().map(|p| p.unblinded).collect::<Vec<_>>(), [false, true]);
+    assert_eq!(shown.iter().map(|p| p.could_have_known).collect::<Vec<_>>(), [false, true]);
     service.stop().await;
 }
 

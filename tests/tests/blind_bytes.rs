@@ -102,7 +102,7 @@ async fn no_address_reveals_rated_gaits_to_a_rater() {
     let clinician = signed_in(&service, Role::Clinician).await;
     let gaits: Vec<_> =
         service.trials(automatic).await.into_iter().filter(|trial| trial.state == TrialState::Converged).collect();
-    let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id, "notes": "treadmill"});
+    let plan = json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id, "notes": "treadmill"});
     let session = post(&service, &clinician, &format!("/api/v1/studies/{automatic}/lab-sessions"), &plan).await.json();
     let rater = rater_of(&service, &[automatic, study]).await;
     let program = token(&service, &[Right::Rate]).await;

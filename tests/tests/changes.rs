@@ -128,14 +128,14 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let given = scene.one(done, "post /studies/{id}/preferences", &give, answer).await;
     let retract = format!("{api}/preferences/{}/retract", text(&given["id"]));
     scene.one(done, "post /preferences/{id}/retract", &retract, json!({"reason": "r"})).await;
-    let unclear = json!({"first": trials[0].id, "second": trials[1].id, "answer": "cannot_tell"});
+    let unclear = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "cannot_tell"});
     let made = format!("{api}/studies/{finished}/assessments");
     let made = scene.one(done, "post /studies/{id}/assessments", &made, unclear).await;
     let retract = format!("{api}/assessments/{}/retract", text(&made["id"]));
     scene.one(done, "post /assessments/{id}/retract", &retract, json!({"reason": "r"})).await;
     let report = format!("{api}/trials/{}/safety-reports", trials[0].id);
     scene.one(done, "post /trials/{id}/safety-reports", &report, json!({"note": "stumbled"})).await;
-    let again = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_both"});
+    let again = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "unsafe_both"});
     service.post(&format!("{api}/studies/{finished}/assessments"), &again).await;
     for (trial, decision) in [(&trials[0], "walkable"), (&trials[1], "unsafe"), (&trials[1], "walkable")] {
         let review = format!("{api}/trials/{}/safety-reviews", trial.id);
@@ -157,7 +157,9 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let say = format!("{api}/blind-pairs/{}/answer", text(&pair["pair"]["token"]));
     scene.one(done, "post /blind-pairs/{token}/answer", &say, json!({"answer": "first"})).await;
     let unblind = json!({"rater": "not signed in", "reason": "r"});
-    scene.one(done, "post /studies/{id}/unblind", &format!("{api}/studies/{human}/unblind"), unblind).await;
+    scene
+        .one(done, "post /studies/{id}/raters/unblind", &format!("{api}/studies/{human}/raters/unblind"), unblind)
+        .await;
 
     let user = json!({"name": "Ada", "role": "clinician"});
     let user = scene.one(done, "post /users", &format!("{api}/users"), user).await;
@@ -204,7 +206,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     scene.one(done, "post /reference-gaits", &format!("{api}/reference-gaits"), reference).await;
 
     let plan = format!("{api}/studies/{finished}/lab-sessions");
-    let pair = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let pair = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
     let session = scene.one(done, "post /studies/{id}/lab-sessions", &plan, pair).await;
     let session = format!("{api}/lab-sessions/{}", text(&session["id"]));
     scene.one(done, "post /lab-sessions/{id}/walks", &format!("{session}/walks"), json!({"walk": 1})).await;

@@ -42,14 +42,14 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let empty = service.post(&format!("{of_subject}/withdraw"), &json!({"reason": " "})).await;
     assert_eq!(empty.status, StatusCode::UNPROCESSABLE_ENTITY);
     let converged = service.trials(finished).await;
-    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
+    let gaits = json!({"trial_a": converged[0].id, "trial_b": converged[1].id});
     let session = service.post(&format!("/api/v1/studies/{finished}/lab-sessions"), &gaits).await.json();
     let session = session["id"].as_str().unwrap().to_owned();
     service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
     let measured = json!({"walk": 1, "recording": motion()});
     let recording = service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &measured).await;
     assert_eq!(recording.status, StatusCode::CREATED, "{}", recording.text);
-    let remark = json!({"first": converged[0].id, "second": converged[1].id, "answer": "cannot_tell"});
+    let remark = json!({"trial_a": converged[0].id, "trial_b": converged[1].id, "answer": "cannot_tell"});
     let remark = service.post(&format!("/api/v1/studies/{finished}/assessments"), &remark).await.json();
     let remark = remark["id"].as_str().unwrap().to_owned();
     let best = converged.iter().filter_map(|trial| trial.gait_rmse_rad).fold(f64::INFINITY, f64::min);
@@ -95,7 +95,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/lab-sessions/{session}/retract-answer"), json!({})),
         (
             format!("/api/v1/studies/{finished}/assessments"),
-            json!({"first": trials[0].id, "second": trials[1].id, "answer": "cannot_tell"}),
+            json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "cannot_tell"}),
         ),
         (format!("/api/v1/assessments/{remark}/retract"), json!({"reason": "r"})),
         (format!("/api/v1/lab-sessions/{session}/close"), json!({})),
@@ -158,7 +158,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/trials/{}/certificate", trials[0].id), json!({})),
         (format!("/api/v1/trials/{}/explanation", trials[0].id), json!({})),
         (format!("/api/v1/trials/{}/execution-report", trials[0].id), json!({})),
-        (format!("/api/v1/studies/{human}/unblind"), json!({"rater": "not signed in", "reason": "r"})),
+        (format!("/api/v1/studies/{human}/raters/unblind"), json!({"rater": "not signed in", "reason": "r"})),
         (format!("/api/v1/preferences/{heard_id}/retract"), json!({"reason": "r"})),
     ] {
         let refused = service.post(&path, &body).await;

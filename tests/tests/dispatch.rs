@@ -5,8 +5,9 @@
 
 use axum::http::StatusCode;
 use futures_util::future::BoxFuture;
+use gaitwright_service::dispatch_error::DispatchError;
 use gaitwright_service::workers::nats::JetStream;
-use gaitwright_service::workers::{Assignment, Dispatch, DispatchError, InProcess, News, Receipt};
+use gaitwright_service::workers::{Assignment, Dispatch, InProcess, News, Receipt};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;

@@ -228,7 +228,7 @@ impl Scene {
         let (first, second) = self.pair;
         match rule {
             Rule::Safety => {
-                let report = json!({"first": first, "second": self.equal, "answer": "unsafe_first", "author": "S"});
+                let report = json!({"trial_a": first, "trial_b": self.equal, "answer": "unsafe_a", "author": "S"});
                 self.post(&format!("/api/v1/studies/{}/assessments", self.study), &report).await;
                 (first, second)
             }
@@ -256,7 +256,7 @@ impl Scene {
 
     /// A session with the pair, after this number of walks.
     async fn session(&self, walks: u8) -> String {
-        let body = json!({"gait_one": self.pair.0, "gait_two": self.pair.1});
+        let body = json!({"trial_a": self.pair.0, "trial_b": self.pair.1});
         let planned = self.post(&format!("/api/v1/studies/{}/lab-sessions", self.study), &body).await.json();
         let id = planned["id"].as_str().unwrap().to_owned();
         for walk in 1..=walks {
@@ -281,7 +281,7 @@ async fn call(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session:
             service.post_text(&format!("/studies/{study}/compare"), FORM, &body).await
         }
         "post /api/v1/studies/{id}/assessments" => {
-            let body = json!({"first": a, "second": b, "answer": "cannot_tell", "author": "K"});
+            let body = json!({"trial_a": a, "trial_b": b, "answer": "cannot_tell", "author": "K"});
             service.post(&format!("/api/v1/studies/{study}/assessments"), &body).await
         }
         "post /api/v1/studies/{id}/suggestions" => {
@@ -291,12 +291,10 @@ async fn call(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session:
             service.post(&format!("/api/v1/studies/{study}/suggestions"), &body).await
         }
         "post /api/v1/studies/{id}/lab-sessions" => {
-            service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &json!({"gait_one": a, "gait_two": b})).await
+            service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &json!({"trial_a": a, "trial_b": b})).await
         }
         "post /studies/{id}/lab" => {
-            service
-                .post_text(&format!("/studies/{study}/lab"), FORM, &format!("gait_one={a}&gait_two={b}&notes="))
-                .await
+            service.post_text(&format!("/studies/{study}/lab"), FORM, &format!("trial_a={a}&trial_b={b}&notes=")).await
         }
         "post /api/v1/lab-sessions/{id}/walks" => {
             service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 2})).await
@@ -501,7 +499,7 @@ impl Rated {
             trials.iter().filter(|trial| trial.state == TrialState::Converged).map(|trial| trial.id).collect();
         match rule {
             Rule::Safety => {
-                let report = json!({"first": gaits[0], "second": gaits[1], "answer": "unsafe_both", "author": "S"});
+                let report = json!({"trial_a": gaits[0], "trial_b": gaits[1], "answer": "unsafe_both", "author": "S"});
                 self.service.post(&format!("/api/v1/studies/{}/assessments", self.study), &report).await;
             }
             Rule::Certificate => {
@@ -549,7 +547,7 @@ async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
         );
         let page = scene.service.post_text(&format!("/studies/{}/compare", scene.study), FORM, &form).await;
         assert!(!page.status.is_server_error(), "{}", page.text);
-        let note = json!({"first": a, "second": b, "answer": "cannot_tell"});
+        let note = json!({"trial_a": a, "trial_b": b, "answer": "cannot_tell"});
         let noted = scene.service.post(&format!("/api/v1/studies/{}/assessments", scene.study), &note).await;
         assert_eq!(noted.status, StatusCode::CONFLICT, "{}", noted.text);
         let bounds = scene.service.trials(scene.study).await.into_iter().find(|trial| trial.id == a).unwrap().action;

@@ -9,7 +9,7 @@ use gaitwright_service::access::Role;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::callers::{As, rater_of, send, service, signed_in};
-use gaitwright_tests::read_allocations::gait_one_first;
+use gaitwright_tests::read_allocations::gait_a_first;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -80,7 +80,7 @@ async fn event_streams_reveal_no_allocation_by_content_or_timing() {
     let mut looks = BTreeSet::new();
     let (mut until_event, mut until_answer, mut walks) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..SESSIONS {
-        let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id});
+        let plan = json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id});
         let planned = post(&service, &reader, &format!("/api/v1/studies/{study}/lab-sessions"), &plan).await.json();
         let id = planned["id"].as_str().unwrap();
         heard.lock().unwrap().clear();
@@ -103,7 +103,7 @@ async fn event_streams_reveal_no_allocation_by_content_or_timing() {
         };
         until_event.push(event.saturating_duration_since(asked));
         looks.insert(heard.lock().unwrap().iter().map(|(_, text)| masked(text)).collect::<String>());
-        truth.push(gait_one_first(&service.store, id.parse().unwrap()).await);
+        truth.push(gait_a_first(&service.store, id.parse().unwrap()).await);
     }
     assert_eq!(looks.len(), 1, "{looks:#?}");
     // Five standard deviations, which chance exceeds less than once in a million.

@@ -43,7 +43,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     }
     let trials = service.trials(studies[0]).await;
     let gaits: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
-    let pair = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id});
+    let pair = json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id});
     let session = service.post(&format!("/api/v1/studies/{}/lab-sessions", studies[0]), &pair).await.json();
     let session = session["id"].as_str().unwrap();
     service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;

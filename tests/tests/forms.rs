@@ -682,8 +682,12 @@ async fn study_is_renamed_tagged_found_and_archived() {
         [study, other].map(|id| page.contains(&format!("<a href=\"/studies/{id}\">")))
     };
     assert_eq!(lists("").await, [true, true]);
+    let rest = async |query: &str| {
+        let listed = service.fetch(&format!("/api/v1/studies{query}")).await.items();
+        [study, other].map(|id| listed.as_array().unwrap().iter().any(|found| found["id"] == id.to_string()))
+    };
     for query in ["?text=visit", "?text=SHOES", "?tag=pilot", "?text=treadm&state=finished"] {
-        assert_eq!(lists(query).await, [true, false], "{query}");
+        assert_eq!((lists(query).await, rest(query).await), ([true, false], [true, false]), "{query}");
     }
     assert_eq!(lists("?state=draft").await, [false, false]);
     assert_eq!(lists("?text=%25").await, [false, false], "no wildcard");
@@ -697,6 +701,7 @@ async fn study_is_renamed_tagged_found_and_archived() {
 
     assert_eq!(service.post_text(&details, FORM, "act=archive").await.status, StatusCode::SEE_OTHER);
     assert_eq!((lists("").await, lists("?archived=yes").await), ([false, true], [true, false]));
+    assert_eq!((rest("").await, rest("?archived=true").await), ([false, true], [true, false]));
     assert!(service.fetch(&format!("/studies/{study}")).await.status.is_success(), "it is still there");
     assert_eq!(service.post_text(&details, FORM, "act=restore").await.status, StatusCode::SEE_OTHER);
     assert_eq!(lists("").await, [true, true]);

@@ -15,7 +15,7 @@ use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::measured::{electromyogram, motion};
-use gaitwright_tests::read_allocations::gait_one_first;
+use gaitwright_tests::read_allocations::gait_a_first;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ fn converged(trials: &[Trial]) -> Vec<&Trial> {
 
 async fn planned(service: &Service, study: StudyId, trials: &[Trial]) -> Value {
     let gaits = converged(trials);
-    let body = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id, "notes": "treadmill"});
+    let body = json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id, "notes": "treadmill"});
     let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &body).await;
     assert_eq!(planned.status, StatusCode::CREATED, "{}", planned.text);
     planned.json()
@@ -86,8 +86,7 @@ async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     service.post(&format!("{api}/walks"), &json!({"walk": 3, "note": "tired"})).await;
     let told = service.fetch(&api).await.json();
     let row: LabSessionId = id(&session).parse().unwrap();
-    let drawn =
-        if gait_one_first(&service.store, row).await { ["gait_one", "gait_two"] } else { ["gait_two", "gait_one"] };
+    let drawn = if gait_a_first(&service.store, row).await { ["trial_a", "trial_b"] } else { ["trial_b", "trial_a"] };
     assert_eq!(conditions(&told), [json!("normal"), json!(drawn[0]), json!(drawn[1])]);
     let after: Vec<_> = told["walks"].as_array().unwrap().iter().map(|walk| &walk["after_unblinding"]).collect();
     assert_eq!(after, [&json!(false), &json!(false), &json!(true)]);
@@ -125,9 +124,7 @@ async fn lab_session_reveals_no_gait_before_unblinding() {
     }
     assert!(bytes.contains("Walk 1") && bytes.contains(id(&session)));
     let words = bytes.to_lowercase();
-    for word in
-        ["trial", "rmse", "gait_", "gait one", "gait two", "treadmill", "seed", "controller", &study.to_string()]
-    {
+    for word in ["trial", "rmse", "gait_", "gait A", "gait B", "treadmill", "seed", "controller", &study.to_string()] {
         assert!(!words.contains(word), "{word}");
     }
     for trial in &trials {
@@ -142,7 +139,7 @@ async fn lab_session_reveals_no_gait_before_unblinding() {
             service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
         }
         service.post(&format!("{lab}/answers"), &json!({"number": 1, "answer": "second"})).await;
-        let order = gait_one_first(&service.store, id(&session).parse().unwrap()).await;
+        let order = gait_a_first(&service.store, id(&session).parse().unwrap()).await;
         let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
         let code = &id(&session)[id(&session).len() - 8..];
         let page = page
@@ -186,8 +183,8 @@ async fn each_walk_gets_the_controller_file_of_its_own_gait() {
         assert!(none.text.contains("without the device"), "{}", none.text);
         let told = service.post(&format!("{api}/unblind"), &json!({"reason": "a test"})).await.json();
         let expected = [1, 2].map(|place| match told["walks"][place]["condition"].as_str() {
-            Some("gait_one") => one.clone(),
-            Some("gait_two") => two.clone(),
+            Some("trial_a") => one.clone(),
+            Some("trial_b") => two.clone(),
             other => panic!("{other:?}"),
         });
         assert!(sent == expected, "the order is {}", told["walks"]);
@@ -282,9 +279,9 @@ async fn unsafe_walk_excludes_both_gaits_until_unblinding() {
     let pair = json!({"trial_a": gaits[0].id, "trial_b": gaits[2].id, "answer": "a", "author": "K"});
     let refused = service.post(&format!("/api/v1/studies/{study}/preferences"), &pair).await;
     assert!(refused.text.contains("a walkable gait"), "{}", refused.text);
-    let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[2].id});
+    let plan = json!({"trial_a": gaits[0].id, "trial_b": gaits[2].id});
     let refused = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await;
-    assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("gait_one")));
+    assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("trial_a")));
 
     service.post(&format!("{session}/unblind"), &json!({"reason": "a stumble"})).await;
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
@@ -311,12 +308,12 @@ async fn lab_session_requires_two_converged_gaits_of_its_study() {
         (no_gait, "Only a converged gait can be walked"),
         (gaits[0].id, "a different gait"),
     ] {
-        let refused = service.post(&path, &json!({"gait_one": gaits[0].id, "gait_two": two})).await;
-        assert_eq!(refused.json()["field"], "gait_two");
+        let refused = service.post(&path, &json!({"trial_a": gaits[0].id, "trial_b": two})).await;
+        assert_eq!(refused.json()["field"], "trial_b");
         assert!(refused.text.contains(expected), "{}", refused.text);
     }
     let form = format!("/studies/{study}/lab");
-    let refused = service.post_text(&form, FORM, &format!("gait_one={}&gait_two=x&notes=level", gaits[0].id)).await;
+    let refused = service.post_text(&form, FORM, &format!("trial_a={}&trial_b=x&notes=level", gaits[0].id)).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
     assert!(
         refused.text.contains("a gait from the list") && refused.text.contains(">level</textarea>"),
@@ -325,7 +322,7 @@ async fn lab_session_requires_two_converged_gaits_of_its_study() {
     );
     assert_eq!(service.fetch(&path).await.items(), json!([]));
 
-    let body = format!("gait_one={}&gait_two={}&notes=", gaits[0].id, gaits[1].id);
+    let body = format!("trial_a={}&trial_b={}&notes=", gaits[0].id, gaits[1].id);
     let made = service.post_text(&form, FORM, &body).await;
     let page = made.headers["location"].to_str().unwrap().to_owned();
     let shown = service.fetch(&page).await.text;
@@ -361,7 +358,7 @@ async fn lab_session_form_offers_each_motion_once_and_no_unsafe_gait() {
     let offered = async || {
         let page = service.fetch(&format!("/studies/{study}/lab")).await.text;
         let list =
-            page.split("id=\"gait_two\"").nth(1).unwrap_or_default().split("</select>").next().unwrap().to_owned();
+            page.split("id=\"trial_b\"").nth(1).unwrap_or_default().split("</select>").next().unwrap().to_owned();
         trials.iter().filter(|trial| list.contains(&trial.id.to_string())).cloned().collect::<Vec<_>>()
     };
     let both = offered().await;
@@ -395,7 +392,7 @@ async fn archive_preserves_the_lab_sessions_of_its_study() {
     let other = Store::open(&folder.path().join("b.db")).await.unwrap();
     import(&other, &file).await.unwrap();
     assert_eq!(lab_sessions::of_study(&mut other.read().await.unwrap(), study).await.unwrap(), before);
-    assert_eq!(before[0].answers.iter().map(|answer| answer.taken_back).collect::<Vec<_>>(), [true, false]);
+    assert_eq!(before[0].answers.iter().map(|answer| answer.retracted).collect::<Vec<_>>(), [true, false]);
     // The files in the archive give the same curves.
     let mut computing = other.clone();
     let anew = lab::compute(&mut computing, before[0].id, EmgSettings::default()).await.unwrap();

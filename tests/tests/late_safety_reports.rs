@@ -26,10 +26,10 @@ async fn converged(service: &Service, study: StudyId) -> Vec<Trial> {
     trials
 }
 
-/// The gaits with an open report.
+/// The gaits with a report in force.
 async fn closed(service: &Service, study: StudyId) -> BTreeSet<String> {
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
-    let open = reports.as_array().unwrap().iter().filter(|report| report["open"] == json!(true));
+    let open = reports.as_array().unwrap().iter().filter(|report| report["in_force"] == json!(true));
     open.map(|report| report["trial_id"].as_str().unwrap().to_owned()).collect()
 }
 
@@ -155,7 +155,7 @@ impl Lab {
         service.wait_for(study, &[StudyState::Finished]).await;
         let trials = converged(service, study).await;
         let gaits = [trials[0].id, trials[1].id];
-        let plan = json!({"gait_one": gaits[0], "gait_two": gaits[1]});
+        let plan = json!({"trial_a": gaits[0], "trial_b": gaits[1]});
         let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await.json();
         Self { study, gaits, id: session["id"].as_str().unwrap().to_owned() }
     }

@@ -1,6 +1,6 @@
 //! The description of the REST interface: complete, committed, and consistent with the service.
 //!
-//! `GAITWRIGHT_WRITE_OPENAPI=1 cargo test -p gaitwright-tests --test openapi` accepts additions: it rewrites the
+//! `GAITWRIGHT_WRITE_OPENAPI=1 cargo test --workspace --locked --test openapi` accepts additions: it rewrites the
 //! committed file. Changes that break clients need `GAITWRIGHT_WRITE_OPENAPI=breaks`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -99,7 +99,7 @@ async fn repeated_change_with_a_key_happens_once_or_refuses_the_key_as_described
         "studies" => json!({"subject_id": subject, "start": false}),
         "extend" => json!({"trial_budget": 7}),
         "preferences" => json!({"trial_a": trial, "trial_b": other, "answer": "a"}),
-        "assessments" => json!({"first": trial, "second": other, "answer": "cannot_tell"}),
+        "assessments" => json!({"trial_a": trial, "trial_b": other, "answer": "cannot_tell"}),
         "users" => json!({"name": "K", "role": "clinician"}),
         "tokens" => json!({"name": "t", "scopes": ["read"]}),
         "invitations" => json!({"name": "guest"}),

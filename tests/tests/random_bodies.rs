@@ -105,7 +105,7 @@ impl Scene {
         let author = format!("author {}", self.number());
         let body = match what {
             "preferences" => json!({"trial_a": one, "trial_b": other, "answer": "a", "author": author}),
-            _ => json!({"first": one, "second": other, "answer": "cannot_tell", "author": author}),
+            _ => json!({"trial_a": one, "trial_b": other, "answer": "cannot_tell", "author": author}),
         };
         self.id_of(&format!("/studies/{}/{what}", self.finished), body).await
     }
@@ -118,7 +118,7 @@ impl Scene {
             let reviewed = self.request("post", &format!("/trials/{trial}/safety-reviews"), &review).await;
             assert!(reviewed.status.is_success() || reviewed.status == StatusCode::CONFLICT, "{}", reviewed.text);
         }
-        let gaits = json!({"gait_one": self.trials[0], "gait_two": self.trials[1]});
+        let gaits = json!({"trial_a": self.trials[0], "trial_b": self.trials[1]});
         let id = self.id_of(&format!("/studies/{}/lab-sessions", self.finished), gaits).await;
         for walk in 1..=if walked { 3 } else { 0 } {
             self.post(&format!("/lab-sessions/{id}/walks"), json!({"walk": walk})).await;
@@ -150,7 +150,7 @@ impl Scene {
                 id
             }
             "/studies/{id}/ask" | "/studies/{id}/extend" => self.script.to_string(),
-            "/studies/{id}/unblind" => self.human.to_string(),
+            "/studies/{id}/raters/unblind" => self.human.to_string(),
             path if path.starts_with("/studies/{id}") => self.finished.to_string(),
             path if path.starts_with("/subjects/{id}") => self.subject().await,
             "/trials/{id}/tell" => {
@@ -162,7 +162,7 @@ impl Scene {
             }
             path if path.starts_with("/trials/{id}") => {
                 let trial = self.trials[4];
-                let body = json!({"first": trial, "second": self.trials[5], "answer": "unsafe_first"});
+                let body = json!({"trial_a": trial, "trial_b": self.trials[5], "answer": "unsafe_a"});
                 self.post(&format!("/studies/{}/assessments", self.finished), body).await;
                 trial.to_string()
             }
@@ -207,8 +207,8 @@ async fn known(scene: &Scene) -> BTreeMap<&'static str, Vec<Value>> {
     let devices = scene.service.fetch("/api/v1/devices").await.items();
     let rater = scene.service.fetch(&format!("/api/v1/studies/{}/raters", scene.human)).await.items();
     let mut known: BTreeMap<&'static str, Vec<Value>> =
-        ["trial_a", "first", "over", "gait_one"].map(|field| (field, trials[..2].to_vec())).into();
-    known.extend(["trial_b", "second", "gait_two"].map(|field| (field, trials[2..].to_vec())));
+        ["trial_a", "over"].map(|field| (field, trials[..2].to_vec())).into();
+    known.insert("trial_b", trials[2..].to_vec());
     known.insert("subject_id", vec![json!(scene.service.subject().await)]);
     known.insert("device_id", vec![devices[0]["id"].clone()]);
     known.insert("reference_gait_id", vec![json!(scene.service.reference().await)]);

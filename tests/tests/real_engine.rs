@@ -11,7 +11,7 @@ use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
 use gaitwright_service::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
-use gaitwright_store::studies::{Chosen, FeedbackMode, StudyState};
+use gaitwright_store::studies::{FeedbackMode, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
 use gaitwright_tests::analytic::Analytic;
@@ -335,7 +335,7 @@ async fn tune_continues_an_interrupted_study_and_ignores_studies_of_another_kind
     let mut ours = None;
     until("a study of its own", async || {
         let mut reader = pool.acquire().await.unwrap();
-        let all = studies::page(&mut reader, Reach::Every, Chosen::newest(10)).await.unwrap();
+        let all = studies::page(&mut reader, Reach::Every, &StudyFilter::newest(10)).await.unwrap();
         ours = all.into_iter().map(|study| study.id).find(|id| !of_others.contains(id));
         match ours {
             Some(id) => !trials::of_study(&mut reader, id).await.unwrap().is_empty(),

@@ -4,7 +4,8 @@
 
 use axum::http::StatusCode;
 use futures_util::future::BoxFuture;
-use gaitwright_service::workers::{Assignment, Dispatch, DispatchError, InProcess, News};
+use gaitwright_service::dispatch_error::DispatchError;
+use gaitwright_service::workers::{Assignment, Dispatch, InProcess, News};
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;

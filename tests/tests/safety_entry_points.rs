@@ -76,7 +76,7 @@ async fn report_covers_every_trial_of_the_subject_with_the_same_motion() {
     let recommended = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     assert_ne!(recommended["trial_id"], json!(best.id));
     let other = trials.iter().find(|trial| trial.id != best.id).unwrap();
-    let plan = json!({"gait_one": best.id, "gait_two": other.id});
+    let plan = json!({"trial_a": best.id, "trial_b": other.id});
     let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await;
     assert_eq!(planned.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", planned.text);
     let page = service.fetch(&format!("/trials/{}", best.id)).await.text;
@@ -178,7 +178,7 @@ async fn single_gait_is_reported_without_a_comparison() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let made = report(&service, &trials[0]).await;
-    assert_eq!((&made["trial_id"], &made["open"]), (&json!(trials[0].id), &json!(true)));
+    assert_eq!((&made["trial_id"], &made["in_force"]), (&json!(trials[0].id), &json!(true)));
     assert_eq!(controller(&service, &trials[0]).await, StatusCode::CONFLICT);
     let sent = service.post_text(&format!("/trials/{}/safety-report", trials[1].id), FORM, "author=K1&note=fell").await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
@@ -194,7 +194,7 @@ async fn single_gait_is_reported_without_a_comparison() {
 async fn report_between_walks_ends_the_walks() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
-    let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let gaits = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
     let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
     let lab = format!("/api/v1/lab-sessions/{}", session["id"].as_str().unwrap());
     let unsafe_first = json!({"number": 1, "answer": "unsafe_first"});
@@ -227,7 +227,7 @@ async fn controller_file_is_refused_after_a_report_or_the_end_of_the_session() {
     let (study, trials) = finished(&service).await;
     let device = Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
     for ends in ["closed", "reported"] {
-        let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+        let gaits = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
         let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
         let id = session["id"].as_str().unwrap();
         // As at the end of a request that computed its files before.
@@ -247,7 +247,7 @@ async fn controller_file_is_refused_after_a_report_or_the_end_of_the_session() {
 async fn report_stops_a_controller_file_that_waits_for_the_access_log() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
-    let gaits = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let gaits = json!({"trial_a": trials[0].id, "trial_b": trials[1].id});
     let session = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
     let of_trial = format!("/api/v1/trials/{}/controller.json", trials[0].id);
     let of_walk = format!("/api/v1/lab-sessions/{}/controller.json?walk=2", session["id"].as_str().unwrap());
@@ -288,7 +288,7 @@ async fn pair_is_no_longer_shown_to_its_rater_after_a_report() {
 async fn safety_report_of_an_assessment_is_reviewed_and_cannot_be_retracted() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
-    let body = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_first", "author": "K"});
+    let body = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "unsafe_a", "author": "K"});
     let made = service.post(&format!("/api/v1/studies/{study}/assessments"), &body).await.json();
     let retract = format!("/api/v1/assessments/{}/retract", made["id"].as_str().unwrap());
     let refused = service.post(&retract, &json!({"reason": "a slip"})).await;

@@ -49,7 +49,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!(said.len(), 1, "{said:?}");
-    assert_eq!((&said[0]["open"], &said[0]["review"]), (&json!(true), &Value::Null));
+    assert_eq!((&said[0]["in_force"], &said[0]["review"]), (&json!(true), &Value::Null));
     let gait = said[0]["trial_id"].as_str().unwrap().to_owned();
     let page = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(page.contains("Do not walk with it") && page.contains("Safety review"), "{page}");
@@ -73,7 +73,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     let walkable = json!({"decision": "walkable", "reason": "the video was cut", "author": "K2"});
     assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
     let said = safety_reports(&service, study).await;
-    assert_eq!((&said[0]["open"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
+    assert_eq!((&said[0]["in_force"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(!shown.contains("Do not walk with it") && shown.contains("cleared the gait for walking"), "{shown}");
     // The answer of the rater is unchanged, and does not imply that the other gait is better.
@@ -89,9 +89,9 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert_eq!(reviews.len(), 2);
     assert!(reviews.iter().any(|row| row.detail.to_string().contains("the video was cut")));
     let heard = service.feedback(study).await;
-    let taken_back: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
+    let retracted: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
     assert_eq!(
-        taken_back.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
+        retracted.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
         [("K2", "the video was cut")]
     );
     // The pair can be compared again.
@@ -107,7 +107,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     let recommended = async || service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     let best = recommended().await["trial_id"].clone();
     let other = converged(&service, study).await.into_iter().find(|id| json!(id) != best).unwrap();
-    let remark = json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K1"});
+    let remark = json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K1"});
     let remarks = format!("/api/v1/studies/{study}/assessments");
     service.post(&remarks, &remark).await;
     assert_ne!(recommended().await["trial_id"], best);
@@ -116,7 +116,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
     assert!(for_the_device.text.contains("It must not be walked until"), "{}", for_the_device.text);
     let seen = safety_reports(&service, study).await[0]["id"].clone();
-    service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
+    service.post(&remarks, &json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K3"})).await;
     let late = decide(&service, best_id, &json!({"decision": "walkable", "reason": "r", "reports": [seen]})).await;
     assert_eq!(late.status, StatusCode::CONFLICT);
     assert!(late.text.contains("a safety report by K3 that is not among"), "{}", late.text);
@@ -153,7 +153,7 @@ async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
     let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
     let gaits = converged(&service, study).await;
     let sessions = format!("/api/v1/studies/{study}/lab-sessions");
-    let plan = json!({"gait_one": gaits[0], "gait_two": gaits[1]});
+    let plan = json!({"trial_a": gaits[0], "trial_b": gaits[1]});
     let id = service.post(&sessions, &plan).await.json()["id"].as_str().unwrap().to_owned();
     for walk in 1..=3 {
         service.post(&format!("/api/v1/lab-sessions/{id}/walks"), &json!({"walk": walk})).await;
@@ -171,7 +171,7 @@ async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
     service.post(&format!("/api/v1/lab-sessions/{id}/unblind"), &json!({"reason": "walked"})).await;
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let mut snapshot = safety_reports(&service, study).await;
-    snapshot.retain(|report| report["open"] == json!(true));
+    snapshot.retain(|report| report["in_force"] == json!(true));
     assert_eq!(snapshot.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
     service.stop().await;
 }

@@ -30,10 +30,10 @@ async fn script_study(service: &Service, trials: u32, parallel: u32) -> StudyId 
 }
 
 /// The loop of a lab script: ask, measure, tell.
-async fn run(service: &Service, study: StudyId, worker: &str, trials: usize) -> Vec<(u64, f64)> {
+async fn run(service: &Service, study: StudyId, script: &str, trials: usize) -> Vec<(u64, f64)> {
     let mut done = Vec::new();
     for _ in 0..trials {
-        let asked = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({ "worker": worker })).await;
+        let asked = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({ "script": script })).await;
         assert_eq!(asked.status, StatusCode::OK, "{}", asked.text);
         let trial = asked.json();
         let rmse = 0.1 + (trial["action"]["a5"].as_f64().unwrap() - 0.026).abs();
@@ -89,7 +89,7 @@ async fn proposal_stays_with_its_worker() {
     let (_folder, service) = service().await;
     let study = script_study(&service, 10, 2).await;
     let ask = format!("/api/v1/studies/{study}/ask");
-    let of = |worker: &str| json!({ "worker": worker });
+    let of = |script: &str| json!({ "script": script });
     let left = service.post(&ask, &of("left")).await.json();
     assert_eq!(service.post(&ask, &of("left")).await.json(), left);
     let right = service.post(&ask, &of("right")).await.json();

@@ -39,7 +39,7 @@ impl Scene {
             answer.json()["id"].as_str().unwrap().to_owned()
         };
         let preference = json!({"trial_a": one, "trial_b": two, "answer": "a"});
-        let assessment = json!({"first": one, "second": two, "answer": "cannot_tell", "author": "somebody else"});
+        let assessment = json!({"trial_a": one, "trial_b": two, "answer": "cannot_tell", "author": "somebody else"});
         let user = made("/api/v1/users".to_owned(), json!({"name": "Ada", "role": "rater"})).await;
         let ids = BTreeMap::from([
             ("subjects", service.subject().await.to_string()),
@@ -48,7 +48,7 @@ impl Scene {
             ("jobs", format!("solve-{one}")),
             ("preferences", made(format!("{api}/preferences"), preference).await),
             ("assessments", made(format!("{api}/assessments"), assessment).await),
-            ("lab-sessions", made(format!("{api}/lab-sessions"), json!({"gait_one": one, "gait_two": two})).await),
+            ("lab-sessions", made(format!("{api}/lab-sessions"), json!({"trial_a": one, "trial_b": two})).await),
             ("users", user),
             ("study-members", made(format!("{api}/members"), json!({"kind": "user", "name": "Ada"})).await),
             ("tokens", made("/api/v1/tokens".to_owned(), json!({"name": "t", "scopes": ["read"]})).await),
@@ -95,7 +95,7 @@ impl Scene {
         }
         let id = match name {
             "subject_id" => "subjects",
-            "trial_a" | "first" | "over" | "gait_one" => "trials",
+            "trial_a" | "over" => "trials",
             _ => "",
         };
         match schema["type"].as_str().unwrap_or("string") {

@@ -61,11 +61,11 @@ impl Closed {
         let gaits: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
         let (a, b) = (gaits[0].id, gaits[1].id);
         let api = format!("/api/v1/studies/{study}");
-        let assessment = json!({"first": a, "second": gaits[2].id, "answer": "cannot_tell"});
+        let assessment = json!({"trial_a": a, "trial_b": gaits[2].id, "answer": "cannot_tell"});
         let assessment = post(&service, &admin, &format!("{api}/assessments"), &assessment).await;
         let pair = json!({"trial_a": a, "trial_b": b, "answer": "a"});
         let preference = post(&service, &admin, &format!("{api}/preferences"), &pair).await;
-        let session = json!({"gait_one": a, "gait_two": b});
+        let session = json!({"trial_a": a, "trial_b": b});
         let session = post(&service, &admin, &format!("{api}/lab-sessions"), &session).await;
         let session = session["id"].as_str().unwrap().to_owned();
         post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
@@ -550,8 +550,8 @@ async fn trial_of_another_study_looks_unknown() {
         let mut all = Vec::new();
         for (path, body) in [
             ("preferences", json!({"trial_a": gaits[0], "trial_b": id, "answer": "a"})),
-            ("assessments", json!({"first": gaits[0], "second": id, "answer": "cannot_tell"})),
-            ("lab-sessions", json!({"gait_one": gaits[0], "gait_two": id})),
+            ("assessments", json!({"trial_a": gaits[0], "trial_b": id, "answer": "cannot_tell"})),
+            ("lab-sessions", json!({"trial_a": gaits[0], "trial_b": id})),
             ("suggestions", json!({"over": id, "bounds": {"a6": 0.2}})),
         ] {
             let answer =

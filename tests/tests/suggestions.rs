@@ -109,7 +109,7 @@ async fn suggestion_counts_once_for_each_person_and_not_besides_their_answer() {
         assert_eq!(given.status, status, "{}", given.text);
     }
 
-    let report = json!({"first": three.id, "second": two.id, "answer": "unsafe_first", "author": "S"});
+    let report = json!({"trial_a": three.id, "trial_b": two.id, "answer": "unsafe_a", "author": "S"});
     assert_eq!(service.post(&format!("/api/v1/studies/{study}/assessments"), &report).await.status, created);
     for (over, bounds) in [(three, two), (two, three)] {
         let refused = suggest(over, bounds, "cleo").await;

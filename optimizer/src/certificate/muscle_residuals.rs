@@ -13,7 +13,7 @@ const LENGTH: MeasuredQuantity = MeasuredQuantity::new("C8 fibre lengths from th
 const TORQUE: MeasuredQuantity = MeasuredQuantity::new("C9-C12 joint torques of the muscles", "N m", 1e-4, None);
 const RANGE: MeasuredQuantity =
     MeasuredQuantity::new("C5-C8 activations, fibre lengths and velocities", "", 3e-6, Some(0.05));
-const RESET: Quantity = Quantity::judged("C8 continuity of fibre lengths", "l_opt", 1e-6);
+const RESET: Quantity = Quantity::judged("C2 continuity of fibre lengths", "l_opt", 1e-6);
 
 /// Measures a grid point.
 pub(super) fn note(

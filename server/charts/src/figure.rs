@@ -8,7 +8,7 @@ use super::standalone::{self, Inside};
 use super::tree::Tree;
 use super::walker::Animation;
 use crate::csv_table::{CsvTable, cells};
-use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::gait::stick_figure::StickFigure;
 
 /// A drawing with a file name.
 #[derive(Debug, Clone)]

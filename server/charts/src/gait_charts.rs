@@ -8,8 +8,8 @@ pub use solve_progress::solve;
 
 use crate::{Animation, Chart, Drawing, Figure, LegCycle, Stroke, WalkerFigure, over_reference};
 use cycle::Cycle;
-use gait_optimizer::walking::stick_figure::StickFigure;
-use gait_optimizer::walking::{PhaseProgress, progress};
+use gait_optimizer::gait::stick_figure::StickFigure;
+use gait_optimizer::gait::{PhaseProgress, progress};
 use gait_optimizer::{Gait, ModelError, ReferenceGait};
 
 /// The phases of the stride, in their order, for either leg.

@@ -1,7 +1,7 @@
 //! A stride as a row of pictures, in place of an animation.
 
 use crate::walker::{UNITS_PER_M, parts};
-use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::gait::stick_figure::StickFigure;
 use std::fmt::Write;
 
 /// Number of pictures of a stride.

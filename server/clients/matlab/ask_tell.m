@@ -15,7 +15,7 @@ subject = subjects.items(strcmp({subjects.items.pseudonym}, 'paper-1'));
 study = request(address, token, 'POST', '/studies', struct( ...
     'subject_id', subject.id, 'name', 'treadmill', 'evaluation', 'script', 'trial_budget', 10));
 for k = 1:study.trial_budget
-    trial = request(address, token, 'POST', ['/studies/' study.id '/ask'], struct('worker', 'treadmill'));
+    trial = request(address, token, 'POST', ['/studies/' study.id '/ask'], struct('script', 'treadmill'));
     rmse = measure(trial.action);
     if isnan(rmse)
         outcome = struct('outcome', 'not_converged', 'reason', 'the walker stumbled');

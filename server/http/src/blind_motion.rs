@@ -2,7 +2,7 @@
 //! same position, starting at another phase in each pair.
 
 use gait_optimizer::Gait;
-use gait_optimizer::walking::stick_figure::{LegPoints, StickFigure, stick_figures};
+use gait_optimizer::gait::stick_figure::{LegPoints, StickFigure, stick_figures};
 use gaitwright_service::error::Error;
 use serde::Serialize;
 use sha2::{Digest, Sha256};

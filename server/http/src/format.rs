@@ -137,7 +137,7 @@ pub(crate) fn sides_in_words(answer: Judgement) -> &'static str {
 /// Where an answer comes from.
 pub(crate) fn source(row: &FeedbackRow) -> &'static str {
     // A rater need not be the subject or a clinician; known is only whether the answer is blind.
-    match (row.by_rater, row.unblinded) {
+    match (row.by_rater, row.could_have_known) {
         (true, false) => "a rater",
         (true, true) => "an unblinded rater",
         (false, _) => source_name(row.source),

@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value, json};
 
-const GAIT: &str = "A trial of this study with a walkable gait: converged, certified, without an open safety report. The two trials of \
+const GAIT: &str = "A trial of this study with a walkable gait: converged, certified, without a safety report in force. The two trials of \
                     a comparison have different gaits.";
 const GAIT_OF_STUDY: &str =
     "A converged trial of this study. For `cannot_tell`, its gait is walkable. The two trials have different gaits.";
@@ -28,10 +28,10 @@ const REFERENCE_FILE: &str = "A file in the format that `format` names, with its
 const RULES: [(&str, &str, &str); 27] = [
     ("NewPreference", "trial_a", GAIT),
     ("NewPreference", "trial_b", GAIT),
-    ("NewAssessment", "first", GAIT_OF_STUDY),
-    ("NewAssessment", "second", GAIT_OF_STUDY),
-    ("NewLabSession", "gait_one", GAIT),
-    ("NewLabSession", "gait_two", GAIT),
+    ("NewAssessment", "trial_a", GAIT_OF_STUDY),
+    ("NewAssessment", "trial_b", GAIT_OF_STUDY),
+    ("NewLabSession", "trial_a", GAIT),
+    ("NewLabSession", "trial_b", GAIT),
     ("Suggestion", "over", "A trial of this study with a walkable gait."),
     (
         "Suggestion",
@@ -51,7 +51,7 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
     ("Invitation", "name", "The name of a rater, or one that is not taken."),
     ("Unblind", "rater", "A rater who was shown a pair of this study."),
-    ("NewSafetyReview", "reports", "Includes every open safety report about the gait of this trial."),
+    ("NewSafetyReview", "reports", "Includes every safety report in force about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
     (
         "NewEmg",

@@ -29,7 +29,7 @@ const NAMES: [(&str, &str, u32); 12] = [
     ("NewStudy", "name", 120),
     ("Change", "name", 120),
     ("Fork", "name", 120),
-    ("Ask", "worker", 80),
+    ("Ask", "script", 80),
     ("NewPreference", "author", 80),
     ("NewAssessment", "author", 80),
     ("NewSafetyReport", "author", 80),
@@ -91,8 +91,6 @@ pub(super) fn state(document: &mut Value) {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
             set(schemas, component, "source", one);
         }
-        let assessments = json!({ "enum": ["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"] });
-        set(schemas, "NewAssessment", "answer", assessments);
         let answers = json!({ "enum": [
             "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both",
         ] });

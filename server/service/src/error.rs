@@ -1,7 +1,6 @@
-//! The errors of the service. `http::problem` maps them to HTTP responses.
+//! The errors of the service. `http::problem_details` maps them to HTTP responses.
 
-use crate::studies::lifecycle::NotPossible;
-use crate::workers::DispatchError;
+use crate::dispatch_error::DispatchError;
 use gait_learner::LearnerError;
 use gait_optimizer::{ModelError, SolveError};
 use gaitwright_compute::ComputeError;
@@ -239,11 +238,5 @@ impl From<SolveError> for Error {
             SolveError::WarmStartShape { .. } => Self::Conflict(error.to_string()),
             SolveError::Solver(_) => Self::Internal(error.to_string()),
         }
-    }
-}
-
-impl From<NotPossible> for Error {
-    fn from(error: NotPossible) -> Self {
-        Self::Conflict(error.to_string())
     }
 }

@@ -8,6 +8,7 @@
 
 pub mod access;
 pub mod backups;
+pub mod dispatch_error;
 pub mod error;
 pub mod json_document;
 pub mod printable;

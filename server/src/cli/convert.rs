@@ -7,7 +7,7 @@ use super::out_file::OutFile;
 use super::output::data;
 use clap::{Args, ValueEnum};
 use gait_optimizer::export::motion_file;
-use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::gait::stick_figure::stick_figures;
 use gaitwright_charts::gait_table::gait_csv;
 use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
 use gaitwright_service::error::Error;

@@ -3,10 +3,60 @@
 use super::feedback::{Attribution, Retraction, Source};
 use super::presentations::Judgement;
 use super::{AssessmentId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
+
+/// What a person states instead of a preference between two gaits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AssessmentAnswer {
+    /// The person cannot tell which gait is better.
+    CannotTell,
+    /// Gait A must not be walked.
+    UnsafeA,
+    /// Gait B must not be walked.
+    UnsafeB,
+    /// Neither gait may be walked.
+    UnsafeBoth,
+}
+
+impl AssessmentAnswer {
+    /// Whether it is a safety report.
+    pub fn is_about_safety(self) -> bool {
+        self != Self::CannotTell
+    }
+}
+
+impl From<AssessmentAnswer> for Judgement {
+    /// The judgement if gait A is the first one.
+    fn from(answer: AssessmentAnswer) -> Self {
+        match answer {
+            AssessmentAnswer::CannotTell => Self::CannotTell,
+            AssessmentAnswer::UnsafeA => Self::UnsafeFirst,
+            AssessmentAnswer::UnsafeB => Self::UnsafeSecond,
+            AssessmentAnswer::UnsafeBoth => Self::UnsafeBoth,
+        }
+    }
+}
+
+impl TryFrom<Judgement> for AssessmentAnswer {
+    type Error = StoreError;
+
+    /// The answer if gait A is the first one.
+    fn try_from(judgement: Judgement) -> StoreResult<Self> {
+        match judgement {
+            Judgement::CannotTell => Ok(Self::CannotTell),
+            Judgement::UnsafeFirst => Ok(Self::UnsafeA),
+            Judgement::UnsafeSecond => Ok(Self::UnsafeB),
+            Judgement::UnsafeBoth => Ok(Self::UnsafeBoth),
+            Judgement::First | Judgement::Second | Judgement::NoDifference | Judgement::Retracted => {
+                Err(StoreError::Damaged { what: "assessment answer", reason: judgement.as_str().to_owned() })
+            }
+        }
+    }
+}
 
 /// A recorded assessment.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -15,12 +65,12 @@ pub struct Assessment {
     pub id: AssessmentId,
     /// The study.
     pub study_id: StudyId,
-    /// The trial with the first of the two gaits.
-    pub first: TrialId,
-    /// The trial with the second of the two gaits.
-    pub second: TrialId,
-    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
-    pub answer: Judgement,
+    /// The trial with gait A.
+    pub trial_a: TrialId,
+    /// The trial with gait B.
+    pub trial_b: TrialId,
+    /// The answer.
+    pub answer: AssessmentAnswer,
     /// Who answered.
     pub source: Source,
     /// Author.
@@ -38,7 +88,7 @@ pub struct Assessment {
 impl Assessment {
     /// The two gaits.
     pub fn pair(&self) -> (TrialId, TrialId) {
-        (self.first, self.second)
+        (self.trial_a, self.trial_b)
     }
 }
 
@@ -49,8 +99,8 @@ pub struct NewAssessment<'a> {
     pub study: StudyId,
     /// The two gaits.
     pub pair: (TrialId, TrialId),
-    /// The judgement.
-    pub judgement: Judgement,
+    /// The answer.
+    pub answer: AssessmentAnswer,
     /// Source, author and note.
     pub attribution: Attribution<'a>,
     /// The derived preference, if any.
@@ -71,7 +121,7 @@ pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult
     .bind(new.study)
     .bind(new.pair.0)
     .bind(new.pair.1)
-    .bind(new.judgement.as_str())
+    .bind(Judgement::from(new.answer).as_str())
     .bind(new.attribution.source.as_str())
     .bind(new.attribution.author)
     .bind(new.attribution.note)
@@ -129,9 +179,9 @@ fn from_row(row: &SqliteRow) -> StoreResult<Assessment> {
     Ok(Assessment {
         id: row.try_get("id")?,
         study_id: row.try_get("study_id")?,
-        first: row.try_get("first")?,
-        second: row.try_get("second")?,
-        answer: row.try_get::<&str, _>("answer")?.parse()?,
+        trial_a: row.try_get("first")?,
+        trial_b: row.try_get("second")?,
+        answer: row.try_get::<&str, _>("answer")?.parse::<Judgement>()?.try_into()?,
         source: row.try_get::<&str, _>("source")?.parse()?,
         author: row.try_get("author")?,
         note: row.try_get("note")?,

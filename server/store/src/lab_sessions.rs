@@ -68,9 +68,9 @@ pub struct LabSession {
     /// Number in the study, from 1.
     pub number: u32,
     /// The trial with the first of the two gaits.
-    pub gait_one: TrialId,
+    pub trial_a: TrialId,
     /// The trial with the second of the two gaits.
-    pub gait_two: TrialId,
+    pub trial_b: TrialId,
     /// What may be known of its allocation.
     pub allocation: OfSession,
     /// Free text.
@@ -93,13 +93,13 @@ impl LabSession {
 
     /// The current answer, which was not retracted.
     pub fn answer(&self) -> Option<&LabAnswer> {
-        self.answers.last().filter(|answer| !answer.taken_back)
+        self.answers.last().filter(|answer| !answer.retracted)
     }
 
     /// The gaits of walks 2 and 3; `None` while the session is blinded.
     pub fn walked(&self) -> Option<(TrialId, TrialId)> {
-        let one_first = self.allocation.gait_one_first?;
-        Some(if one_first { (self.gait_one, self.gait_two) } else { (self.gait_two, self.gait_one) })
+        let one_first = self.allocation.gait_a_first?;
+        Some(if one_first { (self.trial_a, self.trial_b) } else { (self.trial_b, self.trial_a) })
     }
 }
 
@@ -111,9 +111,9 @@ pub struct NewLabSession<'a> {
     /// Number in the study, from 1.
     pub number: u32,
     /// The trial with the first of the two gaits.
-    pub gait_one: TrialId,
+    pub trial_a: TrialId,
     /// The trial with the second of the two gaits.
-    pub gait_two: TrialId,
+    pub trial_b: TrialId,
     /// Free text.
     pub notes: &'a str,
 }
@@ -131,8 +131,8 @@ pub async fn insert(db: &mut Connection, actor: &Actor, new: &NewLabSession<'_>)
     .bind(id)
     .bind(new.study_id)
     .bind(new.number)
-    .bind(new.gait_one)
-    .bind(new.gait_two)
+    .bind(new.trial_a)
+    .bind(new.trial_b)
     .bind(new.notes)
     .bind(actor.as_str())
     .bind(now())
@@ -232,8 +232,8 @@ async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> 
         id,
         study_id: row.try_get("study_id")?,
         number: row.try_get("number")?,
-        gait_one: row.try_get("gait_one")?,
-        gait_two: row.try_get("gait_two")?,
+        trial_a: row.try_get("gait_one")?,
+        trial_b: row.try_get("gait_two")?,
         allocation: allocations::session(&mut *db, id).await?,
         notes: row.try_get("notes")?,
         actor: row.try_get("actor")?,

@@ -83,7 +83,7 @@ impl Judgement {
     ];
 
     /// The entry for the learner, if any. An unsafe gait loses against the other one.
-    pub fn heard(self, (first, second): (TrialId, TrialId)) -> Option<feedback::FeedbackContent> {
+    pub fn feedback(self, (first, second): (TrialId, TrialId)) -> Option<feedback::FeedbackContent> {
         match self {
             Self::First | Self::UnsafeSecond => {
                 Some(feedback::FeedbackContent::Preference { winner: first, loser: second })
@@ -175,7 +175,7 @@ pub struct Presentation {
     /// The presentation that it repeats.
     pub repeats: Option<PresentationId>,
     /// Whether the rater could have known the allocation.
-    pub unblinded: bool,
+    pub could_have_known: bool,
     /// Time at which the pair was drawn.
     pub created_at: Instant,
     /// The answer about the pair, where `First` is `one`; `None` if there is none yet.
@@ -215,8 +215,8 @@ pub struct NewPresentation {
     pub pair: (TrialId, TrialId),
     /// The presentation that it repeats.
     pub repeats: Option<PresentationId>,
-    /// Whether the rater could know the allocation.
-    pub unblinded: bool,
+    /// Whether the rater could have known the allocation.
+    pub could_have_known: bool,
 }
 
 /// Adds a presentation.
@@ -238,7 +238,7 @@ pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<P
     .bind(new.pair.0)
     .bind(new.pair.1)
     .bind(new.repeats)
-    .bind(new.unblinded)
+    .bind(new.could_have_known)
     .bind(now())
     .execute(db)
     .await?;
@@ -301,7 +301,7 @@ pub async fn retract(db: &mut Connection, id: PresentationId) -> StoreResult<boo
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn heard_of(db: &mut Connection, id: PresentationId) -> StoreResult<Option<FeedbackId>> {
+pub async fn feedback_of(db: &mut Connection, id: PresentationId) -> StoreResult<Option<FeedbackId>> {
     let row = sqlx::query("select feedback_id from presentation_answers where presentation_id = ?")
         .bind(id)
         .fetch_optional(db)
@@ -396,7 +396,7 @@ impl Presentation {
             one: row.try_get("shown_first")?,
             other: row.try_get("shown_second")?,
             repeats: row.try_get("repeats")?,
-            unblinded: row.try_get("could_have_known")?,
+            could_have_known: row.try_get("could_have_known")?,
             created_at: row.try_get("created_at")?,
             answer: row.try_get::<Option<&str>, _>("answer")?.map(str::parse).transpose()?,
             answered_at: row.try_get("answered_at")?,

@@ -31,7 +31,7 @@ async fn study() -> (TempDir, Service, StudyId, Vec<u8>) {
     for (path, body) in [
         ("preferences", json!({"trial_a": good[0], "trial_b": good[1], "answer": "b", "author": "K"})),
         ("preferences", json!({"trial_a": good[2], "trial_b": good[0], "answer": "no_difference", "author": "K"})),
-        ("assessments", json!({"first": good[1], "second": good[2], "answer": "unsafe_first", "author": "K"})),
+        ("assessments", json!({"trial_a": good[1], "trial_b": good[2], "answer": "unsafe_a", "author": "K"})),
     ] {
         let done = service.post(&format!("/api/v1/studies/{study}/{path}"), &body).await;
         assert!(done.status.is_success(), "{path}: {}", done.text);
@@ -68,9 +68,9 @@ async fn review_made_with_a_fast_clock_does_not_cover_later_reports() {
     import(&store, &rows.packed()).await.unwrap();
     store.close().await;
     let other = Service::start(&database, Consistent::default(), 1).await;
-    assert_eq!(other.fetch(&listed).await.items()[0]["open"], json!(false));
+    assert_eq!(other.fetch(&listed).await.items()[0]["in_force"], json!(false));
     let report = other.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "fell"})).await;
-    assert_eq!((report.status, &report.json()["open"]), (StatusCode::CREATED, &json!(true)), "{}", report.text);
+    assert_eq!((report.status, &report.json()["in_force"]), (StatusCode::CREATED, &json!(true)), "{}", report.text);
     assert!(report.json()["created_at"].as_str().unwrap() > ahead.as_str(), "times have the order of recording");
     let file = other.fetch(&format!("/api/v1/trials/{gait}/controller.json")).await;
     assert!(file.status == StatusCode::CONFLICT && file.text.contains("reported as unsafe"), "{}", file.text);

@@ -84,7 +84,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let pair = taken.headers["location"].to_str().unwrap().to_owned();
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
     simulated::keep(&site.service.store, converged[0]).await;
-    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id, "notes": "treadmill, 1.1 m/s"});
+    let gaits = json!({"trial_a": converged[0].id, "trial_b": converged[1].id, "notes": "treadmill, 1.1 m/s"});
     let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
     let session = session["id"].as_str().unwrap();
     for walk in 1..=2 {
@@ -98,7 +98,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &joints).await;
     site.service.post(&format!("/api/v1/lab-sessions/{session}/emg-results"), &json!({})).await;
     // A session that waits for the answer of the subject, and one with an answer.
-    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
+    let gaits = json!({"trial_a": converged[0].id, "trial_b": converged[1].id});
     let mut walked = Vec::new();
     for _ in 0..2 {
         let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
@@ -113,11 +113,11 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let told = format!("/api/v1/lab-sessions/{}/unblind", walked[1]);
     site.service.post(&told, &json!({"reason": "every walk was recorded"})).await;
     let unsafe_one = converged[2].id;
-    let remark = json!({"first": unsafe_one, "second": converged[3].id, "answer": "unsafe_first", "author": "K1",
+    let remark = json!({"trial_a": unsafe_one, "trial_b": converged[3].id, "answer": "unsafe_a", "author": "K1",
         "note": "stumbled twice"});
     site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     let lifted = converged[4].id;
-    let remark = json!({"first": lifted, "second": converged[3].id, "answer": "unsafe_first", "author": "K1"});
+    let remark = json!({"trial_a": lifted, "trial_b": converged[3].id, "answer": "unsafe_a", "author": "K1"});
     site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     let decision = json!({"decision": "walkable", "author": "K2", "reason": "walked slowly, with a harness"});
     site.service.post(&format!("/api/v1/trials/{lifted}/safety-reviews"), &decision).await;

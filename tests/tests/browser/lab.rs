@@ -15,7 +15,7 @@ async fn planned(site: &Site) -> (StudyId, String) {
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let mut gaits = site.service.trials(study).await;
     gaits.retain(|trial| trial.state == TrialState::Converged);
-    let pair = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id});
+    let pair = json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id});
     let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &pair).await.json();
     (study, session["id"].as_str().unwrap().to_owned())
 }
@@ -206,7 +206,7 @@ async fn browser_staff_review_a_safety_report() {
     let trials = site.service.trials(study).await;
     let gait = trials.iter().find(|trial| format!("trial {}", trial.number) == best).unwrap().id;
     let other = trials.iter().find(|trial| trial.state == TrialState::Converged && trial.id != gait).unwrap().id;
-    let remark = json!({"first": gait, "second": other, "answer": "unsafe_first", "author": "R7"});
+    let remark = json!({"trial_a": gait, "trial_b": other, "answer": "unsafe_a", "author": "R7"});
     site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     watched.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;
 

@@ -30,7 +30,7 @@ async fn browser_completes_a_lab_session_from_plan_to_unblinding() {
     // Planned from the page of the study. The allocation is concealed.
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.click("main a[href$='/lab']").await;
-    page.wait_for("#gait_one").await;
+    page.wait_for("#trial_a").await;
     is_for_everybody(axe, &page, "no session yet").await;
     page.fill("#notes", "treadmill, 1.1 m/s").await;
     page.click("form[action$='/lab'] button[type=submit]").await;
@@ -106,7 +106,7 @@ async fn browser_previews_an_emg_recording_and_rejects_a_stride() {
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let trials = site.service.trials(study).await;
     let mut gaits = trials.iter().filter(|trial| trial.state == TrialState::Converged);
-    let gaits = json!({"gait_one": gaits.next().unwrap().id, "gait_two": gaits.next().unwrap().id});
+    let gaits = json!({"trial_a": gaits.next().unwrap().id, "trial_b": gaits.next().unwrap().id});
     let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
     let session = session["id"].as_str().unwrap();
     site.service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;

@@ -194,7 +194,7 @@ async fn browser_updates_do_not_overwrite_edited_fields() {
     let mut gaits = site.service.trials(study).await;
     gaits.retain(|trial| trial.state == gaitwright_store::trials::TrialState::Converged);
     let remark =
-        serde_json::json!({"first": gaits[0].id, "second": gaits[1].id, "answer": "unsafe_first", "author": "K1"});
+        serde_json::json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id, "answer": "unsafe_a", "author": "K1"});
     site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
     page.wait_for("[data-part=state] [role=alert]").await;
     let typed = "`${window.field.value} ${document.querySelector('#more') === window.field}`";

@@ -4,7 +4,7 @@ use super::body::parts;
 use super::figure::{Pose, WalkerFigure, muscle_line, muscle_opacity, muscle_width, share_of_peak};
 use super::muscle_paths::{is_left, muscle_paths};
 use super::segment::{Placement, Segment, UNITS_PER_M};
-use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::gait::stick_figure::StickFigure;
 use std::fmt::Write;
 
 /// Pictures of a stride. The last one is the first of the next stride.

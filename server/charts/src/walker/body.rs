@@ -4,7 +4,7 @@
 //! shares of the length of the trunk, from hip to shoulder.
 
 use super::segment::{Segment, UNITS_PER_M};
-use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::gait::stick_figure::StickFigure;
 use std::fmt::Write;
 
 /// Share of the human thigh that the socket of the prosthesis leaves free.

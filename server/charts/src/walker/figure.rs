@@ -6,7 +6,7 @@ use super::segment::UNITS_PER_M;
 use crate::escaped_text::escape;
 use crate::gait_series::{MUSCLES, points};
 use gait_optimizer::body::{GRAVITY, WalkerModel};
-use gait_optimizer::walking::stick_figure::{LegPoints, StickFigure, stick_figure, stick_figures};
+use gait_optimizer::gait::stick_figure::{LegPoints, StickFigure, stick_figure, stick_figures};
 use gait_optimizer::{Gait, ModelError, ReferenceGait};
 use std::fmt::Write;
 

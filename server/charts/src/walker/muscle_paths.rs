@@ -6,7 +6,7 @@
 use super::body::Lengths;
 use super::segment::Segment;
 use crate::gait_series::MUSCLES;
-use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::gait::stick_figure::StickFigure;
 
 /// Points through which a muscle is drawn, each in the frame of a segment, in units of a drawing.
 pub(crate) type MusclePath = Vec<(Segment, [f64; 2])>;

@@ -1,6 +1,6 @@
 //! The segments of the walker and where a stick figure puts them.
 
-use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::gait::stick_figure::StickFigure;
 
 /// Units of a drawing per metre.
 pub(crate) const UNITS_PER_M: f64 = 100.0;
@@ -81,7 +81,7 @@ impl Placement {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use gait_optimizer::walking::stick_figure::LegPoints;
+    use gait_optimizer::gait::stick_figure::LegPoints;
 
     /// A person who stands: all segments are at rest.
     pub(crate) fn standing() -> StickFigure {

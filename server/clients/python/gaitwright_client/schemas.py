@@ -24,7 +24,7 @@ Binary = bytes
 CertificateState = Literal["passed", "failed", "being_certified", "not_certified"]
 
 # Condition of a walk.
-Condition = Literal["normal", "gait_one", "gait_two"]
+Condition = Literal["normal", "trial_a", "trial_b"]
 
 # Kind of entry: consent or withdrawal.
 ConsentKind = Literal["given", "withdrawn"]
@@ -1168,9 +1168,9 @@ class _LabSessionViewRequired(TypedDict):
     # Time of planning.
     created_at: Instant
     # The trial with the first of the two gaits. Does not imply the order of the walks.
-    gait_one: TrialId
+    trial_a: TrialId
     # The trial with the second of the two gaits.
-    gait_two: TrialId
+    trial_b: TrialId
     # Identifier.
     id: LabSessionId
     # Free text.
@@ -1597,9 +1597,9 @@ class NewLabAnswer(_NewLabAnswerRequired, total=False):
 
 class _NewLabSessionRequired(TypedDict):
     # Converged trial with one of the two gaits.
-    gait_one: TrialId
+    trial_a: TrialId
     # Converged trial with the other gait.
-    gait_two: TrialId
+    trial_b: TrialId
 
 
 class NewLabSession(_NewLabSessionRequired, total=False):

@@ -35,15 +35,15 @@ pub(super) async fn ask(
     Id(id, _): Id<StudyId, Run>,
     IdempotentWith(request, ask): IdempotentWith<Run, Ask>,
 ) -> Result<Response, Refusal> {
-    let worker = ask.worker.as_deref().unwrap_or(&request.caller.name).trim();
+    let script = ask.script.as_deref().unwrap_or(&request.caller.name).trim();
     for _ in 0..TRIES {
         let beliefs = Arc::clone(&app.beliefs);
-        let suggestion = lab_script::suggest(app.store_mut(), id, worker, &beliefs).await;
+        let suggestion = lab_script::suggest(app.store_mut(), id, script, &beliefs).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return repeat_ask(&app, before).await,
         };
-        if let Some(trial) = lab_script::give_out(&mut writer, &request.caller, worker, &suggestion?).await? {
+        if let Some(trial) = lab_script::give_out(&mut writer, &request.caller, script, &suggestion?).await? {
             return request.done(&app, writer, &trial).await;
         }
     }

@@ -143,11 +143,11 @@ pub(super) async fn controller(
     let gait = lab::for_device(&mut writer, &authorized.caller, id, of.walk).await?;
     commit(writer).await?;
     let text = match gait {
-        GaitOfWalk::One => one,
-        GaitOfWalk::Two => two,
+        GaitOfWalk::A => one,
+        GaitOfWalk::B => two,
     };
     let name = format!("controller-walk-{}.json", of.walk);
-    Ok(exports::controller_file_response(&name, text, vec![session.gait_one, session.gait_two]))
+    Ok(exports::controller_file_response(&name, text, vec![session.trial_a, session.trial_b]))
 }
 
 /// Closing of a session.

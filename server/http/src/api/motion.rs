@@ -7,7 +7,7 @@ use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::Gait;
-use gait_optimizer::walking::stick_figure::{StickFigure, stick_figures};
+use gait_optimizer::gait::stick_figure::{StickFigure, stick_figures};
 use gaitwright_charts::gait_series::points;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;

@@ -15,7 +15,7 @@ use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::{StudyTransition, acts_of_people};
 use gaitwright_service::studies::study_change::{self, Change, Extend, Fork};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
-use gaitwright_store::studies::{self, Chosen, Study, StudyState};
+use gaitwright_store::studies::{self, Study, StudyFilter, StudyState};
 use gaitwright_store::trials::{self, TrialCounts};
 use gaitwright_store::{Connection, LentWriter, StudyId, SubjectId};
 use serde::{Deserialize, Serialize};
@@ -40,11 +40,17 @@ impl StudyView {
 }
 
 /// Filter of studies.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Filter {
     subject_id: Option<SubjectId>,
+    #[serde(default)]
+    text: String,
+    #[serde(default)]
+    tag: String,
     state: Option<StudyState>,
+    #[serde(default)]
+    archived: bool,
 }
 
 /// List studies
@@ -56,8 +62,11 @@ pub(super) struct Filter {
     operation_id = "list_studies",
     tag = "studies",
     params(
-        ("subject_id" = Option<SubjectId>, Query, description = "Studies of this subject"),
-        ("state" = Option<StudyState>, Query, description = "Studies in this state")
+        ("subject_id" = Option<SubjectId>, Query, description = "Only studies of this subject"),
+        ("text" = Option<String>, Query, description = "Only studies whose name, tags, notes or pseudonym of the subject contain this text"),
+        ("tag" = Option<String>, Query, description = "Only studies with this tag"),
+        ("state" = Option<StudyState>, Query, description = "Only studies in this state"),
+        ("archived" = Option<bool>, Query, description = "Whether to list archived studies, or the others (the default)")
     ),
     responses((status = 200, description = "A page", body = Page<StudyView>)),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -68,9 +77,10 @@ pub(super) async fn list(
     paging: Paging<StudyId, Filter>,
 ) -> Result<Json<Page<StudyView>>, Refusal> {
     let mut reader = app.read().await?;
-    let Filter { subject_id, state } = paging.filter;
-    let chosen = Chosen { subject: subject_id, state, before: paging.after, limit: paging.to_read() };
-    let found = studies::page(&mut reader, authorized.caller.reach(), chosen).await?;
+    let (before, limit) = (paging.after, paging.to_read());
+    let Filter { subject_id: subject, text, tag, state, archived } = paging.filter.clone();
+    let filter = StudyFilter { subject, text, tag, state, archived: Some(archived), before, limit };
+    let found = studies::page(&mut reader, authorized.caller.reach(), &filter).await?;
     let (found, next) = paging.page(found, |study| study.id)?.into_parts();
     let mut views = Vec::with_capacity(found.len());
     for study in found {

@@ -26,8 +26,8 @@ pub(crate) fn walk_name(session: &LabSessionView, walk: u8) -> String {
     let condition = session.walks.iter().find(|known| known.number == walk).and_then(|known| known.condition);
     match condition {
         Some(Condition::Normal) => "without the device".to_owned(),
-        Some(Condition::GaitOne) => "gait one".to_owned(),
-        Some(Condition::GaitTwo) => "gait two".to_owned(),
+        Some(Condition::GaitA) => "gait A".to_owned(),
+        Some(Condition::GaitB) => "gait B".to_owned(),
         None => format!("walk {walk}"),
     }
 }

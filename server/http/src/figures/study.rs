@@ -4,7 +4,7 @@ use super::outcome::StudyOutcome;
 use super::study_progress::{COURSE, course, warm_starts};
 use super::study_results::{StudyResults, have_one_reference_gait};
 use crate::shared_state::AppState;
-use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::{Chart, Figure, band_in_words, gait_charts};
 use gaitwright_compute::OnPool;

@@ -1,7 +1,7 @@
 //! The figures of a trial: its gait, its solve, and its gait beside that of another trial.
 
 use crate::shared_state::AppState;
-use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
 use gaitwright_compute::OnPool;

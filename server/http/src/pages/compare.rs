@@ -22,10 +22,8 @@ use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::answer::{self, Answer};
-use gaitwright_service::studies::assessment::{self};
+use gaitwright_service::studies::answer;
 use gaitwright_service::studies::comparison::{Question, open_question};
-use gaitwright_service::studies::preference::{self};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::walkable;
@@ -36,6 +34,7 @@ use gaitwright_store::{
     trials,
 };
 use serde::Deserialize;
+use std::str::FromStr;
 
 /// The gaits to compare, and the answer that was just saved.
 #[derive(Debug, Default, Deserialize)]
@@ -305,7 +304,7 @@ async fn read_back(
                 at: assessment.created_at,
                 retracted: assessment.retraction.is_some(),
                 is_safety_report: assessment.answer.is_about_safety(),
-                pair: Some((assessment.first, assessment.second)),
+                pair: Some(assessment.pair()),
                 other_answers: Vec::new(),
             })
         }

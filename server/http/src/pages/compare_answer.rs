@@ -4,9 +4,9 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Form;
-use crate::page_error::{PageError, page};
+use crate::page_error::PageError;
 use axum::extract::State;
-use axum::response::{IntoResponse, Redirect};
+use axum::response::Redirect;
 use gaitwright_service::access::{self, Caller};
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
@@ -14,12 +14,15 @@ use gaitwright_service::studies::answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::preference::{self, CurrentAnswer};
 use gaitwright_service::studies::safety_reports::SafetyReports;
+use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};
-use gaitwright_store::{AssessmentId, Connection, FeedbackId, StudyId, commit, gaits, presentations, studies};
+use gaitwright_store::presentations::Judgement;
+use gaitwright_store::{AssessmentId, Connection, FeedbackId, StudyId, commit};
 use serde::Deserialize;
 use std::fmt;
 use std::str::FromStr;
+
 /// The row of an answer in the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
@@ -76,12 +79,12 @@ impl GivenAnswer {
         matches!(self, Self::Assessment(assessment) if assessment.answer.is_about_safety())
     }
 
-    /// Whether every gait that this answer calls unsafe still has an open report.
-    async fn still_closes(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
+    /// Whether every gait that this answer calls unsafe still has a report in force.
+    async fn is_still_in_force(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
         match self {
             Self::Assessment(given) if self.is_about_safety() => {
-                let gaits = given.answer.unsafe_of((given.first, given.second));
-                Ok(SafetyReports::read(db, study).await?.close_all(&gaits))
+                let gaits = Judgement::from(given.answer).unsafe_of((given.trial_a, given.trial_b));
+                Ok(SafetyReports::read(db, study).await?.are_all_in_force(&gaits))
             }
             _ => Ok(true),
         }
@@ -100,16 +103,16 @@ impl AnswerForm {
         };
         let assessment = |answer| {
             let (author, note) = (author.clone(), note.clone());
-            GivenAnswer::Assessment(NewAssessment { first: a, second: b, answer, source, author, note })
+            GivenAnswer::Assessment(NewAssessment { trial_a: a, trial_b: b, answer, source, author, note })
         };
         let judgement = match self.answer.as_str() {
             "a" => preference(PairAnswer::A),
             "b" => preference(PairAnswer::B),
             "no_difference" => preference(PairAnswer::NoDifference),
-            "cannot_tell" => assessment(presentations::Judgement::CannotTell),
-            "unsafe_a" => assessment(presentations::Judgement::UnsafeFirst),
-            "unsafe_b" => assessment(presentations::Judgement::UnsafeSecond),
-            "unsafe_both" => assessment(presentations::Judgement::UnsafeBoth),
+            "cannot_tell" => assessment(AssessmentAnswer::CannotTell),
+            "unsafe_a" => assessment(AssessmentAnswer::UnsafeA),
+            "unsafe_b" => assessment(AssessmentAnswer::UnsafeB),
+            "unsafe_both" => assessment(AssessmentAnswer::UnsafeBoth),
             other => {
                 return Err(Error::invalid("answer", other, "one of the answers on the form"));
             }
@@ -159,7 +162,7 @@ pub(super) async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &An
     let key = if judgement.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
     let before = idempotency::find(&mut writer, &caller.actor, &key).await?;
     // A report that staff have reviewed since is a new one.
-    let is_reviewed = before.is_some() && !judgement.still_closes(&mut writer, id).await?;
+    let is_reviewed = before.is_some() && !judgement.is_still_in_force(&mut writer, id).await?;
     if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;
         let recorded = Recorded::try_from(before.body)?;

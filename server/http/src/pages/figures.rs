@@ -12,7 +12,7 @@ use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_store::studies::{Chosen, Study};
+use gaitwright_store::studies::{Study, StudyFilter};
 use gaitwright_store::{LabSessionId, StudyId, TrialId, lab_sessions, studies};
 use serde::Deserialize;
 
@@ -61,7 +61,7 @@ pub(super) async fn get(
     let other = accessible(&mut *app.read().await?, reach, other).await?;
     let StudyFigures { study, best, without_gait, sections, .. } = of_study(&mut app, id, other).await?;
     let mut reader = app.read().await?;
-    let mut offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;
+    let mut offered = studies::page(&mut reader, reach, &StudyFilter::newest(OFFERED)).await?;
     offered.retain(|offered| offered.id != id);
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
     drop(reader);

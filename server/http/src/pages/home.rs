@@ -13,7 +13,7 @@ use gaitwright_charts::sparkline;
 use gaitwright_service::access::{Permission, Rate, Read, Run, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_reports;
-use gaitwright_store::studies::{Listed, Study, StudyState};
+use gaitwright_store::studies::{Study, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
 use serde::Deserialize;
@@ -34,7 +34,7 @@ struct Home {
     /// The address of the next page, if older studies follow.
     next: Option<String>,
     /// The filter as typed.
-    filter: StudyFilter,
+    filter: ListQuery,
     /// Every tag of the accessible studies.
     tags: Vec<String>,
     states: [StudyState; 6],
@@ -45,7 +45,7 @@ struct Home {
 /// Which studies to show.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct StudyFilter {
+pub(super) struct ListQuery {
     /// Text in name, pseudonym, tags or notes.
     text: String,
     tag: String,
@@ -56,7 +56,7 @@ pub(super) struct StudyFilter {
     before: Option<StudyId>,
 }
 
-impl StudyFilter {
+impl ListQuery {
     /// Whether studies are left out.
     fn is_set(&self) -> bool {
         !self.text.is_empty() || !self.tag.is_empty() || !self.state.is_empty() || self.archived.is_some()
@@ -67,7 +67,7 @@ impl StudyFilter {
         self.state == state.as_str()
     }
 
-    fn listed(&self, limit: u32) -> Result<Listed, Error> {
+    fn filter(&self, limit: u32) -> Result<StudyFilter, Error> {
         let state = match self.state.as_str() {
             "" => None,
             text => {
@@ -76,7 +76,8 @@ impl StudyFilter {
             }
         };
         let (text, tag) = (self.text.trim().to_owned(), self.tag.clone());
-        Ok(Listed { text, tag, state, archived: self.archived.is_some(), before: self.before, limit })
+        let archived = Some(self.archived.is_some());
+        Ok(StudyFilter { subject: None, text, tag, state, archived, before: self.before, limit })
     }
 
     /// The address of the studies after this one, with the same filter.
@@ -142,7 +143,7 @@ pub(super) async fn get(
     SignedIn(caller): SignedIn,
     authorized: Result<Authorized<Read>, RefusedRequest>,
     State(app): State<AppState>,
-    Params(filter): Params<StudyFilter>,
+    Params(filter): Params<ListQuery>,
 ) -> Result<Response, RefusedRequest> {
     match authorized {
         Ok(authorized) => Ok(show(&app, &authorized, filter).await.into_response()),
@@ -151,10 +152,10 @@ pub(super) async fn get(
     }
 }
 
-async fn show(app: &AppState, authorized: &Authorized<Read>, filter: StudyFilter) -> PageResult {
+async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) -> PageResult {
     let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
-    let mut found = studies::listed(&mut reader, reach, &filter.listed(PAGE + 1)?).await?;
+    let mut found = studies::page(&mut reader, reach, &filter.filter(PAGE + 1)?).await?;
     let more = found.len() > PAGE as usize;
     found.truncate(PAGE as usize);
     let next = found.last().filter(|_| more).map(|study| filter.after(study.id));

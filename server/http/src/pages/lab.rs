@@ -55,8 +55,8 @@ impl SessionsPage {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct LabSessionFields {
-    gait_one: String,
-    gait_two: String,
+    trial_a: String,
+    trial_b: String,
     notes: String,
 }
 
@@ -64,8 +64,8 @@ impl LabSessionFields {
     fn read(&self) -> Result<NewLabSession, Error> {
         let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait from the list"));
         Ok(NewLabSession {
-            gait_one: gait("gait_one", &self.gait_one)?,
-            gait_two: gait("gait_two", &self.gait_two)?,
+            trial_a: gait("trial_a", &self.trial_a)?,
+            trial_b: gait("trial_b", &self.trial_b)?,
             notes: self.notes.clone(),
         })
     }
@@ -111,7 +111,7 @@ async fn show_list(
 }
 
 /// The labels of the form that plans a session.
-const LABELS: [(&str, &str); 3] = [("gait_one", "Gait one"), ("gait_two", "Gait two"), ("notes", "Notes")];
+const LABELS: [(&str, &str); 3] = [("trial_a", "Gait A"), ("trial_b", "Gait B"), ("notes", "Notes")];
 
 /// `POST /studies/{id}/lab`.
 pub(super) async fn plan(
@@ -267,8 +267,8 @@ pub(super) async fn show(
     let mut reader = app.read().await?;
     let session = LabSessionView::from(&lab_sessions::get(&mut reader, id).await?);
     let study = studies::get(&mut reader, session.study_id).await?;
-    let one = trials::get(&mut reader, session.gait_one).await?.number;
-    let two = trials::get(&mut reader, session.gait_two).await?.number;
+    let one = trials::get(&mut reader, session.trial_a).await?.number;
+    let two = trials::get(&mut reader, session.trial_b).await?.number;
     let recordings = measurement_files::of_session(&mut reader, id).await?;
     drop(reader);
     let draw = move |_: &OnPool| {
@@ -282,10 +282,7 @@ pub(super) async fn show(
     page(&SessionPage {
         study,
         state: words(session.state.as_str()),
-        gaits: [
-            NumberedTrial { id: session.gait_one, number: one },
-            NumberedTrial { id: session.gait_two, number: two },
-        ],
+        gaits: [NumberedTrial { id: session.trial_a, number: one }, NumberedTrial { id: session.trial_b, number: two }],
         walks: session
             .walks
             .iter()
@@ -313,8 +310,8 @@ fn in_words(condition: Option<Condition>) -> &'static str {
     match condition {
         None => "one of the two gaits (blinded)",
         Some(Condition::Normal) => "without the device",
-        Some(Condition::GaitOne) => "gait one",
-        Some(Condition::GaitTwo) => "gait two",
+        Some(Condition::GaitA) => "gait A",
+        Some(Condition::GaitB) => "gait B",
     }
 }
 

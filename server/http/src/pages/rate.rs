@@ -13,14 +13,14 @@ use askama::Template;
 use axum::extract::{Path, State};
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::Gait;
-use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::gait::stick_figure::StickFigure;
 use gaitwright_charts::gait_tiles;
 use gaitwright_service::access::{Caller, Rate, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::Sided;
 use gaitwright_store::presentations::{self, Judgement, Presentation};
-use gaitwright_store::studies::{Chosen, FeedbackMode};
+use gaitwright_store::studies::{FeedbackMode, StudyFilter};
 use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
 
@@ -186,7 +186,7 @@ pub(super) async fn list(
 /// A rater's newest answer, if it can be retracted.
 async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlindAnswer>, Error> {
     let mut newest: Option<Presentation> = None;
-    for study in studies::page(db, caller.reach(), Chosen::newest(SEARCHED)).await? {
+    for study in studies::page(db, caller.reach(), &StudyFilter::newest(SEARCHED)).await? {
         if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
             continue;
         }
@@ -241,7 +241,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, token).await?;
     let (token, number) = (shown.presentation.token.clone(), shown.presentation.number);
-    let not_blind = shown.presentation.unblinded
+    let not_blind = shown.presentation.could_have_known
         || blind::could_have_known(&mut reader, caller, shown.presentation.study_id).await?;
     if shown.presentation.answer.is_some() {
         let saved = read_back(&mut reader, shown).await?;

@@ -1,7 +1,7 @@
 //! Which bounds a gait reaches, and for which values of each it stays the same.
 
 use crate::format;
-use gait_optimizer::walking::kept_clearance_m;
+use gait_optimizer::gait::kept_clearance_m;
 use gait_optimizer::{Gait, TunedBounds, UnchangedBound};
 use gaitwright_service::error::Error;
 

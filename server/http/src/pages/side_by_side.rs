@@ -17,7 +17,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_store::studies::{Chosen, Study};
+use gaitwright_store::studies::{Study, StudyFilter};
 use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -72,7 +72,7 @@ pub(super) async fn get(
     let mut reader = app.read().await?;
     let shown: BTreeSet<SubjectId> =
         subjects::consenting(&mut reader).await?.into_iter().map(|subject| subject.id).collect();
-    let mut offered = studies::page(&mut reader, reach, Chosen::newest(OFFERED)).await?;
+    let mut offered = studies::page(&mut reader, reach, &StudyFilter::newest(OFFERED)).await?;
     offered.retain(|study| shown.contains(&study.plan.subject_id));
     let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
     let compared = match (a, b) {

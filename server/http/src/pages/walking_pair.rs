@@ -1,6 +1,6 @@
 //! Two gaits that walk side by side, or one behind the other.
 
-use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ModelError};
 use gaitwright_charts::{WalkerFigure, gait_tiles};
 use gaitwright_store::TrialId;

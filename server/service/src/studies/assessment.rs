@@ -6,9 +6,8 @@ use super::preference::{self, Again, GivenJudgement};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use gaitwright_store::assessments::{self, Assessment};
+use gaitwright_store::assessments::{self, Assessment, AssessmentAnswer};
 use gaitwright_store::feedback::Source;
-use gaitwright_store::presentations::Judgement;
 use gaitwright_store::{AssessmentId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
 use serde::Deserialize;
 use serde_json::json;
@@ -19,12 +18,12 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewAssessment)]
 pub struct NewAssessment {
-    /// The trial with the first of the two gaits.
-    pub first: TrialId,
-    /// The trial with the second of the two gaits.
-    pub second: TrialId,
-    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. To state which gait is better, record a preference instead.
-    pub answer: Judgement,
+    /// The trial with gait A.
+    pub trial_a: TrialId,
+    /// The trial with gait B.
+    pub trial_b: TrialId,
+    /// The answer. To state which gait is better, record a preference instead.
+    pub answer: AssessmentAnswer,
     /// Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
     #[serde(default)]
     pub source: Option<Source>,
@@ -49,25 +48,19 @@ pub async fn give(
     new: &NewAssessment,
 ) -> Result<AssessmentId, Error> {
     let study = studies::get(writer, study).await?;
-    if !new.answer.is_assessment() {
-        return Err(Error::invalid(
-            "answer",
-            json!(new.answer),
-            "cannot_tell, unsafe_first, unsafe_second or unsafe_both",
-        ));
-    }
     let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
     let statement = GivenJudgement {
         study: study.id,
-        pair: (new.first, new.second),
-        fields: ("first", "second"),
-        judgement: new.answer,
+        pair: (new.trial_a, new.trial_b),
+        fields: ("trial_a", "trial_b"),
+        judgement: new.answer.into(),
         attribution,
         again: Again::Refused,
     };
     let id = write(writer, statement).await?;
-    let (first, second, author) = (new.first, new.second, attribution.author);
-    let detail = json!({ "study": study.id, "first": first, "second": second, "answer": new.answer, "author": author });
+    let (trial_a, trial_b, author) = (new.trial_a, new.trial_b, attribution.author);
+    let detail =
+        json!({ "study": study.id, "trial_a": trial_a, "trial_b": trial_b, "answer": new.answer, "author": author });
     audit::append(writer, &caller.actor, "assessment.give", &format!("assessment {id}"), &detail).await?;
     Ok(id)
 }
@@ -75,13 +68,13 @@ pub async fn give(
 /// Adds an assessment and the preference derived from it, and notifies open pages.
 ///
 /// # Errors
-/// As [`preference::hear`].
+/// As [`preference::record`].
 pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<AssessmentId, Error> {
-    let heard = preference::hear(writer, statement).await?;
+    let heard = preference::record(writer, statement).await?;
     let GivenJudgement { study, pair, judgement, attribution, .. } = statement;
     let id = assessments::insert(
         writer,
-        &assessments::NewAssessment { study, pair, judgement, attribution, feedback: heard },
+        &assessments::NewAssessment { study, pair, answer: judgement.try_into()?, attribution, feedback: heard },
     )
     .await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "assessment_id": id })).await?;

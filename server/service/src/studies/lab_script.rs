@@ -31,30 +31,30 @@ pub struct Ask {
     /// Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
-    pub worker: Option<String>,
+    pub script: Option<String>,
 }
 
 /// The trial for a script that asks.
 #[derive(Debug)]
 pub enum SuggestedTrial {
-    /// The open trial of this evaluator.
+    /// The open trial of this script.
     Same(TrialId),
     /// A new trial, valid while the study matches the snapshot.
     New(Box<StudySnapshot>, Box<NewTrial>),
 }
 
-/// Chooses the trial for an evaluator, outside any transaction.
+/// Chooses the trial for a script, outside any transaction.
 ///
 /// # Errors
-/// [`Error::Conflict`] if the study has no trial to give, [`Error::Invalid`] for the name of the evaluator.
+/// [`Error::Conflict`] if the study has no trial to give, [`Error::Invalid`] for the name of the script.
 pub async fn suggest(
     store: &mut Store,
     study: StudyId,
-    worker: &str,
+    script: &str,
     beliefs: &Arc<Beliefs>,
 ) -> Result<SuggestedTrial, Error> {
     let beliefs = Arc::clone(beliefs);
-    let worker = printable::name("worker", worker, 80)?;
+    let script = printable::name("script", script, 80)?;
     let mut db = store.read().await?;
     let study = studies::get(&mut db, study).await?;
     if study.plan.evaluation != Evaluation::Script {
@@ -62,7 +62,7 @@ pub async fn suggest(
             "The service evaluates the trials of this study itself. Scripts need a study with evaluation \"script\".",
         ));
     }
-    if let Some(open) = trials::open_of(&mut db, study.id, worker).await? {
+    if let Some(open) = trials::open_of(&mut db, study.id, script).await? {
         return Ok(SuggestedTrial::Same(open));
     }
     if study.state != StudyState::Running {
@@ -105,7 +105,7 @@ pub async fn suggest(
 pub async fn not_reported(db: &mut Connection, trial: TrialId) -> Result<(), Error> {
     let trial = trials::get(db, trial).await?;
     let reports = SafetyReports::read(db, trial.study_id).await?;
-    if reports.closed_bounds().any(|bounds| bounds == trial.action) {
+    if reports.reported_bounds().any(|bounds| bounds == trial.action) {
         let number = trial.number;
         return Err(Error::conflict(format!(
             "A gait with the bounds of trial {number} was reported as unsafe. Cancel the trial, then ask again."
@@ -121,7 +121,7 @@ pub async fn not_reported(db: &mut Connection, trial: TrialId) -> Result<(), Err
 pub async fn give_out(
     writer: &mut Writer,
     caller: &Caller,
-    worker: &str,
+    script: &str,
     suggestion: &SuggestedTrial,
 ) -> Result<Option<Trial>, Error> {
     let (snapshot, new) = match suggestion {
@@ -139,10 +139,10 @@ pub async fn give_out(
         return Ok(None);
     }
     let Some(id) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
-    trials::give_to(writer, id, worker).await?;
+    trials::give_to(writer, id, script).await?;
     let payload = json!({ "trial_id": id, "number": new.number, "state": TrialState::Running });
     events::append(writer, study, "trial_started", &payload).await?;
-    let detail = json!({ "study": study, "worker": worker, "number": new.number });
+    let detail = json!({ "study": study, "script": script, "number": new.number });
     audit::append(writer, &caller.actor, "trial.ask", &format!("trial {id}"), &detail).await?;
     Ok(Some(trials::get(writer, id).await?))
 }

@@ -7,8 +7,8 @@
 //!          finished, stopped -> running     (with a larger budget: `extend`)
 //! ```
 
+use crate::error::Error;
 use gaitwright_store::studies::StudyState;
-use thiserror::Error;
 
 /// A transition of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,13 +52,19 @@ impl StudyTransition {
 }
 
 /// The transition is not possible in this state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("Cannot {} a study that is {}. Possible now: {}.", act.as_str(), in_words(*state), possible(*state))]
 pub struct NotPossible {
     /// The state of the study.
     pub state: StudyState,
     /// The requested transition.
     pub act: StudyTransition,
+}
+
+impl From<NotPossible> for Error {
+    fn from(error: NotPossible) -> Self {
+        Self::Conflict(error.to_string())
+    }
 }
 
 /// A state as the adjective of a sentence: `The study is not started`.

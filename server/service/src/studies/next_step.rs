@@ -20,7 +20,7 @@ const FAILURES_IN_A_ROW: usize = 3;
 /// What a study needs next.
 pub(super) enum PlanningStep {
     Nothing,
-    StudyTransition(StudyTransition, String),
+    Act(StudyTransition, String),
     Try(NewTrial),
 }
 
@@ -107,7 +107,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             author: String::new(),
             note: String::new(),
             by_rater: false,
-            unblinded: false,
+            could_have_known: false,
             created_at: now(),
             retraction: None,
         });

@@ -4,13 +4,13 @@
 //! An engine may lose jobs, and may deliver a result late or twice. The record decides what counts, by the number of
 //! the attempt.
 
+use crate::dispatch_error::DispatchError;
 use futures_util::future::BoxFuture;
 use gait_optimizer::{GaitProblem, IterationRecord, SolveOptions, SolveOutcome, WarmStart};
 use gaitwright_store::TrialId;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::time::Duration;
-use thiserror::Error;
 
 /// One attempt at the solve of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -106,27 +106,6 @@ impl fmt::Debug for Receipt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Receipt").field(&self.0.is_some()).finish()
     }
-}
-
-/// A job could not be dispatched. It is retried later.
-#[derive(Debug, Error)]
-pub enum DispatchError {
-    /// The job is too large for the engine.
-    #[error("{what} has {bytes} bytes, but the broker accepts at most {limit}. Raise its max_payload.")]
-    TooLarge {
-        /// The kind of message.
-        what: &'static str,
-        /// Its size.
-        bytes: usize,
-        /// The limit of the broker.
-        limit: usize,
-    },
-    /// A message cannot be written or read.
-    #[error("A message between service and worker is malformed: {0}.")]
-    Message(String),
-    /// The engine cannot be reached.
-    #[error("{0}")]
-    Unreachable(String),
 }
 
 /// An engine that runs jobs and reports their results.

@@ -1,7 +1,8 @@
 //! The engine of a single machine: one thread for each running solve.
 
-use super::dispatch::{Dispatch, DispatchError, Finding, News, Receipt};
+use super::dispatch::{Dispatch, Finding, News, Receipt};
 use super::{Assignment, Evaluate};
+use crate::dispatch_error::DispatchError;
 use futures_util::future::BoxFuture;
 use gait_optimizer::CancelToken;
 use gaitwright_compute::priority::{SOLVER, STACK_BYTES, stand_back};

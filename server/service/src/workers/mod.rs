@@ -16,7 +16,7 @@ mod solve_progress;
 
 pub use after_solves::AfterSolves;
 pub use certify::{Certify, GaitCertifier};
-pub use dispatch::{Assignment, Attempt, Dispatch, DispatchError, Finding, News, Receipt};
+pub use dispatch::{Assignment, Attempt, Dispatch, Finding, News, Receipt};
 pub use evaluate::{Evaluate, GaitSolver};
 pub use explain::{Explain, GaitExplainer, Unexplained};
 pub use in_process::{IN_PROCESS, InProcess, LEASE};

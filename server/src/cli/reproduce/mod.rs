@@ -23,7 +23,7 @@ use gaitwright_service::studies::history;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::trial_choice::best_trial;
-use gaitwright_store::studies::{self, Chosen, Study, StudyState};
+use gaitwright_store::studies::{self, Study, StudyFilter, StudyState};
 use gaitwright_store::{Store, commit, gaits, reference_gaits};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -175,7 +175,7 @@ impl Reproduce {
         };
         let wanted = study_plan::checked(&mut writer, new.clone()).await?;
         // A folder has at most two subjects, two variants and a hundred seeds.
-        let known = studies::page(&mut writer, Reach::Every, Chosen::newest(1000)).await?;
+        let known = studies::page(&mut writer, Reach::Every, &StudyFilter::newest(1000)).await?;
         commit(writer).await?;
         let same = known
             .into_iter()

@@ -4,7 +4,7 @@ use super::comparison::{PairComparison, ReproducedStudy, conclusion, pair_compar
 use super::statements::{Statement, statements};
 use askama::Template;
 use gait_optimizer::Gait;
-use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::gait::stick_figure::stick_figures;
 use gaitwright_charts::gait_charts;
 use gaitwright_charts::{Chart, STYLE_SHEET, Stroke, band_in_words, gait_tiles};
 use gaitwright_service::error::Error;

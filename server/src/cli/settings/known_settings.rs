@@ -1,6 +1,6 @@
 //! Every setting of the service.
 
-/// Every setting: name in the file, default, meaning. Flag and environment variable derive from the name.
+/// Every setting: name in the file, default, meaning. The environment variable derives from the name.
 pub(super) const KNOWN: &[(&str, &str, &str)] = &[
     ("listen", "127.0.0.1:8080", "address and port to listen on"),
     ("database", "gaitwright.db", "SQLite file"),

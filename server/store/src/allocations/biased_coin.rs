@@ -47,7 +47,7 @@ impl Lot {
         hex::encode(self.nonce)
     }
 
-    /// Whether gait one comes first. `lead` is how many more unblinded sessions gait one came first in than gait two.
+    /// Whether gait A comes first. `lead` is how many more unblinded sessions gait A came first in than gait B.
     /// The coin is fair up to a lead of two; at three or more, the rarer order has a probability of three quarters.
     pub(super) fn one_first(self, lead: i64) -> bool {
         if lead.unsigned_abs() < TOLERANCE {

@@ -34,7 +34,7 @@ pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32,
     Ok(())
 }
 
-/// The number of unblinded sessions with this number in which gait one came first, less those in which gait two did. A
+/// The number of unblinded sessions with this number in which gait A came first, less those in which gait B did. A
 /// concealed allocation does not count, because later ones would reveal it once they are unblinded. Nor does an
 /// imported one, which another service balanced.
 async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
@@ -53,8 +53,8 @@ pub struct OfSession {
     /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
     /// it.
     pub included: bool,
-    /// Whether walk 2 uses gait one; `None` while the session is blinded.
-    pub gait_one_first: Option<bool>,
+    /// Whether walk 2 uses gait A; `None` while the session is blinded.
+    pub gait_a_first: Option<bool>,
     /// Who fetched controller files of its walks, in order.
     pub files: Vec<ControllerFileDownload>,
 }
@@ -83,10 +83,10 @@ pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<OfSes
     );
     let order = order.bind(id).fetch_optional(&mut *db).await?;
     let included = order.is_some();
-    let gait_one_first = order.map(|row| row.try_get(0)).transpose()?.flatten();
+    let gait_a_first = order.map(|row| row.try_get(0)).transpose()?.flatten();
     let files = sqlx::query("select * from lab_device_files where session_id = ? order by id").bind(id);
     let files = files.fetch_all(db).await?.iter().map(controller_file).collect::<StoreResult<_>>()?;
-    Ok(OfSession { included, gait_one_first, files })
+    Ok(OfSession { included, gait_a_first, files })
 }
 
 fn controller_file(row: &SqliteRow) -> StoreResult<ControllerFileDownload> {
@@ -98,7 +98,7 @@ fn controller_file(row: &SqliteRow) -> StoreResult<ControllerFileDownload> {
     })
 }
 
-/// Records the release of the controller file of a walk. Returns whether the walk uses gait one, or `None` if the
+/// Records the release of the controller file of a walk. Returns whether the walk uses gait A, or `None` if the
 /// allocation is not in this record.
 ///
 /// # Errors

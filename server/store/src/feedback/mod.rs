@@ -32,7 +32,7 @@ pub struct FeedbackRow {
     /// Whether it comes from a rater's blind comparison.
     pub by_rater: bool,
     /// Whether the rater could have known the allocation, so that the entry does not count as blind.
-    pub unblinded: bool,
+    pub could_have_known: bool,
     /// Time of recording.
     pub created_at: Instant,
     /// Retraction, if it was retracted.
@@ -133,7 +133,7 @@ pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reaso
 const SELECT: &str = "select f.*, r.author as retracted_by, r.reason as retracted_because, \
                       r.created_at as retracted_at, \
                       p.presentation_id is not null as by_rater, \
-                      coalesce(p.could_have_known, 0) = 1 or coalesce(q.unblinded, 0) = 1 as unblinded \
+                      coalesce(p.could_have_known, 0) = 1 or coalesce(q.unblinded, 0) = 1 as could_have_known \
                       from feedback f left join retractions r on r.feedback_seq = f.seq \
                       left join presentation_answers p on p.feedback_id = f.id \
                       left join presentations q on q.id = p.presentation_id ";
@@ -343,7 +343,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         author: row.try_get("author")?,
         note: row.try_get("note")?,
         by_rater: row.try_get("by_rater")?,
-        unblinded: row.try_get("unblinded")?,
+        could_have_known: row.try_get("could_have_known")?,
         created_at: row.try_get("created_at")?,
         retraction: Retraction::from_row(row)?,
     })

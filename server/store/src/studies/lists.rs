@@ -6,20 +6,26 @@ use crate::members::{binds, reached};
 use crate::{Connection, Instant, StoreResult, StudyId, SubjectId};
 
 /// Which studies of those that a caller reaches.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Chosen {
+#[derive(Debug, Clone, Default)]
+pub struct StudyFilter {
     /// Of this subject.
     pub subject: Option<SubjectId>,
+    /// Whose name, tags, notes or pseudonym contain this text, whatever its case. Empty for all.
+    pub text: String,
+    /// With this tag. Empty for all.
+    pub tag: String,
     /// In this state.
     pub state: Option<StudyState>,
+    /// Archived studies or the others. `None` for both.
+    pub archived: Option<bool>,
     /// Older than this one.
     pub before: Option<StudyId>,
     /// At most so many.
     pub limit: u32,
 }
 
-impl Chosen {
-    /// The newest ones.
+impl StudyFilter {
+    /// The newest studies, archived or not.
     pub fn newest(limit: u32) -> Self {
         Self { limit, ..Self::default() }
     }
@@ -29,53 +35,21 @@ impl Chosen {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn page(db: &mut Connection, reach: Reach, chosen: Chosen) -> StoreResult<Vec<Study>> {
-    let (every, open, principal) = binds(reach);
-    let sql = concat!(
-        "select * from studies where ",
-        reached!("id"),
-        " and (?4 is null or id < ?4) and (?5 is null or subject_id = ?5) and (?6 is null or state = ?6) \
-         order by id desc limit ?7"
-    );
-    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(chosen.before).bind(chosen.subject);
-    let query = query.bind(chosen.state.map(StudyState::as_str)).bind(chosen.limit);
-    query.fetch_all(db).await?.iter().map(from_row).collect()
-}
-
-/// Which studies a list shows.
-#[derive(Debug, Clone, Default)]
-pub struct Listed {
-    /// Whose name, tags, notes or pseudonym contain this text, whatever its case. Empty for all.
-    pub text: String,
-    /// With this tag. Empty for all.
-    pub tag: String,
-    /// In this state.
-    pub state: Option<StudyState>,
-    /// Archived ones instead of the others.
-    pub archived: bool,
-    /// Older than this one.
-    pub before: Option<StudyId>,
-    /// At most so many.
-    pub limit: u32,
-}
-
-/// Studies that a caller reaches, filtered as people ask for them, newest first.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn listed(db: &mut Connection, reach: Reach, listed: &Listed) -> StoreResult<Vec<Study>> {
+pub async fn page(db: &mut Connection, reach: Reach, filter: &StudyFilter) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!(
         "select s.* from studies s join subjects p on p.id = s.subject_id where ",
         reached!("s.id"),
-        " and (?4 is null or s.id < ?4) and (?5 is null or s.state = ?5) and (s.archived_at is not null) = ?6 \
-         and (?7 = '' or instr(lower(s.name || char(10) || p.pseudonym || char(10) || coalesce(s.tags, '') || char(10) || coalesce(s.notes, '')), lower(?7))) \
-         and (?8 = '' or exists (select 1 from json_each(s.tags) where value = ?8)) \
-         order by s.id desc limit ?9"
+        " and (?4 is null or s.id < ?4) and (?5 is null or s.subject_id = ?5) and (?6 is null or s.state = ?6) \
+         and (?7 is null or (s.archived_at is not null) = ?7) \
+         and (?8 = '' or instr(lower(s.name || char(10) || p.pseudonym || char(10) || coalesce(s.tags, '') \
+                                     || char(10) || coalesce(s.notes, '')), lower(?8))) \
+         and (?9 = '' or exists (select 1 from json_each(s.tags) where value = ?9)) \
+         order by s.id desc limit ?10"
     );
-    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(listed.before);
-    let query = query.bind(listed.state.map(StudyState::as_str)).bind(listed.archived);
-    let query = query.bind(&listed.text).bind(&listed.tag).bind(listed.limit);
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(filter.before).bind(filter.subject);
+    let query = query.bind(filter.state.map(StudyState::as_str)).bind(filter.archived);
+    let query = query.bind(&filter.text).bind(&filter.tag).bind(filter.limit);
     query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 

@@ -5,8 +5,8 @@ mod plan;
 mod state;
 
 pub use lists::{
-    Chosen, Listed, active, asking_raters, ended_before, is_named, listed, of_subject, of_subject_with_safety_reports,
-    open_of, page, tags, waiting_for_people, with_safety_reports,
+    StudyFilter, active, asking_raters, ended_before, is_named, of_subject, of_subject_with_safety_reports, open_of,
+    page, tags, waiting_for_people, with_safety_reports,
 };
 pub use plan::{Evaluation, FeedbackMode, StudyPlan};
 pub use state::StudyState;

@@ -344,7 +344,7 @@ class LabMethods(Transport):
         The session consists of a walk without the device, then one with each gait. The order of the gaits is drawn at
         random when the session is planned, and concealed.
 
-        Fields: gait_one, gait_two; optionally notes.
+        Fields: trial_a, trial_b; optionally notes.
         """
         return cast(
             LabSessionView,

@@ -15,7 +15,7 @@ use crate::studies::walkable;
 use gaitwright_store::allocations::{self, Lot, Sided};
 use gaitwright_store::audit;
 use gaitwright_store::feedback::{self, Attribution, Source};
-use gaitwright_store::presentations::{self, Judgement, NewPairAnswer, NewPresentation, Presentation};
+use gaitwright_store::presentations::{self, Judgement, Kind, NewPairAnswer, NewPresentation, Presentation};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{
     Connection, LentWriter, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
@@ -115,7 +115,7 @@ pub async fn next<'a>(
         kind: drawn.kind,
         pair: drawn.pair,
         repeats: drawn.repeats,
-        unblinded: could_have_known(&mut writer, caller, study).await?,
+        could_have_known: could_have_known(&mut writer, caller, study).await?,
     };
     let id = presentations::insert(&mut writer, &new).await?;
     allocations::of_pair(&mut writer, id, drawn.again, Lot::draw()?).await?;
@@ -124,7 +124,7 @@ pub async fn next<'a>(
     Ok((writer, Some(shown)))
 }
 
-/// The trials of pairs whose gaits have an open safety report.
+/// The trials of pairs whose gaits have a safety report in force.
 async fn closed_among(
     db: &mut Connection,
     safety_reports: &SafetyReports,
@@ -132,7 +132,7 @@ async fn closed_among(
 ) -> Result<Vec<TrialId>, Error> {
     let mut closed = Vec::new();
     for trial in pairs.flat_map(|(a, b)| [a, b]).collect::<BTreeSet<_>>() {
-        if safety_reports.closes(&trials::get(db, trial).await?) {
+        if safety_reports.forbid(&trials::get(db, trial).await?) {
             closed.push(trial);
         }
     }
@@ -154,7 +154,7 @@ async fn cancel(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
         response_ms: None,
         note: "",
         feedback: None,
-        could_have_known: open.unblinded,
+        could_have_known: open.could_have_known,
     };
     presentations::answer(writer, open.id, retracted).await?;
     Ok(())
@@ -199,7 +199,7 @@ pub async fn answer(
         }
         let gaits = judgement.unsafe_of(shown.pair());
         let is_repeated = shown.answer == Some(judgement) && shown.note == given.note;
-        if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.close_all(&gaits)) {
+        if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.are_all_in_force(&gaits)) {
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
         return Ok((shown.study_id, Answered { number: shown.number }));
@@ -212,7 +212,7 @@ pub async fn answer(
         let (study, pair) = (shown.study_id, shown.pair());
         let again = if shown.kind == Kind::Repeat { Again::Meant } else { Again::Refused };
         let statement = GivenJudgement { study, pair, fields, judgement, attribution, again };
-        preference::hear(writer, statement).await.map_err(without_gaits)?
+        preference::record(writer, statement).await.map_err(without_gaits)?
     };
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
     let row = NewPairAnswer {
@@ -264,7 +264,7 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Resul
                    review it.";
         return Err(Error::conflict(why));
     }
-    if let Some(heard) = presentations::heard_of(writer, shown.id).await?
+    if let Some(heard) = presentations::feedback_of(writer, shown.id).await?
         // Staff may have retracted it already.
         && feedback::get(writer, heard).await?.retraction.is_none()
     {

@@ -55,7 +55,7 @@ pub struct RaterFigures {
     /// Number of answers that reported a gait as unsafe.
     pub unsafe_gaits: u32,
     /// Number of presentations in which the rater could have known the allocation. The shares exclude them.
-    pub unblinded: u32,
+    pub could_have_known: u32,
 }
 
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
@@ -80,14 +80,14 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterFigures 
         repeats_agree: repeats_agree(&own),
         cannot_tell: count(&|s| s.answer == Some(Judgement::CannotTell)),
         unsafe_gaits: count(&is_unsafe),
-        unblinded: count(&|s| s.unblinded),
+        could_have_known: count(&|s| s.could_have_known),
     }
 }
 
 fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
     let mut own = sides.iter().filter(|sided| sided.presentation.rater == rater).peekable();
     own.peek()?;
-    let blind = own.filter(|sided| !sided.presentation.unblinded && sided.presentation.kind != Kind::Null);
+    let blind = own.filter(|sided| !sided.presentation.could_have_known && sided.presentation.kind != Kind::Null);
     let answers: Vec<Judgement> = blind.filter_map(Sided::answer).collect();
     let count =
         |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
@@ -97,8 +97,9 @@ fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
 
 /// Compares each plain answer with the previous one to the same pair.
 fn repeats_agree(own: &[&Presentation]) -> Share {
-    let plain =
-        |shown: &&Presentation| !shown.unblinded && shown.kind != Kind::Null && shown.answer.is_some_and(is_plain);
+    let plain = |shown: &&Presentation| {
+        !shown.could_have_known && shown.kind != Kind::Null && shown.answer.is_some_and(is_plain)
+    };
     let answered: Vec<&Presentation> = own.iter().copied().filter(plain).collect();
     let (mut agree, mut of) = (0_u32, 0_u32);
     for (place, shown) in answered.iter().enumerate() {

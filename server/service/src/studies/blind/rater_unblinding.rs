@@ -31,7 +31,7 @@ pub struct UnblindedPair {
     /// Earlier presentation that it repeats.
     pub repeats: Option<PresentationId>,
     /// Whether the rater could have known the allocation.
-    pub unblinded: bool,
+    pub could_have_known: bool,
     /// Time at which the pair was drawn.
     pub created_at: Instant,
     /// Answer in terms of what was shown. Absent if there is none yet.
@@ -53,7 +53,7 @@ impl From<&Sided> for UnblindedPair {
             shown_first,
             shown_second,
             repeats: row.repeats,
-            unblinded: row.unblinded,
+            could_have_known: row.could_have_known,
             created_at: row.created_at,
             answer: sided.answer(),
             answered_at: row.answered_at,

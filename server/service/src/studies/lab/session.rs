@@ -24,9 +24,9 @@ const LONGEST_NOTE: usize = 2000;
 #[serde(deny_unknown_fields)]
 pub struct NewLabSession {
     /// Converged trial with one of the two gaits.
-    pub gait_one: TrialId,
+    pub trial_a: TrialId,
     /// Converged trial with the other gait.
-    pub gait_two: TrialId,
+    pub trial_b: TrialId,
     /// Free text, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -36,10 +36,10 @@ pub struct NewLabSession {
 /// Which of a session's two gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GaitOfWalk {
-    /// Gait one.
-    One,
-    /// Gait two.
-    Two,
+    /// Gait A.
+    A,
+    /// Gait B.
+    B,
 }
 
 /// Releases the controller file of a walk and records who fetched it, because the file reveals the gait. Only the
@@ -60,7 +60,7 @@ pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, 
     let is_one = allocations::for_device(writer, id, walk, (&caller.actor, to_device)).await?;
     let detail = json!({ "walk": walk, "to_device": to_device });
     audit::append(writer, &caller.actor, "lab_session.controller_file", &format!("lab session {id}"), &detail).await?;
-    Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::One } else { GaitOfWalk::Two })
+    Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::A } else { GaitOfWalk::B })
 }
 
 /// Checks that a number is that of a walk with the device.
@@ -105,7 +105,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
     Ok(kept.into_iter().map(|(listed, _)| listed).collect())
 }
 
-/// The two gaits of a session for the next walk, gait one first.
+/// The two gaits of a session for the next walk, gait A first.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a walk without the device or an unknown walk, [`Error::Conflict`] if the session is closed or
@@ -125,8 +125,8 @@ pub async fn gaits_to_walk_with(
 /// Both gaits of a session. The error does not say which one is not walkable: to a user who knows which walk is next,
 /// that would reveal the allocation.
 async fn both_walkable(db: &mut Connection, session: &LabSession) -> Result<(WalkableGait, WalkableGait), Error> {
-    let one = walkable::admit(db, session.gait_one).await?;
-    let two = walkable::admit(db, session.gait_two).await?;
+    let one = walkable::admit(db, session.trial_a).await?;
+    let two = walkable::admit(db, session.trial_b).await?;
     one.and_then(|one| Ok((one, two?))).map_err(|reason| match reason {
         NotWalkable::Withdrawn => reason.into(),
         _ => Error::conflict(
@@ -155,18 +155,18 @@ pub async fn plan(
 ) -> Result<LabSession, Error> {
     studies::get(writer, study).await?;
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
-    walkable::admit_pair(writer, study, ("gait_one", "gait_two"), (new.gait_one, new.gait_two)).await?;
+    walkable::admit_pair(writer, study, ("trial_a", "trial_b"), (new.trial_a, new.trial_b)).await?;
     let before = lab_sessions::of_study(writer, study).await?.len();
     let row = lab_sessions::NewLabSession {
         study_id: study,
         number: u32::try_from(before).unwrap_or(u32::MAX).saturating_add(1),
-        gait_one: new.gait_one,
-        gait_two: new.gait_two,
+        trial_a: new.trial_a,
+        trial_b: new.trial_b,
         notes: &new.notes,
     };
     let id = lab_sessions::insert(writer, actor, &row).await?;
     allocations::of_session(writer, id, row.number, Lot::draw()?).await?;
-    let detail = json!({ "study": study, "number": row.number, "gait_one": row.gait_one, "gait_two": row.gait_two });
+    let detail = json!({ "study": study, "number": row.number, "trial_a": row.trial_a, "trial_b": row.trial_b });
     audit::append(writer, actor, "lab_session.plan", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)
 }

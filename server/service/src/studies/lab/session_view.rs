@@ -13,10 +13,10 @@ use utoipa::ToSchema;
 pub enum Condition {
     /// Without the device.
     Normal,
-    /// With gait one.
-    GaitOne,
-    /// With gait two.
-    GaitTwo,
+    /// With gait A.
+    GaitA,
+    /// With gait B.
+    GaitB,
 }
 
 /// State of a session.
@@ -77,9 +77,9 @@ pub struct LabSessionView {
     /// State of the session.
     pub state: LabSessionState,
     /// The trial with the first of the two gaits. Does not imply the order of the walks.
-    pub gait_one: TrialId,
+    pub trial_a: TrialId,
     /// The trial with the second of the two gaits.
-    pub gait_two: TrialId,
+    pub trial_b: TrialId,
     /// Free text.
     pub notes: String,
     /// The three walks.
@@ -122,8 +122,8 @@ impl From<&LabSession> for LabSessionView {
             study_id: session.study_id,
             number: session.number,
             state: LabSessionState::of(session),
-            gait_one: session.gait_one,
-            gait_two: session.gait_two,
+            trial_a: session.trial_a,
+            trial_b: session.trial_b,
             notes: session.notes.clone(),
             walks: (1..=WALKS).map(walk).collect(),
             answer: session.answer().map(|answer| AnswerView::of(session, answer)),
@@ -142,15 +142,15 @@ fn condition(session: &LabSession, walk: u8) -> Option<Condition> {
     if walk == 1 {
         return Some(Condition::Normal);
     }
-    let one_first = session.allocation.gait_one_first?;
-    Some(if one_first == (walk == 2) { Condition::GaitOne } else { Condition::GaitTwo })
+    let one_first = session.allocation.gait_a_first?;
+    Some(if one_first == (walk == 2) { Condition::GaitA } else { Condition::GaitB })
 }
 
 /// The gait of a walk; `None` without the device, and while the session is blinded.
 pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
     match condition(session, walk)? {
         Condition::Normal => None,
-        Condition::GaitOne => Some(session.gait_one),
-        Condition::GaitTwo => Some(session.gait_two),
+        Condition::GaitA => Some(session.trial_a),
+        Condition::GaitB => Some(session.trial_b),
     }
 }

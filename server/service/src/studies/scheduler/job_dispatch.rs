@@ -4,8 +4,9 @@ use super::super::prefetch::{PREPARED, Prepared};
 use super::super::solve_input::{PackedInput, SolveInput};
 use super::super::trial_result;
 use super::Scheduler;
+use crate::dispatch_error::DispatchError;
 use crate::error::Error;
-use crate::workers::{Assignment, Attempt, DispatchError};
+use crate::workers::{Assignment, Attempt};
 use gaitwright_store::jobs::{self, Lease};
 use gaitwright_store::{Store, TrialId, commit, now, trials};
 

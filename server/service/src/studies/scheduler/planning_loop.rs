@@ -122,7 +122,7 @@ impl Scheduler {
         }
     }
 
-    /// Requests the certificates that the next comparison needs.
+    /// Requests the certificates that gaits still lack, because people are shown certified gaits only.
     pub(super) fn certify_for_people(&self, snapshot: &StudySnapshot) {
         if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
             for trial in snapshot.trials.iter().filter(|trial| snapshot.waits_for_certificate(trial)) {

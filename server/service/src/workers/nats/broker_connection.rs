@@ -1,6 +1,7 @@
 //! The connection to a broker: its streams, consumers and subjects.
 
-use crate::workers::dispatch::{Attempt, DispatchError};
+use crate::dispatch_error::DispatchError;
+use crate::workers::dispatch::Attempt;
 use async_nats::connection::State;
 use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
 use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stream};

@@ -2,8 +2,9 @@
 
 use super::broker_connection::{AGAIN, BROKER_HEARTBEAT, BrokerConnection, EXPIRES, unreachable};
 use super::message::{PROGRAM, ResultMessage, Sign, SolveOrder, pack, unpack};
+use crate::dispatch_error::DispatchError;
 use crate::workers::Assignment;
-use crate::workers::dispatch::{Dispatch, DispatchError, News, Receipt};
+use crate::workers::dispatch::{Dispatch, News, Receipt};
 use async_nats::jetstream::stream::{LastRawMessageErrorKind, Stream};
 use async_nats::jetstream::{self, AckKind};
 use futures_util::StreamExt;

@@ -1,7 +1,8 @@
 //! Messages between service and workers: compressed MessagePack, which preserves every bit of a number.
 
+use crate::dispatch_error::DispatchError;
 use crate::workers::dispatch::Assignment;
-use crate::workers::dispatch::{Attempt, DispatchError, Finding};
+use crate::workers::dispatch::{Attempt, Finding};
 use gait_optimizer::IterationRecord;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,8 @@
 
 use super::broker_connection::{AGAIN, BrokerConnection, unreachable};
 use super::message::{PROGRAM, ResultMessage, Sign, SolveOrder, pack, unpack};
-use crate::workers::dispatch::{Attempt, Dispatch, DispatchError, Finding, News};
+use crate::dispatch_error::DispatchError;
+use crate::workers::dispatch::{Attempt, Dispatch, Finding, News};
 use crate::workers::{Evaluate, InProcess};
 use async_nats::jetstream::message::Acker;
 use async_nats::jetstream::{self, AckKind};

@@ -37,7 +37,7 @@ pub(super) async fn answers(
             continue;
         };
         let author = printable::person(&row.author);
-        let walked = sessions.iter().filter(|session| sorted(session.gait_one, session.gait_two) == compared).count();
+        let walked = sessions.iter().filter(|session| sorted(session.trial_a, session.trial_b) == compared).count();
         let most = if author == printable::person(subject) { 1 + walked } else { 1 };
         let count = answered.entry((compared, author)).or_default();
         *count += 1;
@@ -52,12 +52,12 @@ pub(super) async fn answers(
     let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.content)?))).collect();
     for assessment in &noted {
         let what = format!("assessment {}", assessment.id);
-        at(&what, of_gaits(trials, [assessment.first, assessment.second]))?;
-        let compared = [assessment.first, assessment.second].map(|id| trials.get(&id).copied());
+        at(&what, of_gaits(trials, [assessment.trial_a, assessment.trial_b]))?;
+        let compared = [assessment.trial_a, assessment.trial_b].map(|id| trials.get(&id).copied());
         if let [Some(first), Some(second)] = compared {
             at(&what, after_both(assessment.created_at, [first, second]))?;
         }
-        let wanted = sorted(assessment.first, assessment.second);
+        let wanted = sorted(assessment.trial_a, assessment.trial_b);
         if assessment.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
             return Err(refuse(format!("{what}: the preference derived from it is about other trials")));
         }

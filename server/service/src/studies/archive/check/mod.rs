@@ -16,7 +16,7 @@ use gaitwright_store::archive::Definition;
 use gaitwright_store::archived_row::{Cell, Row};
 use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::quarantine::Quarantine;
-use gaitwright_store::studies::{Chosen, Study};
+use gaitwright_store::studies::{Study, StudyFilter};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
     Connection, Instant, StudyId, TrialId, archive, devices, lab_sessions, measurement_files, now, reference_gaits,
@@ -103,7 +103,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
         at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is not an identifier")))?;
     }
     let db = quarantine.db();
-    let found = at("studies", studies::page(db, Reach::Every, Chosen::newest(2)).await)?;
+    let found = at("studies", studies::page(db, Reach::Every, &StudyFilter::newest(2)).await)?;
     let [study] = &found[..] else { return Err(refuse(format!("it has {} studies instead of one", found.len()))) };
     let study = study.clone();
     at(format!("study {}", study.id), study_plan::check_plan(&study.plan))?;
@@ -181,7 +181,7 @@ async fn lab(
 ) -> Result<Vec<LabSession>, Error> {
     let sessions = at("lab_sessions", lab_sessions::of_study(db, study).await)?;
     for session in &sessions {
-        at(format!("lab session {}", session.id), of_gaits(trials, [session.gait_one, session.gait_two]))?;
+        at(format!("lab session {}", session.id), of_gaits(trials, [session.trial_a, session.trial_b]))?;
         for found in at("measurement_files", measurement_files::of_session(db, session.id).await)? {
             at(format!("measurement file {}", found.id), lab::check_kept(db, pool, &found).await)?;
         }

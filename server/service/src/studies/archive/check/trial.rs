@@ -2,8 +2,8 @@
 
 use super::Context;
 use crate::studies::{search_space, trial_state};
+use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::solve::CONVERGED_VIOLATION;
-use gait_optimizer::walking::progress_error_m;
 use gait_optimizer::{Gait, GaitFigures, ReferenceGait, WarmStart};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::studies::StudyPlan;

@@ -1,10 +1,10 @@
 //! Phase variable and hip velocity of a gait at its nodes.
 
-use super::{CYCLE, phase_gradient};
+use super::{DomainTrajectory, Gait};
 use crate::body::WalkerModel;
-use crate::gait::Gait;
 use crate::model_error::ModelError;
 use crate::quadrature::simpson;
+use crate::walking::{CYCLE, phase_gradient};
 
 /// Phase and hip velocity at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,7 @@ pub struct PhaseProgress {
 /// [`ModelError`] if subject or device of the gait is invalid.
 pub fn progress(gait: &Gait) -> Result<Vec<PhaseProgress>, ModelError> {
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
-    let of_domain = |(domain, trajectory): (_, &crate::gait::DomainTrajectory)| {
+    let of_domain = |(domain, trajectory): (_, &DomainTrajectory)| {
         let gradient = phase_gradient(&model, domain);
         let along =
             |coordinates: &[f64; 9]| -> f64 { gradient.iter().zip(&coordinates[2..]).map(|(g, c)| g * c).sum() };

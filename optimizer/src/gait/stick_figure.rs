@@ -1,7 +1,7 @@
 //! Joint positions, for drawings of a gait.
 
+use super::Gait;
 use crate::body::{FootPoint, PointState, Side, WalkerModel};
-use crate::gait::Gait;
 use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 
