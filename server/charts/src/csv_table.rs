@@ -86,7 +86,7 @@ numbers!(f64, u32, u64, i64, usize);
 /// A row of cells.
 #[macro_export]
 macro_rules! cells {
-    ($($value:expr),* $(,)?) => { vec![$($crate::csv_table::Cell::from($value)),*] };
+    ($($value:expr),* $(,)?) => { vec![$($crate::csv_table::CsvCell::from($value)),*] };
 }
 pub use cells;
 

@@ -242,7 +242,7 @@ impl Entry {
 
 #[cfg(test)]
 mod tests {
-    use super::Kind;
+    use super::ProblemKind;
     use std::collections::BTreeSet;
 
     #[test]

@@ -43,7 +43,7 @@ impl From<KeptReport> for TrialExecutionReport {
 
 /// Get the execution report of a trial
 ///
-/// The newest report of walks that were simulated with the gait outside the optimiser's model.
+/// The newest report of simulated walks with the gait. The simulation does not use the optimiser's model.
 #[utoipa::path(
     get,
     path = "/trials/{id}/execution-report",

@@ -7,6 +7,7 @@ mod belief;
 mod certainty;
 mod certificate;
 mod compare;
+mod compare_answer;
 mod devices;
 mod disk_space_notice;
 mod explanation;
@@ -36,6 +37,7 @@ mod simulated_walks;
 mod study;
 mod study_details;
 mod subject;
+mod subjects;
 mod system;
 mod undo;
 mod units;
@@ -63,9 +65,9 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/{id}/details", get(study_details::get).post(study_details::post))
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
-        .route("/studies/{id}/retract", post(compare::retract))
+        .route("/studies/{id}/retract", post(compare_answer::retract))
         .route("/studies/{id}/members", get(members::get).post(members::post))
-        .route("/subjects", get(subject::list).post(subject::add))
+        .route("/subjects", get(subjects::list).post(subjects::add))
         .route("/subjects/{id}", get(subject::get))
         .route("/subjects/{id}/consent", post(subject::consent))
         .route("/subjects/{id}/withdraw", post(subject::withdraw))

@@ -4,7 +4,7 @@ use gait_optimizer::execution;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Simulated walks with a gait, outside the optimiser's model.
+/// Simulated walks with a gait, by a model other than the optimiser's.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ExecutionReport {
     /// Version of this layout and of the simulation.

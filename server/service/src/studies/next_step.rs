@@ -20,7 +20,7 @@ const FAILURES_IN_A_ROW: usize = 3;
 /// What a study needs next.
 pub(super) enum PlanningStep {
     Nothing,
-    StudyTransition(StudyTransition, String),
+    Act(StudyTransition, String),
     Try(NewTrial),
 }
 

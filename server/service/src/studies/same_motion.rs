@@ -21,7 +21,7 @@ pub struct GaitMotion {
 #[derive(Debug, Clone, PartialEq)]
 enum KnownBy {
     /// The optimiser computed the gait, and these figures of its report identify it.
-    MotionFigures(MotionFigures),
+    Figures(MotionFigures),
     /// A lab script evaluated the bounds with a tool of its own, so nothing but the bounds identifies the gait.
     Bounds,
 }

@@ -26,7 +26,7 @@ pub(super) enum TrialJobState<R> {
     /// Queued.
     Queued(R),
     /// Running.
-    RunningJob {
+    Running {
         /// The request.
         request: R,
         /// Start of the job.

@@ -1,62 +1,40 @@
 //! The study page, kept current by events.
 
 mod answers;
+mod live_part;
 mod recommended_walker;
 mod time_left;
+mod transitions;
 mod trials_table;
 mod without_gait;
 
-use self::answers::{AnswerRow, answers};
 pub(super) use self::answers::{answer_in_words, assessment_in_words};
-use self::recommended_walker::RecommendedGait;
-use self::time_left::time_left;
-use self::trials_table::{TrialRow, TrialsQuery, TrialsTable};
-use self::without_gait::WithoutGait;
-use super::certainty::certainty;
-use super::page_chart::PageChart;
+use self::live_part::{RunningRow, read_live, running_row};
+pub(super) use self::transitions::post;
+use self::trials_table::TrialsQuery;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extractors::{Form, Params};
-use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
-use crate::format::{self, Bound};
+use crate::extractors::Params;
+use crate::format::{self};
 use crate::page_error::{PageError, PageResult, page};
 use crate::units::Units;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
-use axum::response::{IntoResponse, Redirect, Response};
-use gait_learner::LearnerError;
-use gaitwright_charts::Figure;
-use gaitwright_charts::gait_charts;
-use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
+use axum::response::{IntoResponse, Response};
+use gaitwright_service::access::{Administer, Permission, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
-use gaitwright_service::studies::certified_best::{self, CertificateState, Judged};
-use gaitwright_service::studies::equal_actions::never_active;
-use gaitwright_service::studies::execution;
-use gaitwright_service::studies::lifecycle::{StudyTransition, acts_of_people};
-use gaitwright_service::studies::safety_reports::ReportedGait;
-use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::study_change::{self, Extend};
-use gaitwright_service::studies::trial_choice::MANY;
-use gaitwright_service::studies::{command, lifecycle};
-use gaitwright_service::workers::Track;
-use gaitwright_store::assessments::{self};
+use gaitwright_service::studies::lifecycle;
 use gaitwright_store::devices::{self, Device};
-use gaitwright_store::feedback::{self};
 use gaitwright_store::imports::{self, Import};
-use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::Study;
 use gaitwright_store::subjects::{self, Subject};
-use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
+use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{
-    Instant, LabSessionId, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, lab_sessions,
-    reference_gaits, studies, trials,
+    LabSessionId, StudyId, TrialId, consents, events, lab_sessions, reference_gaits, studies, trials,
 };
-use serde::Deserialize;
-use std::sync::Arc;
 
 #[derive(Template)]
 #[template(path = "study.html")]
@@ -96,145 +74,6 @@ impl ClosedPage {
         lifecycle::in_words(self.study.state)
     }
 }
-
-/// The part that changes while the study runs.
-#[derive(Template)]
-#[template(path = "study_live.html")]
-struct Live {
-    study: Study,
-    state: String,
-    acts: Vec<ActButton>,
-    /// Whether it can be stopped.
-    may_stop: bool,
-    /// Whether it has ended and can get more trials.
-    may_extend: bool,
-    counts: TrialCounts,
-    /// Why trials have no gait.
-    without_gait: Option<WithoutGait>,
-    /// The bounds that were active in no gait so far; empty if none or unknown.
-    never_active: String,
-    /// Number of results, and number of planned trials.
-    progress: [String; 2],
-    /// Expected remaining time; empty unless the study runs.
-    pace: String,
-    /// Why the next solve has not started; empty if one runs.
-    queued: String,
-    running: Vec<RunningRow>,
-    best: Option<BestGait>,
-    /// How sure the recommendation is; `None` without one, and for a large study.
-    certainty: Option<String>,
-    /// The recommended gait, or its place.
-    walker: RecommendedGait,
-    unanswered: bool,
-    /// Whether only people answer comparisons.
-    people_answer: bool,
-    /// The utility of the recommended gait over the answers of people.
-    utility: Option<PageChart>,
-    /// Gait RMSE of the best action by iteration.
-    chart: Option<PageChart>,
-    table: TrialsTable,
-    /// Warm-start tree.
-    tree: Option<PageChart>,
-    answers: Vec<AnswerRow>,
-    unsafe_gaits: Vec<UnsafeGait>,
-    question: bool,
-    /// The trial whose certificate the next comparison waits for.
-    question_after: Option<(TrialId, u32)>,
-    can_compare: bool,
-}
-
-impl Live {
-    /// How many of the newest trials the warm-start tree shows.
-    const BRANCHES: usize = 100;
-
-    fn is_best(&self, row: &TrialRow) -> bool {
-        self.best.as_ref().is_some_and(|best| best.id == row.id)
-    }
-
-    /// Whether the study has ended and nothing waits for a person, so that the recommended gait comes before the state.
-    fn leads_with_outcome(&self) -> bool {
-        self.unsafe_gaits.is_empty() && !self.question && self.study.state.has_ended()
-    }
-
-    /// Whether answers are missing from the list.
-    fn has_more_answers(&self) -> bool {
-        self.answers.len() >= ANSWERS
-    }
-
-    /// Whether the warm-start tree shows the newest trials only.
-    fn has_more_branches(&self) -> bool {
-        self.counts.total as usize > Self::BRANCHES
-    }
-
-    fn is_unsafe(&self, row: &TrialRow) -> bool {
-        self.unsafe_gaits.iter().any(|gait| gait.id == row.id)
-    }
-}
-
-struct ActButton {
-    act: &'static str,
-    label: &'static str,
-}
-
-struct RunningRow {
-    id: TrialId,
-    number: u32,
-    text: String,
-    chart: Option<PageChart>,
-}
-
-struct BestGait {
-    id: TrialId,
-    number: u32,
-    rmse: String,
-    cost: String,
-    bounds: Vec<Bound>,
-    has_gait: bool,
-    /// Whether a script evaluated it and reported figures only.
-    by_script: bool,
-    /// The state of its certificate.
-    judged: Judged,
-    /// How many simulated walks with it were complete; `None` if none were simulated.
-    simulated_walks: Option<String>,
-    /// If it failed, the best trial whose gait passed.
-    passing: Option<Passing>,
-}
-
-impl BestGait {
-    fn failed(&self) -> bool {
-        self.judged.certificate == CertificateState::Failed
-    }
-
-    fn passed(&self) -> bool {
-        self.judged.certificate == CertificateState::Passed
-    }
-
-    fn is_being_certified(&self) -> bool {
-        self.judged.certificate == CertificateState::BeingCertified
-    }
-}
-
-/// A trial whose gait passed its certificate.
-struct Passing {
-    id: TrialId,
-    number: u32,
-    rmse: String,
-}
-
-/// A gait that was reported as unsafe.
-struct UnsafeGait {
-    id: TrialId,
-    number: u32,
-    by: String,
-    at: Instant,
-    /// Whether staff reviewed the report and kept the gait unsafe.
-    reviewed: bool,
-}
-
-/// How many of the newest trials of a large study the chart shows.
-const SHOWN: u32 = 200;
-/// How many of the newest answers the list shows.
-const ANSWERS: usize = 50;
 
 /// `GET /studies/{id}`.
 pub(super) async fn get(
@@ -307,257 +146,4 @@ pub(super) async fn running(
     let trial = trials::get(&mut *app.read().await?, id).await?;
     let Some(track) = app.scheduler.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
     Ok(page(&RunningPage { row: running_row(&trial, Some(&track)) })?.into_response())
-}
-
-/// The form of a button.
-#[derive(Debug, Deserialize)]
-pub(super) struct Do {
-    act: String,
-    /// The new total number of trials, for an extension.
-    #[serde(default)]
-    trial_budget: String,
-}
-
-/// `POST /studies/{id}/do`.
-pub(super) async fn post(
-    authorized: Authorized<Run>,
-    State(app): State<AppState>,
-    Id(id, _): Id<StudyId, Run>,
-    Form(form): Form<Do>,
-) -> Result<Redirect, PageError> {
-    let act = lifecycle::StudyTransition::ALL
-        .into_iter()
-        .find(|act| act.as_str() == form.act && acts_for_pages(*act))
-        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop or extend"))?;
-    let mut writer = app.write().await?;
-    let cancelled = if act == StudyTransition::Extend {
-        let refused =
-            || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
-        let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
-        study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
-        Vec::new()
-    } else {
-        command::act(&mut writer, &authorized.caller.actor, id, act, "").await?.cancelled
-    };
-    commit(writer).await?;
-    for trial in cancelled {
-        app.scheduler.cancel_solve(trial).await;
-    }
-    app.scheduler.changed();
-    Ok(Redirect::to(&format!("/studies/{id}")))
-}
-
-/// Whether the page has a button for it.
-fn acts_for_pages(act: StudyTransition) -> bool {
-    matches!(
-        act,
-        StudyTransition::Start
-            | StudyTransition::Pause
-            | StudyTransition::Resume
-            | StudyTransition::Stop
-            | StudyTransition::Extend
-    )
-}
-
-/// Acts that need no confirmation.
-fn button(act: StudyTransition) -> Option<ActButton> {
-    match act {
-        StudyTransition::Start => Some(ActButton { act: "start", label: "Start" }),
-        StudyTransition::Pause => Some(ActButton { act: "pause", label: "Pause" }),
-        StudyTransition::Resume => Some(ActButton { act: "resume", label: "Resume" }),
-        _ => None,
-    }
-}
-
-async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: TrialsQuery) -> Result<Live, Error> {
-    let mut reader = app.read().await?;
-    let study = studies::get(&mut reader, id).await?;
-    let counts = trials::counts(&mut reader, id).await?;
-    // The computing time of the learner also grows with the answers.
-    let heard = feedback::count(&mut reader, id).await? as usize;
-    let large = counts.total as usize >= MANY || heard > MOST_ANSWERS;
-    let snapshot = if large {
-        StudySnapshot::newest(&mut reader, study, SHOWN).await?
-    } else {
-        StudySnapshot::read(&mut reader, study).await?
-    };
-    let shown = choice.shown.clone();
-    let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
-    let assessments = assessments::of_study(&mut reader, id).await?;
-    drop(reader);
-    let beliefs = Arc::clone(&app.beliefs);
-    let draw = move |pool: &OnPool| {
-        let outcome = learned(pool, &snapshot, large, &beliefs);
-        (snapshot, outcome)
-    };
-    let (snapshot, learned) = app.compute(draw).await?;
-    let Learned { outcome, certainty, utility } = learned.map_err(Error::Learner)?;
-    let mut reader = app.read().await?;
-    let mut judged = certified_best::judged(&mut reader, &outcome.ranking).await?;
-    let without_gait = WithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
-    let has_gait = match outcome.best {
-        Some(best) => gaits::is_here(&mut reader, best).await?,
-        None => false,
-    };
-    let simulated_walks = match outcome.best {
-        Some(best) => execution::newest(&mut reader, best).await?.map(|kept| kept.simulated.report.sentence()),
-        None => None,
-    };
-    drop(reader);
-    if let Some(next) = judged.without_certificate {
-        judged.certified_by_service(app.scheduler.is_certifying(id, next));
-    }
-    let running = snapshot
-        .trials
-        .iter()
-        .filter(|trial| trial.state == TrialState::Running)
-        .map(|trial| running_row(trial, app.scheduler.board().track(trial.id).as_ref()))
-        .collect();
-    let mut answers = answers(&snapshot, &assessments);
-    answers.truncate(ANSWERS);
-    let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let found = StudyFindings { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait };
-    let pace = time_left(&snapshot, counts.results(), app.scheduler.workers());
-    // The newest trials do not say it of all.
-    let inactive = if large { Vec::new() } else { never_active(&snapshot) };
-    let mut live = view(snapshot, counts, found, running, table, answers, caller.may(Run::NEEDED));
-    live.never_active = inactive.join(", ");
-    live.pace = pace;
-    let best = live.best.as_ref().map(|best| (best.id, best.number, best.has_gait));
-    live.walker = RecommendedGait::read(app, &live.study, best, &shown).await?;
-    if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
-        live.queued = waits_for_a_worker(jobs::depth_of_others(&mut *app.read().await?, id).await?);
-    }
-    Ok(live)
-}
-
-/// What the learner says of a study.
-struct Learned {
-    outcome: StudyOutcome,
-    certainty: Option<String>,
-    utility: Option<Figure>,
-}
-
-fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, beliefs: &Beliefs) -> Result<Learned, LearnerError> {
-    let outcome = StudyOutcome::of(pool, snapshot, large, beliefs)?;
-    if large || outcome.best.is_none() {
-        return Ok(Learned { outcome, certainty: None, utility: None });
-    }
-    let certainty = certainty(snapshot, &*beliefs.of(pool, snapshot)?);
-    Ok(Learned { outcome, certainty, utility: utility(pool, snapshot, beliefs)? })
-}
-
-fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
-    let records = track.map_or(&[][..], |track| &track.records);
-    let text = records.last().map_or_else(
-        || "starting".to_owned(),
-        |r| {
-            let violation = format::number(r.constraint_violation);
-            // Counts all iterations, like the chart.
-            let iteration = records.len() - 1;
-            format!("iteration {iteration}, objective {:.4}, violation {violation}", r.objective)
-        },
-    );
-    RunningRow {
-        id: trial.id,
-        number: trial.number,
-        text,
-        chart: gait_charts::solve(records)
-            .map(|figure| PageChart::of(&figure, &format!("/api/v1/trials/{}/figures", trial.id), "")),
-    }
-}
-
-/// What a study has found, and what the record says of it.
-struct StudyFindings {
-    outcome: StudyOutcome,
-    certainty: Option<String>,
-    utility: Option<Figure>,
-    /// The states of the certificates.
-    judged: Judged,
-    /// How many simulated walks with the best gait were complete.
-    simulated_walks: Option<String>,
-    /// Whether the trajectory of the best gait is stored.
-    has_gait: bool,
-    without_gait: Option<WithoutGait>,
-}
-
-fn view(
-    snapshot: StudySnapshot,
-    counts: TrialCounts,
-    found: StudyFindings,
-    running: Vec<RunningRow>,
-    table: TrialsTable,
-    answers: Vec<AnswerRow>,
-    may_run: bool,
-) -> Live {
-    let StudyFindings { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait } = found;
-    let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| BestGait {
-        id: trial.id,
-        number: trial.number,
-        rmse: format::figure(trial.gait_rmse_rad),
-        cost: format::figure(trial.cost_of_transport),
-        bounds: format::bounds(&trial.action),
-        has_gait,
-        by_script: trial.asked_by.is_some(),
-        passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
-            id: trial.id,
-            number: trial.number,
-            rmse: format::figure(trial.gait_rmse_rad),
-        }),
-        judged: judged.clone(),
-        simulated_walks,
-    });
-    let unsafe_gait = |report: &ReportedGait| {
-        let number = snapshot.trial(report.trial)?.number;
-        let reviewed = report.review.is_some();
-        Some(UnsafeGait { id: report.trial, number, by: report.by.clone(), at: report.at, reviewed })
-    };
-    let unsafe_gaits = snapshot.grounds.safety_reports.in_force.iter().filter_map(unsafe_gait).collect();
-    let converged = snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
-    let files = format!("/api/v1/studies/{}/figures", snapshot.study.id);
-    let acts = if may_run { acts_of_people(snapshot.study.state) } else { Vec::new() };
-    Live {
-        state: lifecycle::in_words(snapshot.study.state).to_owned(),
-        may_stop: acts.contains(&StudyTransition::Stop),
-        may_extend: acts.contains(&StudyTransition::Extend),
-        acts: acts.into_iter().filter_map(button).collect(),
-        pace: String::new(),
-        queued: String::new(),
-        without_gait,
-        never_active: String::new(),
-        progress: [counts.results(), snapshot.study.plan.trial_budget].map(|trials| format::count(trials.into())),
-        counts,
-        running,
-        best,
-        certainty,
-        walker: RecommendedGait::None,
-        unanswered: outcome.unanswered,
-        people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
-        utility: utility.map(|figure| PageChart::of(&figure, &files, "")),
-        chart: course(&[(&snapshot, &outcome)]).map(|chart| PageChart::of(&Figure::chart(COURSE, chart), &files, "")),
-        table,
-        tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| PageChart::of(&figure, &files, "")),
-        answers,
-        unsafe_gaits,
-        question: outcome.question && snapshot.study.state != StudyState::Stopped,
-        question_after: outcome
-            .question_after
-            .filter(|_| !snapshot.study.state.has_ended())
-            .and_then(|id| snapshot.trial(id))
-            .map(|trial| (trial.id, trial.number)),
-        can_compare: converged >= 2,
-        study: snapshot.study,
-    }
-}
-
-/// Why the next solve of the study has not started, from the numbers of queued and running solves of other studies.
-fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
-    let solves = |count: u32| if count == 1 { "1 solve".to_owned() } else { format!("{count} solves") };
-    match (running, queued) {
-        (0, _) => "The next solve is queued.".to_owned(),
-        (_, 0) => format!("The next solve is queued. Other studies have {} running.", solves(running)),
-        (_, others) => {
-            format!("The next solve is queued. Other studies have {} running and {others} queued.", solves(running))
-        }
-    }
 }

@@ -157,7 +157,7 @@ pub(super) fn refuse(reason: impl std::fmt::Display) -> Error {
 /// The next part of an archive.
 pub(super) enum Next {
     Row(&'static str, Row),
-    LastLine(ArchiveFacts),
+    End(ArchiveFacts),
 }
 
 impl<R: Read> Unpacker<R> {

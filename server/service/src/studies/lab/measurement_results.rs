@@ -1,7 +1,8 @@
 //! Results of lab measurements: muscle activity over the gait cycle and limit cycles, with the model's values for
 //! unblinded walks.
 
-use super::session::{gait_of, still_shown};
+use super::session::still_shown;
+use super::session_view::gait_of;
 use super::upload::{EmgReading, MotionReading, WHAT};
 use crate::error::Error;
 use gait_optimizer::Gait;

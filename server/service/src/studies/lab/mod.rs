@@ -10,6 +10,7 @@ mod emg_preview;
 mod measurement_results;
 mod question;
 mod session;
+mod session_view;
 mod unblinding;
 mod upload;
 
@@ -22,10 +23,10 @@ pub use measurement_results::{
 };
 pub use question::{AnswerView, WALKS};
 pub use session::{
-    Condition, GaitOfWalk, LabSessionProgress, LabSessionState, LabSessionView, NewLabSession, RecordedWalk, WalkView,
-    checked_walk, close, for_device, gaits_to_plan_with, gaits_to_walk_with, plan, record_walk, session_progress,
-    still_open, was_recorded,
+    GaitOfWalk, LabSessionProgress, NewLabSession, RecordedWalk, checked_walk, close, for_device, gaits_to_plan_with,
+    gaits_to_walk_with, plan, record_walk, session_progress, still_open, was_recorded,
 };
+pub use session_view::{Condition, LabSessionState, LabSessionView, WalkView};
 pub use unblinding::unblind;
 pub use upload::{
     CheckedFile, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, brought, check_kept,

@@ -1,14 +1,14 @@
-//! Lab sessions: planning, recording of walks, closing, and the views that conceal the allocation.
+//! Lab sessions: planning, controller files, recording of walks, closing.
 
-use super::question::{AnswerView, WALKS, asked_answer, can_be_retracted, has_file, next_walk, takes_report};
+use super::question::{AnswerView, WALKS, asked_answer, can_be_retracted, next_walk, takes_report};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::same_motion::is_same_gait;
 use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
-use gaitwright_store::allocations::{self, ControllerFileDownload, Lot};
+use gaitwright_store::allocations::{self, Lot};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::lab_sessions::{self, LabSession, LabSessionStep, SessionStep};
+use gaitwright_store::lab_sessions::{self, LabSession, SessionStep};
 use gaitwright_store::trials::{self, Trial, TrialState};
 use gaitwright_store::trials_table::{self, ListedTrial, Listing};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
@@ -31,155 +31,6 @@ pub struct NewLabSession {
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub notes: String,
-}
-
-/// Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Condition {
-    /// Without the device.
-    Normal,
-    /// With gait A.
-    GaitA,
-    /// With gait B.
-    GaitB,
-}
-
-/// State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `closed`, the
-/// session accepts no more data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LabSessionState {
-    /// No walk is recorded yet.
-    Planned,
-    /// At least one walk is recorded.
-    UnderWay,
-    /// The session accepts no more data.
-    Closed,
-}
-
-impl LabSessionState {
-    /// The name of the state.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Planned => "planned",
-            Self::UnderWay => "under_way",
-            Self::Closed => "closed",
-        }
-    }
-
-    fn of(session: &LabSession) -> Self {
-        if session.done(SessionStep::Closed).is_some() {
-            Self::Closed
-        } else if session.done(SessionStep::Walk(1)).is_some() {
-            Self::UnderWay
-        } else {
-            Self::Planned
-        }
-    }
-}
-
-/// Walk of a session.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WalkView {
-    /// Number of the walk, 1 to 3.
-    pub number: u8,
-    /// Condition of the walk. Absent while it is blinded.
-    pub condition: Option<Condition>,
-    /// Who recorded the walk, and when.
-    pub recorded: Option<LabSessionStep>,
-    /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
-    pub after_unblinding: bool,
-}
-
-/// Lab session, without blinded data.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LabSessionView {
-    /// Identifier.
-    pub id: LabSessionId,
-    /// Identifier of the study.
-    pub study_id: StudyId,
-    /// Number of the session in this study, from 1.
-    pub number: u32,
-    /// State of the session.
-    pub state: LabSessionState,
-    /// The trial with the first of the two gaits. Does not imply the order of the walks.
-    pub trial_a: TrialId,
-    /// The trial with the second of the two gaits.
-    pub trial_b: TrialId,
-    /// Free text.
-    pub notes: String,
-    /// The three walks.
-    pub walks: Vec<WalkView>,
-    /// Current answer of the subject. Absent if there is none.
-    pub answer: Option<AnswerView>,
-    /// Who unblinded the session, when and why. Absent while it is blinded.
-    pub unblinded: Option<LabSessionStep>,
-    /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
-    /// it.
-    pub allocation_included: bool,
-    /// Who fetched controller files of the walks.
-    pub controller_files: Vec<ControllerFileDownload>,
-    /// Who closed the session, and when.
-    pub closed: Option<LabSessionStep>,
-    /// Who planned the session.
-    pub planned_by: String,
-    /// Time of planning.
-    pub created_at: Instant,
-}
-
-impl From<&LabSession> for LabSessionView {
-    fn from(session: &LabSession) -> Self {
-        let walk = |number| {
-            let place = |act| session.acts.iter().position(|(known, _)| *known == act);
-            let recorded = session.done(SessionStep::Walk(number));
-            let unblinded_before = place(SessionStep::Unblinded)
-                .zip(place(SessionStep::Walk(number)))
-                .is_some_and(|(unblinded, walked)| unblinded < walked);
-            WalkView {
-                number,
-                condition: condition(session, number),
-                recorded: recorded.cloned(),
-                after_unblinding: unblinded_before
-                    || recorded.is_some_and(|done| has_file(session, &done.actor, done.at)),
-            }
-        };
-        Self {
-            id: session.id,
-            study_id: session.study_id,
-            number: session.number,
-            state: LabSessionState::of(session),
-            trial_a: session.trial_a,
-            trial_b: session.trial_b,
-            notes: session.notes.clone(),
-            walks: (1..=WALKS).map(walk).collect(),
-            answer: session.answer().map(|answer| AnswerView::of(session, answer)),
-            unblinded: session.done(SessionStep::Unblinded).cloned(),
-            allocation_included: session.allocation.included,
-            controller_files: session.allocation.files.clone(),
-            closed: session.done(SessionStep::Closed).cloned(),
-            planned_by: session.actor.clone(),
-            created_at: session.created_at,
-        }
-    }
-}
-
-/// The condition of a walk; `None` while it is blinded.
-fn condition(session: &LabSession, walk: u8) -> Option<Condition> {
-    if walk == 1 {
-        return Some(Condition::Normal);
-    }
-    let one_first = session.allocation.gait_a_first?;
-    Some(if one_first == (walk == 2) { Condition::GaitA } else { Condition::GaitB })
-}
-
-/// The gait of a walk; `None` without the device, and while the session is blinded.
-pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
-    match condition(session, walk)? {
-        Condition::Normal => None,
-        Condition::GaitA => Some(session.trial_a),
-        Condition::GaitB => Some(session.trial_b),
-    }
 }
 
 /// Which of a session's two gaits.

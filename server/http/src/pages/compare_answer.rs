@@ -1,0 +1,230 @@
+//! The forms with which staff and subjects answer about two gaits of a study, and retract the answer.
+
+use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::extractors::Form;
+use crate::page_error::PageError;
+use axum::extract::State;
+use axum::response::Redirect;
+use gaitwright_service::access::{self, Caller};
+use gaitwright_service::error::Error;
+use gaitwright_service::printable;
+use gaitwright_service::studies::answer::{self, Answer, PairAnswer};
+use gaitwright_service::studies::assessment::{self, NewAssessment};
+use gaitwright_service::studies::preference::{self, CurrentAnswer};
+use gaitwright_service::studies::safety_reports::SafetyReports;
+use gaitwright_store::assessments::AssessmentAnswer;
+use gaitwright_store::feedback::Source;
+use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};
+use gaitwright_store::presentations::Judgement;
+use gaitwright_store::{AssessmentId, Connection, FeedbackId, StudyId, commit};
+use serde::Deserialize;
+use std::fmt;
+use std::str::FromStr;
+
+/// The row of an answer in the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub(super) enum Recorded {
+    Preference(FeedbackId),
+    Assessment(AssessmentId),
+}
+
+impl fmt::Display for Recorded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Preference(id) => id.fmt(f),
+            Self::Assessment(id) => write!(f, "{ASSESSMENT}{id}"),
+        }
+    }
+}
+
+impl TryFrom<String> for Recorded {
+    type Error = Error;
+    fn try_from(text: String) -> Result<Self, Error> {
+        match text.strip_prefix(ASSESSMENT) {
+            Some(id) => Ok(Self::Assessment(identifier("saved", id)?)),
+            None => Ok(Self::Preference(identifier("saved", &text)?)),
+        }
+    }
+}
+
+/// Before the identifier of an assessment.
+const ASSESSMENT: &str = "assessment-";
+
+/// The fields as typed, to show a refused form again.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AnswerForm {
+    pub(super) a: String,
+    pub(super) b: String,
+    #[serde(default)]
+    pub(super) answer: String,
+    pub(super) source: String,
+    pub(super) author: String,
+    #[serde(default)]
+    pub(super) note: String,
+    key: String,
+}
+
+/// An answer as given in the form.
+enum GivenAnswer {
+    Preference(Answer),
+    Assessment(NewAssessment),
+}
+
+impl GivenAnswer {
+    fn is_about_safety(&self) -> bool {
+        matches!(self, Self::Assessment(assessment) if assessment.answer.is_about_safety())
+    }
+
+    /// Whether every gait that this answer calls unsafe still has a report in force.
+    async fn is_still_in_force(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
+        match self {
+            Self::Assessment(given) if self.is_about_safety() => {
+                let gaits = Judgement::from(given.answer).unsafe_of((given.trial_a, given.trial_b));
+                Ok(SafetyReports::read(db, study).await?.are_all_in_force(&gaits))
+            }
+            _ => Ok(true),
+        }
+    }
+}
+
+impl AnswerForm {
+    fn read(&self) -> Result<(GivenAnswer, FeedbackId), Error> {
+        let source = Source::from_str(&self.source)
+            .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician or script"))?;
+        let (a, b) = (identifier("trial_a", &self.a)?, identifier("trial_b", &self.b)?);
+        let (source, author, note) = (Some(source), Some(self.author.clone()), self.note.clone());
+        let preference = |answer| {
+            let (author, note) = (author.clone(), note.clone());
+            GivenAnswer::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note })
+        };
+        let assessment = |answer| {
+            let (author, note) = (author.clone(), note.clone());
+            GivenAnswer::Assessment(NewAssessment { trial_a: a, trial_b: b, answer, source, author, note })
+        };
+        let judgement = match self.answer.as_str() {
+            "a" => preference(PairAnswer::A),
+            "b" => preference(PairAnswer::B),
+            "no_difference" => preference(PairAnswer::NoDifference),
+            "cannot_tell" => assessment(AssessmentAnswer::CannotTell),
+            "unsafe_a" => assessment(AssessmentAnswer::UnsafeA),
+            "unsafe_b" => assessment(AssessmentAnswer::UnsafeB),
+            "unsafe_both" => assessment(AssessmentAnswer::UnsafeBoth),
+            other => {
+                return Err(Error::invalid("answer", other, "one of the answers on the form"));
+            }
+        };
+        Ok((judgement, identifier("key", &self.key)?))
+    }
+
+    /// A digest that distinguishes this answer from another one with the same key.
+    fn fingerprint(&self, study: StudyId) -> String {
+        let Self { a, b, answer, source, author, note, key } = self;
+        let sent = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
+        fingerprint("form", &format!("/studies/{study}/compare"), sent.as_bytes())
+    }
+}
+
+fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
+    text.parse().map_err(|_| Error::invalid(field, text, "an identifier from this form"))
+}
+
+/// The outcome of a submitted form.
+pub(super) enum Given {
+    /// The answer is recorded, now or before.
+    Saved(Recorded),
+    /// The same form was sent before with another answer, which is the recorded one.
+    Before(Recorded),
+    /// The same author answered this comparison before; that answer is the recorded one.
+    Elsewhere(Recorded),
+}
+
+/// The labels of the form.
+pub(super) const LABELS: [(&str, &str); 6] = [
+    ("a", "Gait A"),
+    ("b", "Gait B"),
+    ("answer", "Answer"),
+    ("source", "This person is"),
+    ("author", "Name or code"),
+    ("note", "Note"),
+];
+
+/// Records the answer of a form.
+pub(super) async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &AnswerForm) -> Result<Given, Error> {
+    let (judgement, key) = form.read()?;
+    let mut writer = app.write().await?;
+    // The key of the form makes a repeated form (double click, reload, two tabs) count once.
+    let request = form.fingerprint(id);
+    // A safety report has a key of its own, because it is recorded even if the form was sent before with another answer.
+    let key = if judgement.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
+    let before = idempotency::find(&mut writer, &caller.actor, &key).await?;
+    // A report that staff have reviewed since is a new one.
+    let is_reviewed = before.is_some() && !judgement.is_still_in_force(&mut writer, id).await?;
+    if let Some(before) = before.filter(|_| !is_reviewed) {
+        let same = before.request == request;
+        let recorded = Recorded::try_from(before.body)?;
+        return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
+    }
+    // A second answer is refused, and the page shows the first one. A safety report is always accepted.
+    if !judgement.is_about_safety()
+        && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
+    {
+        return Ok(Given::Elsewhere(saved));
+    }
+    let saved = match judgement {
+        GivenAnswer::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
+        GivenAnswer::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
+    };
+    if !is_reviewed {
+        let kept = StoredResponse { request, status: 303, location: None, body: saved.to_string() };
+        idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
+    }
+    commit(writer).await?;
+    app.scheduler.changed();
+    Ok(Given::Saved(saved))
+}
+
+/// The answer in force of the same author to the same comparison, given in another tab or elsewhere.
+async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerForm) -> Result<Option<Recorded>, Error> {
+    let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
+    let author = printable::name("author", &form.author, 80)?;
+    Ok(preference::current_answer(db, study, pair, author).await?.and_then(|answer| match answer {
+        CurrentAnswer::Preference(id) => Some(Recorded::Preference(id)),
+        CurrentAnswer::Assessment(id) => Some(Recorded::Assessment(id)),
+        // The page shows no blinded answer, and no suggestion as an answer: the refusal says that there is one.
+        CurrentAnswer::Blind(_) | CurrentAnswer::Suggestion(_) => None,
+    }))
+}
+
+/// The form to retract an answer.
+#[derive(Debug, Deserialize)]
+pub(super) struct Retract {
+    saved: Recorded,
+    author: String,
+    reason: String,
+}
+
+/// `POST /studies/{id}/retract`.
+pub(super) async fn retract(
+    authorized: Authorized<access::Answer>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, access::Answer>,
+    Form(form): Form<Retract>,
+) -> Result<Redirect, PageError> {
+    let mut writer = app.write().await?;
+    let author = Some(form.author.as_str());
+    match form.saved {
+        Recorded::Preference(given) => {
+            answer::retract(&mut writer, &authorized.caller, Some(id), given, author, &form.reason).await?;
+        }
+        Recorded::Assessment(made) => {
+            assessment::retract(&mut writer, &authorized.caller, Some(id), made, (author, &form.reason)).await?;
+        }
+    }
+    commit(writer).await?;
+    app.scheduler.changed();
+    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)))
+}

@@ -1,0 +1,82 @@
+//! The buttons that start, pause, resume, stop and extend a study.
+
+use crate::AppState;
+use crate::accessible::Id;
+use crate::authorization::Authorized;
+use crate::extractors::Form;
+use crate::page_error::PageError;
+use axum::extract::State;
+use axum::response::Redirect;
+use gaitwright_service::access::Run;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::command;
+use gaitwright_service::studies::lifecycle::StudyTransition;
+use gaitwright_service::studies::study_change::{self, Extend};
+use gaitwright_store::{StudyId, commit};
+use serde::Deserialize;
+
+/// A button of the page.
+pub(super) struct ActButton {
+    pub(super) act: &'static str,
+    pub(super) label: &'static str,
+}
+
+/// The form of a button.
+#[derive(Debug, Deserialize)]
+pub(in crate::pages) struct Do {
+    act: String,
+    /// The new total number of trials, for an extension.
+    #[serde(default)]
+    trial_budget: String,
+}
+
+/// `POST /studies/{id}/do`.
+pub(in crate::pages) async fn post(
+    authorized: Authorized<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Run>,
+    Form(form): Form<Do>,
+) -> Result<Redirect, PageError> {
+    let act = StudyTransition::ALL
+        .into_iter()
+        .find(|act| act.as_str() == form.act && acts_for_pages(*act))
+        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop or extend"))?;
+    let mut writer = app.write().await?;
+    let cancelled = if act == StudyTransition::Extend {
+        let refused =
+            || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
+        let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
+        study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
+        Vec::new()
+    } else {
+        command::act(&mut writer, &authorized.caller.actor, id, act, "").await?.cancelled
+    };
+    commit(writer).await?;
+    for trial in cancelled {
+        app.scheduler.cancel_solve(trial).await;
+    }
+    app.scheduler.changed();
+    Ok(Redirect::to(&format!("/studies/{id}")))
+}
+
+/// Whether the page has a button for it.
+pub(super) fn acts_for_pages(act: StudyTransition) -> bool {
+    matches!(
+        act,
+        StudyTransition::Start
+            | StudyTransition::Pause
+            | StudyTransition::Resume
+            | StudyTransition::Stop
+            | StudyTransition::Extend
+    )
+}
+
+/// Acts that need no confirmation.
+pub(super) fn button(act: StudyTransition) -> Option<ActButton> {
+    match act {
+        StudyTransition::Start => Some(ActButton { act: "start", label: "Start" }),
+        StudyTransition::Pause => Some(ActButton { act: "pause", label: "Pause" }),
+        StudyTransition::Resume => Some(ActButton { act: "resume", label: "Resume" }),
+        _ => None,
+    }
+}
