@@ -92,12 +92,12 @@ struct ReferenceGaitsPage {
 
 /// A preview of a recording, as the page shows it.
 struct Preview {
-    charts: Vec<Drawn>,
+    charts: Vec<PageChart>,
     /// The legend of these charts.
     legend: Vec<(String, String)>,
     strides: Vec<RecordedStride>,
     /// The mean stride.
-    mean: Vec<Drawn>,
+    mean: Vec<PageChart>,
     /// Why the recording would be refused.
     refused: Option<String>,
 }
@@ -105,9 +105,9 @@ struct Preview {
 impl Preview {
     fn of(new: &NewReferenceGait) -> Result<Self, Error> {
         let preview = new.preview()?;
-        let mut charts: Vec<Drawn> = reference::preview(&preview).iter().map(Drawn::new).collect();
+        let mut charts: Vec<PageChart> = reference::preview(&preview).iter().map(PageChart::new).collect();
         let (mean, refused) = match &preview.reference {
-            Ok(found) => (gait_charts::of_reference(found).iter().map(Drawn::new).collect(), None),
+            Ok(found) => (gait_charts::of_reference(found).iter().map(PageChart::new).collect(), None),
             Err(error) => (Vec::new(), Some(form_errors::in_words(error))),
         };
         Ok(Self { legend: shared_legend(&mut charts), charts, strides: preview.strides, mean, refused })

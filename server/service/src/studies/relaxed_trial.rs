@@ -4,7 +4,7 @@
 //! the gait that the explanation found is a solution of it.
 
 use super::belief::Beliefs;
-use super::lifecycle::{self, Act};
+use super::lifecycle::{self, StudyTransition};
 use super::search_space;
 use super::snapshot::StudySnapshot;
 use super::study_change;
@@ -216,7 +216,8 @@ pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> 
     }
     let study = &snapshot.study;
     let trial_budget = study.plan.trial_budget.max(new.number);
-    let state = if study.state.has_ended() { lifecycle::after(study.state, Act::Extend)? } else { study.state };
+    let state =
+        if study.state.has_ended() { lifecycle::after(study.state, StudyTransition::Extend)? } else { study.state };
     if (state, trial_budget) != (study.state, study.plan.trial_budget) {
         study_change::raise_budget(writer, study, trial_budget, state).await?;
         events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": "trial.relax" })).await?;
