@@ -20,7 +20,7 @@ from gaitwright_client.api.studies import (
     get_recommendation,
     get_study,
     get_study_archive,
-    get_study_history,
+    list_study_history,
 )
 from gaitwright_client.api.subjects import create_subject, get_subject
 from gaitwright_client.api.trials import get_certificate, list_trials, request_certificate
@@ -124,7 +124,7 @@ def by_script(client: Client, subject: UUID) -> None:
         given(Trial, tell_outcome.sync(trial.id, client=client, body=told))
     trials = trials_of(client, study.id)
     assert [trial.number for trial in trials] == list(range(1, BUDGET + 1)), trials
-    best = given(MilestonePage, get_study_history.sync(study.id, client=client)).items[-1]
+    best = given(MilestonePage, list_study_history.sync(study.id, client=client)).items[-1]
     wait_until(client, study.id, StudyState.FINISHED)
     print(f"python: {len(trials)} trials, best: trial {best.number}, {best.gait_rmse_rad:.4f} rad")
 

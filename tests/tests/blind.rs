@@ -150,7 +150,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     assert_eq!(before[0]["first_preferred"], Value::Null, "before unblinding it would tell the order of pairs");
     assert_eq!(before[0]["repeats_agree"]["of"], json!(repeats));
     let unblind = json!({"rater": "a rater", "reason": "the study has ended"}).to_string();
-    let path = format!("/api/v1/studies/{study}/unblind");
+    let path = format!("/api/v1/studies/{study}/raters/unblind");
     let told = send(&service, &admin, &Method::POST, &path, "application/json", &unblind).await;
     assert_eq!(told.status, StatusCode::OK, "{}", told.text);
     let after = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
@@ -311,7 +311,7 @@ async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, json_of, "{}").await.json()["pair"].clone();
     let unblind = json!({"rater": "a rater", "reason": "adverse event"}).to_string();
-    send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/unblind"), json_of, &unblind).await;
+    send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/raters/unblind"), json_of, &unblind).await;
     let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, json_of, "{\"answer\": \"first\"}").await;
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
@@ -373,7 +373,7 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let pair = post(&rater, &next, json!({})).await.json()["pair"].clone();
     let token = pair["token"].as_str().unwrap();
     post(&rater, &format!("/api/v1/blind-pairs/{token}/answer"), json!({"answer": "second"})).await;
-    let path = format!("/api/v1/studies/{study}/unblind");
+    let path = format!("/api/v1/studies/{study}/raters/unblind");
     let refused = post(&admin, &path, json!({"rater": "a rater", "reason": " "})).await;
     assert_eq!(refused.json()["field"], "reason");
     let unknown = post(&admin, &path, json!({"rater": "nobody", "reason": "r"})).await;

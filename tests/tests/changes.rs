@@ -157,7 +157,9 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let say = format!("{api}/blind-pairs/{}/answer", text(&pair["pair"]["token"]));
     scene.one(done, "post /blind-pairs/{token}/answer", &say, json!({"answer": "first"})).await;
     let unblind = json!({"rater": "not signed in", "reason": "r"});
-    scene.one(done, "post /studies/{id}/unblind", &format!("{api}/studies/{human}/unblind"), unblind).await;
+    scene
+        .one(done, "post /studies/{id}/raters/unblind", &format!("{api}/studies/{human}/raters/unblind"), unblind)
+        .await;
 
     let user = json!({"name": "Ada", "role": "clinician"});
     let user = scene.one(done, "post /users", &format!("{api}/users"), user).await;

@@ -32,6 +32,6 @@ async fn report_after_a_review_applies_although_the_clock_was_set_back() {
     assert_eq!(service.post(&report, &json!({})).await.status, StatusCode::CREATED);
     assert_eq!(service.fetch(&controller).await.status, StatusCode::CONFLICT);
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
-    assert_eq!((&reports[0]["open"], &reports[1]["open"]), (&json!(false), &json!(true)), "{reports}");
+    assert_eq!((&reports[0]["in_force"], &reports[1]["in_force"]), (&json!(false), &json!(true)), "{reports}");
     service.stop().await;
 }

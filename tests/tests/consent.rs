@@ -158,7 +158,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/trials/{}/certificate", trials[0].id), json!({})),
         (format!("/api/v1/trials/{}/explanation", trials[0].id), json!({})),
         (format!("/api/v1/trials/{}/execution-report", trials[0].id), json!({})),
-        (format!("/api/v1/studies/{human}/unblind"), json!({"rater": "not signed in", "reason": "r"})),
+        (format!("/api/v1/studies/{human}/raters/unblind"), json!({"rater": "not signed in", "reason": "r"})),
         (format!("/api/v1/preferences/{heard_id}/retract"), json!({"reason": "r"})),
     ] {
         let refused = service.post(&path, &body).await;

@@ -392,7 +392,7 @@ async fn archive_preserves_the_lab_sessions_of_its_study() {
     let other = Store::open(&folder.path().join("b.db")).await.unwrap();
     import(&other, &file).await.unwrap();
     assert_eq!(lab_sessions::of_study(&mut other.read().await.unwrap(), study).await.unwrap(), before);
-    assert_eq!(before[0].answers.iter().map(|answer| answer.taken_back).collect::<Vec<_>>(), [true, false]);
+    assert_eq!(before[0].answers.iter().map(|answer| answer.retracted).collect::<Vec<_>>(), [true, false]);
     // The files in the archive give the same curves.
     let mut computing = other.clone();
     let anew = lab::compute(&mut computing, before[0].id, EmgSettings::default()).await.unwrap();

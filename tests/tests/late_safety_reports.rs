@@ -26,10 +26,10 @@ async fn converged(service: &Service, study: StudyId) -> Vec<Trial> {
     trials
 }
 
-/// The gaits with an open report.
+/// The gaits with a report in force.
 async fn closed(service: &Service, study: StudyId) -> BTreeSet<String> {
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
-    let open = reports.as_array().unwrap().iter().filter(|report| report["open"] == json!(true));
+    let open = reports.as_array().unwrap().iter().filter(|report| report["in_force"] == json!(true));
     open.map(|report| report["trial_id"].as_str().unwrap().to_owned()).collect()
 }
 

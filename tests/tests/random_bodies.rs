@@ -150,7 +150,7 @@ impl Scene {
                 id
             }
             "/studies/{id}/ask" | "/studies/{id}/extend" => self.script.to_string(),
-            "/studies/{id}/unblind" => self.human.to_string(),
+            "/studies/{id}/raters/unblind" => self.human.to_string(),
             path if path.starts_with("/studies/{id}") => self.finished.to_string(),
             path if path.starts_with("/subjects/{id}") => self.subject().await,
             "/trials/{id}/tell" => {

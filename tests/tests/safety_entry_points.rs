@@ -178,7 +178,7 @@ async fn single_gait_is_reported_without_a_comparison() {
     let (_folder, service) = service().await;
     let (study, trials) = finished(&service).await;
     let made = report(&service, &trials[0]).await;
-    assert_eq!((&made["trial_id"], &made["open"]), (&json!(trials[0].id), &json!(true)));
+    assert_eq!((&made["trial_id"], &made["in_force"]), (&json!(trials[0].id), &json!(true)));
     assert_eq!(controller(&service, &trials[0]).await, StatusCode::CONFLICT);
     let sent = service.post_text(&format!("/trials/{}/safety-report", trials[1].id), FORM, "author=K1&note=fell").await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);

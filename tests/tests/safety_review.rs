@@ -49,7 +49,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!(said.len(), 1, "{said:?}");
-    assert_eq!((&said[0]["open"], &said[0]["review"]), (&json!(true), &Value::Null));
+    assert_eq!((&said[0]["in_force"], &said[0]["review"]), (&json!(true), &Value::Null));
     let gait = said[0]["trial_id"].as_str().unwrap().to_owned();
     let page = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(page.contains("Do not walk with it") && page.contains("Safety review"), "{page}");
@@ -73,7 +73,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     let walkable = json!({"decision": "walkable", "reason": "the video was cut", "author": "K2"});
     assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
     let said = safety_reports(&service, study).await;
-    assert_eq!((&said[0]["open"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
+    assert_eq!((&said[0]["in_force"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(!shown.contains("Do not walk with it") && shown.contains("cleared the gait for walking"), "{shown}");
     // The answer of the rater is unchanged, and does not imply that the other gait is better.
@@ -89,9 +89,9 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert_eq!(reviews.len(), 2);
     assert!(reviews.iter().any(|row| row.detail.to_string().contains("the video was cut")));
     let heard = service.feedback(study).await;
-    let taken_back: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
+    let retracted: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
     assert_eq!(
-        taken_back.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
+        retracted.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
         [("K2", "the video was cut")]
     );
     // The pair can be compared again.
@@ -171,7 +171,7 @@ async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
     service.post(&format!("/api/v1/lab-sessions/{id}/unblind"), &json!({"reason": "walked"})).await;
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let mut snapshot = safety_reports(&service, study).await;
-    snapshot.retain(|report| report["open"] == json!(true));
+    snapshot.retain(|report| report["in_force"] == json!(true));
     assert_eq!(snapshot.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
     service.stop().await;
 }

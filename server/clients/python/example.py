@@ -38,7 +38,7 @@ def main() -> None:
             client.tell_outcome(trial["id"], outcome="converged", gait_rmse_rad=rmse)
         print(f"trial {trial['number']}: {'stumbled' if rmse is None else f'{rmse:.4f} rad'}")
     study = client.wait(study)
-    best = list(client.get_study_history(study["id"]))[-1]
+    best = list(client.list_study_history(study["id"]))[-1]
     print(f"{study['state']}; best: trial {best['number']}, {best['gait_rmse_rad']:.4f} rad")
 
 

@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value, json};
 
-const GAIT: &str = "A trial of this study with a walkable gait: converged, certified, without an open safety report. The two trials of \
+const GAIT: &str = "A trial of this study with a walkable gait: converged, certified, without a safety report in force. The two trials of \
                     a comparison have different gaits.";
 const GAIT_OF_STUDY: &str =
     "A converged trial of this study. For `cannot_tell`, its gait is walkable. The two trials have different gaits.";
@@ -51,7 +51,7 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
     ("Invitation", "name", "The name of a rater, or one that is not taken."),
     ("Unblind", "rater", "A rater who was shown a pair of this study."),
-    ("NewSafetyReview", "reports", "Includes every open safety report about the gait of this trial."),
+    ("NewSafetyReview", "reports", "Includes every safety report in force about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
     (
         "NewEmg",

@@ -20,7 +20,7 @@ pub struct LabAnswer {
     /// Time of recording.
     pub at: Instant,
     /// Whether it was retracted.
-    pub taken_back: bool,
+    pub retracted: bool,
 }
 
 /// Adds an answer. Returns `false` if there is one with this number.
@@ -73,7 +73,7 @@ pub async fn retract(db: &mut Connection, actor: &Actor, id: LabSessionId, numbe
 /// Errors of the database.
 pub async fn of_session(db: &mut Connection, id: LabSessionId) -> StoreResult<Vec<LabAnswer>> {
     let rows = sqlx::query(
-        "select a.*, r.number is not null as taken_back from lab_answers a \
+        "select a.*, r.number is not null as retracted from lab_answers a \
          left join lab_answer_retractions r on r.session_id = a.session_id and r.number = a.number \
          where a.session_id = ? order by a.number",
     )
@@ -90,6 +90,6 @@ fn from_row(row: &SqliteRow) -> StoreResult<LabAnswer> {
         note: row.try_get("note")?,
         actor: row.try_get("actor")?,
         at: row.try_get("created_at")?,
-        taken_back: row.try_get("taken_back")?,
+        retracted: row.try_get("retracted")?,
     })
 }

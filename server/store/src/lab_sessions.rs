@@ -93,7 +93,7 @@ impl LabSession {
 
     /// The current answer, which was not retracted.
     pub fn answer(&self) -> Option<&LabAnswer> {
-        self.answers.last().filter(|answer| !answer.taken_back)
+        self.answers.last().filter(|answer| !answer.retracted)
     }
 
     /// The gaits of walks 2 and 3; `None` while the session is blinded.

@@ -83,7 +83,7 @@ impl Judgement {
     ];
 
     /// The entry for the learner, if any. An unsafe gait loses against the other one.
-    pub fn heard(self, (first, second): (TrialId, TrialId)) -> Option<feedback::FeedbackContent> {
+    pub fn feedback(self, (first, second): (TrialId, TrialId)) -> Option<feedback::FeedbackContent> {
         match self {
             Self::First | Self::UnsafeSecond => {
                 Some(feedback::FeedbackContent::Preference { winner: first, loser: second })
@@ -301,7 +301,7 @@ pub async fn retract(db: &mut Connection, id: PresentationId) -> StoreResult<boo
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn heard_of(db: &mut Connection, id: PresentationId) -> StoreResult<Option<FeedbackId>> {
+pub async fn feedback_of(db: &mut Connection, id: PresentationId) -> StoreResult<Option<FeedbackId>> {
     let row = sqlx::query("select feedback_id from presentation_answers where presentation_id = ?")
         .bind(id)
         .fetch_optional(db)

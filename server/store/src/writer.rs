@@ -201,11 +201,11 @@ impl Shared {
         if !self.state().begun {
             return;
         }
-        let taken_back = match run(connection, "rollback to change").await {
+        let rolled_back = match run(connection, "rollback to change").await {
             Ok(()) => run(connection, "release change").await,
             error => error,
         };
-        match taken_back {
+        match rolled_back {
             Ok(()) => self.state().begun = false,
             // SQLite rolled back the whole transaction, as it does when the disk is full.
             Err(error) => self.give_up(connection, &error).await,

@@ -68,9 +68,9 @@ async fn review_made_with_a_fast_clock_does_not_cover_later_reports() {
     import(&store, &rows.packed()).await.unwrap();
     store.close().await;
     let other = Service::start(&database, Consistent::default(), 1).await;
-    assert_eq!(other.fetch(&listed).await.items()[0]["open"], json!(false));
+    assert_eq!(other.fetch(&listed).await.items()[0]["in_force"], json!(false));
     let report = other.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "fell"})).await;
-    assert_eq!((report.status, &report.json()["open"]), (StatusCode::CREATED, &json!(true)), "{}", report.text);
+    assert_eq!((report.status, &report.json()["in_force"]), (StatusCode::CREATED, &json!(true)), "{}", report.text);
     assert!(report.json()["created_at"].as_str().unwrap() > ahead.as_str(), "times have the order of recording");
     let file = other.fetch(&format!("/api/v1/trials/{gait}/controller.json")).await;
     assert!(file.status == StatusCode::CONFLICT && file.text.contains("reported as unsafe"), "{}", file.text);

@@ -201,7 +201,7 @@ pub(super) struct UnblindedRater {
 /// rater do not count as blind.
 #[utoipa::path(
     post,
-    path = "/studies/{id}/unblind",
+    path = "/studies/{id}/raters/unblind",
     operation_id = "unblind_rater",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),

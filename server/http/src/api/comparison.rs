@@ -61,7 +61,7 @@ pub(super) struct StudyComparison {
 #[utoipa::path(
     get,
     path = "/study-comparison",
-    operation_id = "compare_studies",
+    operation_id = "list_study_comparisons",
     tag = "studies",
     params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of studies")),
     responses((status = 200, description = "One row for each study", body = Page<StudyComparison>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),

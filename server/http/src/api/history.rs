@@ -25,7 +25,7 @@ use std::sync::Arc;
 #[utoipa::path(
     get,
     path = "/studies/{id}/history",
-    operation_id = "get_study_history",
+    operation_id = "list_study_history",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "A page, in order of iterations", body = Page<Milestone>), (status = 409, description = "The subject withdrew consent")),

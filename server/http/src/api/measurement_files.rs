@@ -231,7 +231,7 @@ pub(super) async fn result(
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/limit-cycles",
-    operation_id = "get_limit_cycles",
+    operation_id = "list_limit_cycles",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     responses((status = 200, description = "One entry for each walk", body = Page<LimitCycles>), (status = 409, description = "The subject withdrew consent")),

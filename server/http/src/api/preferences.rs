@@ -49,7 +49,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     get,
     path = "/studies/{id}/preferences.csv",
-    operation_id = "list_preferences_csv",
+    operation_id = "get_preferences_csv",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "All preferences, oldest first", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),

@@ -13,7 +13,7 @@ use axum::response::Response;
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::safety_report::{self, Report};
-use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
+use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReports};
 use gaitwright_service::studies::safety_review::{self, Decision};
 use gaitwright_store::safety_reviews::{SafetyDecision, SafetyReview};
 use gaitwright_store::{Instant, SafetyReportId, StudyId, TrialId, studies, trials};
@@ -34,17 +34,17 @@ pub(super) struct SafetyReport {
     created_at: Instant,
     /// Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. The gait must
     /// not be walked.
-    open: bool,
+    in_force: bool,
     /// Newest review. Null while the report awaits review.
     review: Option<SafetyReview>,
 }
 
-impl From<Closed> for SafetyReport {
-    fn from(closed: Closed) -> Self {
-        let id = closed.id();
-        let Closed { trial, by, at, review, .. } = closed;
-        let open = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
-        Self { id, trial_id: trial, author: by, created_at: at, open, review }
+impl From<ReportedGait> for SafetyReport {
+    fn from(report: ReportedGait) -> Self {
+        let id = report.id();
+        let ReportedGait { trial, by, at, review, .. } = report;
+        let in_force = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
+        Self { id, trial_id: trial, author: by, created_at: at, in_force, review }
     }
 }
 
@@ -70,8 +70,8 @@ pub(super) async fn of_study(
 ) -> Result<Json<Page<SafetyReport>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let SafetyReports { closed, lifted, .. } = SafetyReports::read(&mut reader, id).await?;
-    let mut all: Vec<SafetyReport> = closed.into_iter().chain(lifted).map(Into::into).collect();
+    let SafetyReports { in_force, cleared, .. } = SafetyReports::read(&mut reader, id).await?;
+    let mut all: Vec<SafetyReport> = in_force.into_iter().chain(cleared).map(Into::into).collect();
     let at = |report: &SafetyReport| (report.created_at, report.trial_id, report.author.clone());
     all.sort_by_key(at);
     Ok(Json(paging.cut(all, at)?))
@@ -102,8 +102,11 @@ pub(super) async fn report(
     };
     let made = safety_report::give(&mut writer, &request.caller, id, &report).await?;
     let study = trials::get(&mut writer, id).await?.study_id;
-    let made =
-        SafetyReports::read(&mut writer, study).await?.closing(id).into_iter().find(|report| report.id() == made);
+    let made = SafetyReports::read(&mut writer, study)
+        .await?
+        .in_force_about(id)
+        .into_iter()
+        .find(|report| report.id() == made);
     let made = made.ok_or_else(|| Error::Internal("a safety report did not take effect".to_owned()))?;
     let location = format!("/api/v1/studies/{study}/safety-reports");
     request.created(&app, writer, location, &SafetyReport::from(made)).await

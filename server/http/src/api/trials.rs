@@ -94,7 +94,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials.csv",
-    operation_id = "list_trials_csv",
+    operation_id = "get_trials_csv",
     tag = "trials",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "All trials, in order of number", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),

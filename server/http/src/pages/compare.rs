@@ -370,12 +370,12 @@ impl GivenAnswer {
         matches!(self, Self::Assessment(assessment) if assessment.answer.is_about_safety())
     }
 
-    /// Whether every gait that this answer calls unsafe still has an open report.
-    async fn still_closes(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
+    /// Whether every gait that this answer calls unsafe still has a report in force.
+    async fn is_still_in_force(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
         match self {
             Self::Assessment(given) if self.is_about_safety() => {
                 let gaits = Judgement::from(given.answer).unsafe_of((given.trial_a, given.trial_b));
-                Ok(SafetyReports::read(db, study).await?.close_all(&gaits))
+                Ok(SafetyReports::read(db, study).await?.are_all_in_force(&gaits))
             }
             _ => Ok(true),
         }
@@ -484,7 +484,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     let key = if judgement.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
     let before = idempotency::find(&mut writer, &caller.actor, &key).await?;
     // A report that staff have reviewed since is a new one.
-    let is_reviewed = before.is_some() && !judgement.still_closes(&mut writer, id).await?;
+    let is_reviewed = before.is_some() && !judgement.is_still_in_force(&mut writer, id).await?;
     if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;
         let recorded = Recorded::try_from(before.body)?;

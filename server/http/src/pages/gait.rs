@@ -25,7 +25,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::relaxed_trial::NotPossible;
-use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
+use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReports};
 use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::{Trial, TrialState};
@@ -70,20 +70,20 @@ struct GaitPage {
     no_gait: Option<NoGait>,
     phases: [(&'static str, &'static str); 4],
     /// Safety reports in force.
-    unsafe_by: Vec<Closed>,
+    unsafe_by: Vec<ReportedGait>,
     /// Why the gait must not be walked, if the report is about another trial with the same motion.
     unsafe_elsewhere: Option<String>,
     /// Safety reports after which staff cleared the gait.
-    lifted: Vec<Closed>,
+    cleared: Vec<ReportedGait>,
     /// The name of a user who may review the reports.
     reviewer: Option<String>,
     trial: Trial,
 }
 
 impl GaitPage {
-    /// The open safety reports of the page, for a review; `None` without one.
+    /// The safety reports in force of the page, for a review; `None` without one.
     fn reports(&self) -> Option<String> {
-        let shown: Vec<String> = self.unsafe_by.iter().map(|closed| closed.id().to_string()).collect();
+        let shown: Vec<String> = self.unsafe_by.iter().map(|report| report.id().to_string()).collect();
         (!shown.is_empty()).then(|| shown.join(","))
     }
 }
@@ -116,12 +116,12 @@ pub(super) async fn get(
         None => None,
     };
     let reports = SafetyReports::read(&mut reader, study.id).await?;
-    let elsewhere = reports.standing(&trial).and_then(|closed| closed.other_trial(&trial));
+    let elsewhere = reports.about_motion_of(&trial).and_then(|report| report.other_trial(&trial));
     let unsafe_elsewhere =
         elsewhere.map(|other| format!("The same gait was reported as unsafe in {other}. Do not walk with it."));
-    let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = reports;
-    for reports in [&mut unsafe_by, &mut lifted] {
-        reports.retain(|closed| closed.trial == id);
+    let SafetyReports { in_force: mut unsafe_by, mut cleared, .. } = reports;
+    for reports in [&mut unsafe_by, &mut cleared] {
+        reports.retain(|report| report.trial == id);
     }
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     let converged = trial.state == TrialState::Converged;
@@ -184,7 +184,7 @@ pub(super) async fn get(
         phases: gait_charts::PHASES,
         unsafe_by,
         unsafe_elsewhere,
-        lifted,
+        cleared,
         reviewer,
         trial,
         study,

@@ -66,7 +66,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     let fields = ("trial_a", "trial_b");
     let statement =
         GivenJudgement { study: study.id, pair: (a, b), fields, judgement, attribution, again: Again::Refused };
-    let heard = preference::hear(writer, statement).await?;
+    let heard = preference::record(writer, statement).await?;
     let id = heard.ok_or_else(|| Error::Internal("a preference did not reach the learner".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail =

@@ -68,9 +68,9 @@ pub async fn give(
 /// Adds an assessment and the preference derived from it, and notifies open pages.
 ///
 /// # Errors
-/// As [`preference::hear`].
+/// As [`preference::record`].
 pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<AssessmentId, Error> {
-    let heard = preference::hear(writer, statement).await?;
+    let heard = preference::record(writer, statement).await?;
     let GivenJudgement { study, pair, judgement, attribution, .. } = statement;
     let id = assessments::insert(
         writer,

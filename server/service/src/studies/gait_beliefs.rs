@@ -24,7 +24,7 @@ pub fn is_told(difference: &Prediction) -> bool {
     difference.mean > difference.standard_deviation
 }
 
-/// The gaits without an open safety report, by decreasing utility. The first is the recommended one. Trials with equal
+/// The gaits without a safety report in force, by decreasing utility. The first is the recommended one. Trials with equal
 /// actions or identical gaits are one gait.
 pub(super) fn gait_beliefs(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<GaitBelief>, LearnerError> {
     let ranked: Vec<&Trial> = ranking(snapshot, posterior)?.into_iter().filter_map(|id| snapshot.trial(id)).collect();

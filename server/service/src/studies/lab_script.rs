@@ -105,7 +105,7 @@ pub async fn suggest(
 pub async fn not_reported(db: &mut Connection, trial: TrialId) -> Result<(), Error> {
     let trial = trials::get(db, trial).await?;
     let reports = SafetyReports::read(db, trial.study_id).await?;
-    if reports.closed_bounds().any(|bounds| bounds == trial.action) {
+    if reports.reported_bounds().any(|bounds| bounds == trial.action) {
         let number = trial.number;
         return Err(Error::conflict(format!(
             "A gait with the bounds of trial {number} was reported as unsafe. Cancel the trial, then ask again."

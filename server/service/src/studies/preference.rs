@@ -52,7 +52,7 @@ pub struct GivenJudgement<'a> {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a
 /// second answer.
-pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
+pub async fn record(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
     let GivenJudgement { study, pair, fields, judgement, attribution, again } = statement;
     if !matches!(attribution.source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician or script"));
@@ -69,7 +69,7 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
         let before = current_answer(writer, study, pair.trials(), attribution.author).await?;
         before.map_or(Ok(()), |_| Err(answered_before(attribution.author)))?;
     }
-    match judgement.heard(pair.trials()) {
+    match judgement.feedback(pair.trials()) {
         Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),
     }
@@ -84,8 +84,8 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
-    let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.closes(trial));
-    let heard = judgement.heard(pair).filter(|_| both_open && !is_same_gait(&first, &second));
+    let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.forbid(trial));
+    let heard = judgement.feedback(pair).filter(|_| both_open && !is_same_gait(&first, &second));
     match heard {
         Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),
@@ -154,7 +154,7 @@ async fn stands(db: &mut Connection, shown: &Presentation) -> Result<bool, Error
     if shown.answer.is_none_or(|judgement| judgement == Judgement::Retracted) {
         return Ok(false);
     }
-    Ok(match presentations::heard_of(db, shown.id).await? {
+    Ok(match presentations::feedback_of(db, shown.id).await? {
         Some(heard) => feedback::get(db, heard).await?.retraction.is_none(),
         None => true,
     })

@@ -5,12 +5,12 @@ use gait_learner::{LearnerError, Posterior};
 use gaitwright_store::TrialId;
 use gaitwright_store::trials::{Trial, TrialState};
 
-/// The gaits of a study without an open safety report, by decreasing posterior mean. The first is recommended.
+/// The gaits of a study without a safety report in force, by decreasing posterior mean. The first is recommended.
 ///
 /// # Errors
 /// When a trial's action is not in the search space.
 pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial))
+    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.forbid(trial))
 }
 
 /// Converged trials by decreasing posterior mean; ties by number.

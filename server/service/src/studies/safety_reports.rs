@@ -14,9 +14,9 @@ use gaitwright_store::{
 };
 use std::collections::HashSet;
 
-/// A safety report. While it is open, the gait is neither recommended nor compared nor walked.
+/// A gait in a safety report. While the report is in force, the gait is neither recommended nor compared nor walked.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Closed {
+pub struct ReportedGait {
     /// The trial.
     pub trial: TrialId,
     /// Who reported it, as shown to people.
@@ -42,7 +42,7 @@ pub enum SafetyReportSource {
     Subject(LabSessionId),
 }
 
-impl Closed {
+impl ReportedGait {
     /// The identifier of the report, which is that of the object that holds it. The reports about both gaits of a pair
     /// have the same one.
     pub fn id(&self) -> SafetyReportId {
@@ -62,8 +62,8 @@ impl Closed {
 pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
     let mut found = Vec::new();
     for study in studies::with_safety_reports(db, reach, limit).await? {
-        let closed = SafetyReports::read(db, study.id).await?.closed.into_iter();
-        let waiting: HashSet<TrialId> = closed.filter(|c| c.review.is_none()).map(|c| c.trial).collect();
+        let report = SafetyReports::read(db, study.id).await?.in_force.into_iter();
+        let waiting: HashSet<TrialId> = report.filter(|c| c.review.is_none()).map(|c| c.trial).collect();
         if !waiting.is_empty() {
             found.push((study, waiting.len()));
         }
@@ -71,11 +71,11 @@ pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreRe
     Ok(found)
 }
 
-/// An open report with the motion that it is about, which other trials of the subject can have, too.
+/// A report in force with the motion that it is about, which other trials of the subject can have, too.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ClosedMotion {
+pub struct ReportedMotion {
     /// The report.
-    pub report: Closed,
+    pub report: ReportedGait,
     /// The study of the report.
     study: StudyId,
     /// Number of the trial of the report.
@@ -85,7 +85,7 @@ pub struct ClosedMotion {
     motion: Option<GaitMotion>,
 }
 
-impl ClosedMotion {
+impl ReportedMotion {
     /// Whether the report is about this motion of a trial of the study for which the reports were read.
     fn has(&self, motion: &GaitMotion) -> bool {
         self.motion.as_ref().is_some_and(|own| {
@@ -108,12 +108,12 @@ impl ClosedMotion {
 /// The safety reports of a study, and the pairs that are not compared again.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SafetyReports {
-    /// Open reports: their gaits must not be walked.
-    pub closed: Vec<Closed>,
-    /// Open reports of every study of the subject, with their motions.
-    motions: Vec<ClosedMotion>,
+    /// Reports in force: their gaits must not be walked.
+    pub in_force: Vec<ReportedGait>,
+    /// Reports in force of every study of the subject, with their motions.
+    motions: Vec<ReportedMotion>,
     /// Reports after which staff decided that the gait may be walked again.
-    pub lifted: Vec<Closed>,
+    pub cleared: Vec<ReportedGait>,
     /// Pairs with an answer "cannot tell".
     pub skipped: Vec<(TrialId, TrialId)>,
 }
@@ -128,7 +128,7 @@ impl SafetyReports {
         let mut found = Self::default();
         for (of, same_device) in studies::of_subject_with_safety_reports(db, study).await? {
             let given = Self::given_in(db, of).await?;
-            found.add_motions(db, (of, same_device), given.closed.clone()).await?;
+            found.add_motions(db, (of, same_device), given.in_force.clone()).await?;
             if of == study {
                 found = Self { motions: found.motions, ..given };
             }
@@ -140,12 +140,12 @@ impl SafetyReports {
         &mut self,
         db: &mut Connection,
         (study, same_device): (StudyId, bool),
-        closed: Vec<Closed>,
+        report: Vec<ReportedGait>,
     ) -> StoreResult<()> {
-        for report in closed {
+        for report in report {
             let trial = trials::get(db, report.trial).await?;
             let (number, motion) = (trial.number, GaitMotion::of(&trial));
-            self.motions.push(ClosedMotion { report, study, number, same_device, motion });
+            self.motions.push(ReportedMotion { report, study, number, same_device, motion });
         }
         Ok(())
     }
@@ -156,14 +156,14 @@ impl SafetyReports {
         for shown in presentations::assessments_of_study(db, study).await? {
             if let Some((judgement, at)) = shown.answer.zip(shown.answered_at) {
                 let by = format!("rater {}", shown.rater);
-                let closed = |trial| Closed {
+                let report = |trial| ReportedGait {
                     trial,
                     by: by.clone(),
                     at,
                     source: SafetyReportSource::Rater(shown.id),
                     review: None,
                 };
-                found.hear(judgement, shown.pair(), closed);
+                found.add(judgement, shown.pair(), report);
             }
         }
         for assessment in
@@ -171,7 +171,7 @@ impl SafetyReports {
         {
             let (by, at, source) =
                 (&assessment.author, assessment.created_at, SafetyReportSource::Staff(assessment.id));
-            found.hear(assessment.answer.into(), assessment.pair(), |trial| Closed {
+            found.add(assessment.answer.into(), assessment.pair(), |trial| ReportedGait {
                 trial,
                 by: by.clone(),
                 at,
@@ -181,7 +181,13 @@ impl SafetyReports {
         }
         for report in reports::of_study(db, study).await? {
             let (trial, by, at) = (report.trial_id, report.author, report.created_at);
-            found.closed.push(Closed { trial, by, at, source: SafetyReportSource::Alone(report.id), review: None });
+            found.in_force.push(ReportedGait {
+                trial,
+                by,
+                at,
+                source: SafetyReportSource::Alone(report.id),
+                review: None,
+            });
         }
         for session in lab_sessions::of_study(db, study).await? {
             if session.done(lab_sessions::Act::Unblinded).is_some() {
@@ -189,66 +195,68 @@ impl SafetyReports {
                 continue;
             }
             if let Some(answer) = session.answer().filter(|answer| answer.judgement.is_about_safety()) {
-                // Naming one of the two gaits would reveal the allocation, so both are closed until unblinding.
+                // Naming one of the two gaits would reveal the allocation, so both are report until unblinding.
                 let by =
                     format!("the subject in lab session {} (blinded, so either gait may be meant)", session.number);
                 let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
-                let closed = |trial| Closed { trial, by: by.clone(), at, source, review: None };
-                found.closed.extend([session.trial_a, session.trial_b].map(closed));
+                let report = |trial| ReportedGait { trial, by: by.clone(), at, source, review: None };
+                found.in_force.extend([session.trial_a, session.trial_b].map(report));
             }
         }
         found.review(&safety_reviews::of_study(db, study).await?);
         Ok(found)
     }
 
-    /// Lifts the reports about which the newest review says that the gait may be walked again.
+    /// Sorts out the reports about which the newest review says that the gait may be walked again.
     fn review(&mut self, reviews: &[SafetyReview]) {
-        for mut closed in std::mem::take(&mut self.closed) {
-            let id = closed.id();
-            let of_it = |review: &&SafetyReview| review.trial_id == closed.trial && review.reports.contains(&id);
-            closed.review = reviews.iter().rfind(of_it).cloned();
-            let lifted = closed.review.as_ref().is_some_and(|review| review.decision == SafetyDecision::Walkable);
-            if lifted { self.lifted.push(closed) } else { self.closed.push(closed) }
+        for mut report in std::mem::take(&mut self.in_force) {
+            let id = report.id();
+            let of_it = |review: &&SafetyReview| review.trial_id == report.trial && review.reports.contains(&id);
+            report.review = reviews.iter().rfind(of_it).cloned();
+            let is_cleared = report.review.as_ref().is_some_and(|review| review.decision == SafetyDecision::Walkable);
+            if is_cleared { self.cleared.push(report) } else { self.in_force.push(report) }
         }
     }
 
-    fn hear(&mut self, judgement: Judgement, pair: (TrialId, TrialId), closed: impl Fn(TrialId) -> Closed) {
+    fn add(&mut self, judgement: Judgement, pair: (TrialId, TrialId), report: impl Fn(TrialId) -> ReportedGait) {
         if judgement == Judgement::CannotTell {
             self.skipped.push(pair);
         }
-        self.closed.extend(judgement.unsafe_of(pair).into_iter().map(closed));
+        self.in_force.extend(judgement.unsafe_of(pair).into_iter().map(report));
     }
 
-    /// The open reports about the gait of this trial.
-    pub fn closing(&self, trial: TrialId) -> Vec<Closed> {
-        self.closed.iter().filter(|closed| closed.trial == trial).cloned().collect()
+    /// The reports in force about the gait of this trial.
+    pub fn in_force_about(&self, trial: TrialId) -> Vec<ReportedGait> {
+        self.in_force.iter().filter(|report| report.trial == trial).cloned().collect()
     }
 
-    /// Whether each of these gaits has an open report of its own. A report that is sent twice counts once as long as this
+    /// Whether each of these gaits has a report in force of its own. A report that is sent twice counts once as long as this
     /// holds: after a review it is a new report.
-    pub fn close_all(&self, gaits: &[TrialId]) -> bool {
-        gaits.iter().all(|gait| self.closed.iter().any(|closed| closed.trial == *gait))
+    pub fn are_all_in_force(&self, gaits: &[TrialId]) -> bool {
+        gaits.iter().all(|gait| self.in_force.iter().any(|report| report.trial == *gait))
     }
 
-    /// An open report about the gait of this trial, which may have been given for another trial of the subject.
-    pub fn standing(&self, trial: &Trial) -> Option<&ClosedMotion> {
+    /// A report in force about the gait of this trial, which may have been given for another trial of the subject.
+    pub fn about_motion_of(&self, trial: &Trial) -> Option<&ReportedMotion> {
         if self.motions.is_empty() {
             return None;
         }
-        let own = self.motions.iter().find(|closed| closed.report.trial == trial.id);
-        own.or_else(|| GaitMotion::of(trial).and_then(|motion| self.motions.iter().find(|closed| closed.has(&motion))))
+        let own = self.motions.iter().find(|motion| motion.report.trial == trial.id);
+        own.or_else(|| {
+            GaitMotion::of(trial).and_then(|motion| self.motions.iter().find(|reported| reported.has(&motion)))
+        })
     }
 
-    /// The bounds of gaits with an open report and with the device of this study. A lab script must not evaluate them
+    /// The bounds of gaits with a report in force and with the device of this study. A lab script must not evaluate them
     /// again, because the subject may walk in its evaluation.
-    pub fn closed_bounds(&self) -> impl Iterator<Item = TunedBounds> {
-        let on_device = self.motions.iter().filter(|closed| closed.same_device);
-        on_device.filter_map(|closed| closed.motion.as_ref()).map(GaitMotion::bounds)
+    pub fn reported_bounds(&self) -> impl Iterator<Item = TunedBounds> {
+        let on_device = self.motions.iter().filter(|motion| motion.same_device);
+        on_device.filter_map(|reported| reported.motion.as_ref()).map(GaitMotion::bounds)
     }
 
-    /// Whether the gait of this trial has an open report.
-    pub fn closes(&self, trial: &Trial) -> bool {
-        self.standing(trial).is_some()
+    /// Whether the gait of this trial has a report in force.
+    pub fn forbid(&self, trial: &Trial) -> bool {
+        self.about_motion_of(trial).is_some()
     }
 
     /// Whether an answer about the two gaits is "cannot tell".

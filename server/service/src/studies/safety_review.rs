@@ -1,6 +1,6 @@
 //! Records the decision of staff about a gait that was reported as unsafe, for pages and REST.
 
-use super::safety_reports::{Closed, SafetyReportSource, SafetyReports};
+use super::safety_reports::{ReportedGait, SafetyReportSource, SafetyReports};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -50,19 +50,19 @@ pub async fn give(
     let author = printable::name("author", decision.author.as_deref().unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", &decision.reason, " that give the reason for the decision")?;
     let reports = SafetyReports::read(writer, trial.study_id).await?;
-    let closed = reports.closing(id);
+    let in_force = reports.in_force_about(id);
     let number = trial.number;
-    if closed.is_empty() {
-        let elsewhere = reports.standing(&trial).and_then(|closed| closed.other_trial(&trial));
+    if in_force.is_empty() {
+        let elsewhere = reports.about_motion_of(&trial).and_then(|report| report.other_trial(&trial));
         return Err(Error::conflict(match elsewhere {
             Some(other) => {
                 format!("The gait of trial {number} was reported as unsafe in {other}. Review the report there.")
             }
-            None => format!("The gait of trial {number} has no open safety report."),
+            None => format!("The gait of trial {number} has no safety report in force."),
         }));
     }
-    let unseen = |closed: &&Closed| decision.reports.as_ref().is_some_and(|seen| !seen.contains(&closed.id()));
-    if let Some(unseen) = closed.iter().rfind(unseen) {
+    let unseen = |report: &&ReportedGait| decision.reports.as_ref().is_some_and(|seen| !seen.contains(&report.id()));
+    if let Some(unseen) = in_force.iter().rfind(unseen) {
         let other = format!(
             "The gait of trial {number} has a safety report by {} that is not among the reports of this review. Read it first.",
             unseen.by
@@ -70,15 +70,15 @@ pub async fn give(
         return Err(Error::conflict(other));
     }
     let taken = decision.decision;
-    let decided: Vec<SafetyReportId> = closed.iter().map(Closed::id).collect();
+    let decided: Vec<SafetyReportId> = in_force.iter().map(ReportedGait::id).collect();
     let new = NewSafetyReview { trial: id, reports: &decided, decision: taken, author, reason };
     let made = safety_reviews::insert(writer, new).await?;
     if taken == SafetyDecision::Walkable {
-        retract_derived_preferences(writer, &closed, (author, reason)).await?;
+        retract_derived_preferences(writer, &in_force, (author, reason)).await?;
     }
     let payload = json!({ "trial_id": id, "number": number, "decision": taken });
     events::append(writer, trial.study_id, "safety_reviewed", &payload).await?;
-    let reports: Vec<_> = closed.iter().map(|closed| json!({ "by": closed.by, "at": closed.at })).collect();
+    let reports: Vec<_> = in_force.iter().map(|report| json!({ "by": report.by, "at": report.at })).collect();
     let detail = json!({
         "study": trial.study_id, "decision": taken, "author": author, "reason": reason, "safety_reports": reports,
     });
@@ -89,11 +89,11 @@ pub async fn give(
 /// Retracts the preferences that were derived from safety reports, because nobody stated them.
 async fn retract_derived_preferences(
     writer: &mut Writer,
-    closed: &[Closed],
+    reports: &[ReportedGait],
     (author, reason): (&str, &str),
 ) -> StoreResult<()> {
-    for closed in closed {
-        if let Some(id) = derived_preference(writer, closed.source).await? {
+    for report in reports {
+        if let Some(id) = derived_preference(writer, report.source).await? {
             let row = feedback::get(writer, id).await?;
             feedback::retract(writer, &row, author, reason).await?;
         }
@@ -103,7 +103,7 @@ async fn retract_derived_preferences(
 
 async fn derived_preference(db: &mut Connection, source: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
     match source {
-        SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
+        SafetyReportSource::Rater(id) => presentations::feedback_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
         // The learner receives the answer of a subject only at unblinding, and does not receive reports about one gait.
         SafetyReportSource::Subject(_) | SafetyReportSource::Alone(_) => Ok(None),

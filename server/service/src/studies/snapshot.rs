@@ -150,10 +150,10 @@ impl StudySnapshot {
         matches!(self.walkable(trial), Err(NotWalkable::NotCertified { .. }))
     }
 
-    /// Actions whose gaits Gait RMSE compares: converged, without an open safety report. Nobody walks because of such a
+    /// Actions whose gaits Gait RMSE compares: converged, without a safety report in force. Nobody walks because of such a
     /// comparison, so it needs no certificate.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
-        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.closes(trial);
+        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.forbid(trial);
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 
@@ -185,9 +185,11 @@ impl StudySnapshot {
     pub fn barred_without_result(&self) -> Vec<ActionIndex> {
         let plan = &self.study.plan;
         let open = self.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index);
-        let closed = self.grounds.safety_reports.closed_bounds().filter(|_| plan.evaluation == Evaluation::Script);
-        let closed = closed.filter_map(|bounds| search_space::action_of(&plan.search_space, plan.base_bounds, bounds));
-        open.chain(closed).collect()
+        let unsafe_bounds =
+            self.grounds.safety_reports.reported_bounds().filter(|_| plan.evaluation == Evaluation::Script);
+        let unsafe_actions =
+            unsafe_bounds.filter_map(|bounds| search_space::action_of(&plan.search_space, plan.base_bounds, bounds));
+        open.chain(unsafe_actions).collect()
     }
 }
 

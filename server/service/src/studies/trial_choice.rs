@@ -65,7 +65,7 @@ pub fn best_converged(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Op
     Ok(by_mean(snapshot, belief, |_| true)?.first().copied())
 }
 
-/// The recommended trial: the one with the highest posterior mean among gaits without an open safety report.
+/// The recommended trial: the one with the highest posterior mean among gaits without a safety report in force.
 ///
 /// # Errors
 /// As [`best_converged`].
@@ -91,10 +91,10 @@ pub fn ranking_to_show(
     ranking(snapshot, &*beliefs.posterior(pool, snapshot)?)
 }
 
-/// The trial that was best at the newest proposal, if its gait has no open safety report. Needs only the newest trials.
+/// The trial that was best at the newest proposal, if its gait has no safety report in force. Needs only the newest trials.
 pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
     let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
-    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.closes(best)).then_some(best.id)
+    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.forbid(best)).then_some(best.id)
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

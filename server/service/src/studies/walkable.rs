@@ -27,7 +27,7 @@ pub enum Certified {
     ByLab,
 }
 
-/// A converged gait with a certificate and without an open safety report, of a subject who has not withdrawn consent.
+/// A converged gait with a certificate and without a safety report in force, of a subject who has not withdrawn consent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WalkableGait {
     trial: TrialId,
@@ -96,7 +96,7 @@ pub enum NotWalkable {
         /// Its state.
         state: &'static str,
     },
-    /// The gait has an open safety report.
+    /// The gait has a safety report in force.
     #[error(
         "The gait of trial {number} was reported as unsafe by {by}. It must not be walked until staff have cleared it."
     )]
@@ -106,7 +106,7 @@ pub enum NotWalkable {
         /// Who reported it.
         by: String,
     },
-    /// Another trial of the subject has the same gait, which has an open safety report.
+    /// Another trial of the subject has the same gait, which has a safety report in force.
     #[error(
         "Trial {number} has the same gait as {other}, which was reported as unsafe by {by}. It must not be walked until staff \
          have cleared it there."
@@ -214,10 +214,10 @@ impl Grounds {
         if trial.state != TrialState::Converged {
             return Err(NotWalkable::NotConverged { number, state: trial.state.as_str() });
         }
-        if let Some(closed) = self.safety_reports.standing(trial) {
-            return Err(match closed.other_trial(trial) {
-                None => NotWalkable::ReportedUnsafe { number, by: closed.report.by.clone() },
-                Some(other) => NotWalkable::SameGaitReportedUnsafe { number, other, by: closed.report.by.clone() },
+        if let Some(report) = self.safety_reports.about_motion_of(trial) {
+            return Err(match report.other_trial(trial) {
+                None => NotWalkable::ReportedUnsafe { number, by: report.report.by.clone() },
+                Some(other) => NotWalkable::SameGaitReportedUnsafe { number, other, by: report.report.by.clone() },
             });
         }
         let certified = match self.certificates.get(&trial.id) {

@@ -1,7 +1,7 @@
 //! The answers of people on the study page.
 
 use crate::format;
-use gaitwright_service::studies::safety_reports::{Closed, SafetyReportSource};
+use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReportSource};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::Instant;
 use gaitwright_store::assessments::{Assessment, AssessmentAnswer};
@@ -26,9 +26,9 @@ pub(super) fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> V
     let of_assessment = |id| assessments.iter().any(|assessment| assessment.feedback_id == Some(id));
     let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
     let why = |retraction: &Option<Retraction>| Some(format!("retracted: {}", retraction.as_ref()?.reason));
-    let lifted = |id| {
-        let of_it = |closed: &&Closed| closed.source == SafetyReportSource::Staff(id);
-        let review = snapshot.grounds.safety_reports.lifted.iter().find(of_it)?.review.as_ref()?;
+    let cleared = |id| {
+        let of_it = |report: &&ReportedGait| report.source == SafetyReportSource::Staff(id);
+        let review = snapshot.grounds.safety_reports.cleared.iter().find(of_it)?.review.as_ref()?;
         Some(format!("cleared for walking by {}: {}", review.author, review.reason))
     };
     let preference = |row: &FeedbackRow| {
@@ -46,7 +46,7 @@ pub(super) fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> V
             text: assessment_in_words(assessment, snapshot)?,
             by: format!("{}, {}", format::source_name(assessment.source), assessment.author),
             note: assessment.note.clone(),
-            undone: why(&assessment.retraction).or_else(|| lifted(assessment.id)),
+            undone: why(&assessment.retraction).or_else(|| cleared(assessment.id)),
             saved: (assessment.retraction.is_none() && !assessment.answer.is_about_safety())
                 .then(|| format!("assessment-{}", assessment.id)),
             at: assessment.created_at,

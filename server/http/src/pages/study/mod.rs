@@ -38,7 +38,7 @@ use gaitwright_service::studies::certified_best::{self, CertificateState, Judged
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
 use gaitwright_service::studies::lifecycle::{Act, acts_of_people};
-use gaitwright_service::studies::safety_reports::Closed;
+use gaitwright_service::studies::safety_reports::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_change::{self, Extend};
 use gaitwright_service::studies::trial_choice::MANY;
@@ -494,12 +494,12 @@ fn view(
         judged: judged.clone(),
         simulated_walks,
     });
-    let unsafe_gait = |closed: &Closed| {
-        let number = snapshot.trial(closed.trial)?.number;
-        let reviewed = closed.review.is_some();
-        Some(UnsafeGait { id: closed.trial, number, by: closed.by.clone(), at: closed.at, reviewed })
+    let unsafe_gait = |report: &ReportedGait| {
+        let number = snapshot.trial(report.trial)?.number;
+        let reviewed = report.review.is_some();
+        Some(UnsafeGait { id: report.trial, number, by: report.by.clone(), at: report.at, reviewed })
     };
-    let unsafe_gaits = snapshot.grounds.safety_reports.closed.iter().filter_map(unsafe_gait).collect();
+    let unsafe_gaits = snapshot.grounds.safety_reports.in_force.iter().filter_map(unsafe_gait).collect();
     let converged = snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
     let files = format!("/api/v1/studies/{}/figures", snapshot.study.id);
     let acts = if may_run { acts_of_people(snapshot.study.state) } else { Vec::new() };

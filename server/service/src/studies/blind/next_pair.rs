@@ -21,10 +21,10 @@ pub struct Drawn {
 }
 
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
-/// earlier presentations of this rater; `closed` lists trials with an open safety report.
+/// earlier presentations of this rater; `closed` lists trials with a safety report in force.
 pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], closed: &[TrialId]) -> Drawn {
-    let taken_back = before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != Kind::Null);
-    if let Some(last) = taken_back.filter(|last| !last.has_one_of(closed)) {
+    let retracted = before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != Kind::Null);
+    if let Some(last) = retracted.filter(|last| !last.has_one_of(closed)) {
         // A rater who confused the sides must find them unchanged.
         let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
         let is_question = is_same_pair(last.pair(), question);
@@ -119,18 +119,18 @@ mod tests {
             let asked = question();
             let earlier = shown(1, draw(1, question(), &[], &[]));
             let drawn = draw(lot, asked, std::slice::from_ref(&earlier), &[]);
-            let taken_back = Presentation { answer: Some(Judgement::Retracted), ..shown(2, drawn) };
-            let id = taken_back.id;
-            let again = draw(3, asked, &[earlier, taken_back], &[]);
+            let retracted = Presentation { answer: Some(Judgement::Retracted), ..shown(2, drawn) };
+            let id = retracted.id;
+            let again = draw(3, asked, &[earlier, retracted], &[]);
             assert_eq!(again, Drawn { again: Some(id), ..drawn });
         }
     }
 
     #[test]
     fn settled_comparison_is_not_shown_again() {
-        let taken_back = Presentation { answer: Some(Judgement::Retracted), ..shown(1, draw(1, question(), &[], &[])) };
+        let retracted = Presentation { answer: Some(Judgement::Retracted), ..shown(1, draw(1, question(), &[], &[])) };
         let asked = question();
-        assert_eq!(draw(1, asked, &[taken_back], &[]).pair, asked);
+        assert_eq!(draw(1, asked, &[retracted], &[]).pair, asked);
     }
 
     #[test]

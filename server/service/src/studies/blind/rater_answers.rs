@@ -125,7 +125,7 @@ pub async fn next<'a>(
     Ok((writer, Some(shown)))
 }
 
-/// The trials of pairs whose gaits have an open safety report.
+/// The trials of pairs whose gaits have a safety report in force.
 async fn closed_among(
     db: &mut Connection,
     safety_reports: &SafetyReports,
@@ -133,7 +133,7 @@ async fn closed_among(
 ) -> Result<Vec<TrialId>, Error> {
     let mut closed = Vec::new();
     for trial in pairs.flat_map(|(a, b)| [a, b]).collect::<BTreeSet<_>>() {
-        if safety_reports.closes(&trials::get(db, trial).await?) {
+        if safety_reports.forbid(&trials::get(db, trial).await?) {
             closed.push(trial);
         }
     }
@@ -200,7 +200,7 @@ pub async fn answer(
         }
         let gaits = judgement.unsafe_of(shown.pair());
         let is_repeated = shown.answer == Some(judgement) && shown.note == given.note;
-        if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.close_all(&gaits)) {
+        if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.are_all_in_force(&gaits)) {
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
         return Ok((shown.study_id, Answered { number: shown.number }));
@@ -213,7 +213,7 @@ pub async fn answer(
         let (study, pair) = (shown.study_id, shown.pair());
         let again = if shown.kind == Kind::Repeat { Again::Meant } else { Again::Refused };
         let statement = GivenJudgement { study, pair, fields, judgement, attribution, again };
-        preference::hear(writer, statement).await.map_err(without_gaits)?
+        preference::record(writer, statement).await.map_err(without_gaits)?
     };
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
     let row =
@@ -260,7 +260,7 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Resul
                    review it.";
         return Err(Error::conflict(why));
     }
-    if let Some(heard) = presentations::heard_of(writer, shown.id).await?
+    if let Some(heard) = presentations::feedback_of(writer, shown.id).await?
         // Staff may have retracted it already.
         && feedback::get(writer, heard).await?.retraction.is_none()
     {

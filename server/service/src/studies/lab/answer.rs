@@ -109,7 +109,8 @@ async fn report_unsafe(
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,
         Some(stands)
-            if is_same(stands, new) && SafetyReports::read(writer, session.study_id).await?.close_all(&gaits) =>
+            if is_same(stands, new)
+                && SafetyReports::read(writer, session.study_id).await?.are_all_in_force(&gaits) =>
         {
             session_progress(writer, session.id).await
         }
@@ -143,7 +144,7 @@ async fn add(
     }
     let session = lab_sessions::get(writer, id).await?;
     if session.done(Act::Unblinded).is_some() {
-        hear(writer, &session).await?;
+        record_answer(writer, &session).await?;
     }
     let detail = json!({ "number": number, "answer": new.answer, "note": new.note });
     audit::append(writer, &caller.actor, "lab_session.answer", &format!("lab session {id}"), &detail).await?;
@@ -177,7 +178,7 @@ async fn retract_number(writer: &mut Writer, caller: &Caller, id: LabSessionId, 
 
 /// Passes the current answer, if any, to the learner with the subject as its author. If a gait has been reported as
 /// unsafe since the answer, the answer stays on record but does not reach the learner.
-pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
+pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
     let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
     let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
@@ -193,7 +194,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
     let heard = if given.judgement.is_assessment() {
         assessment::write(writer, statement).await.map(drop)
     } else {
-        heard_as_preference(writer, statement).await
+        record_preference(writer, statement).await
     };
     match heard {
         Err(reason @ (Error::Invalid(_) | Error::Conflict(_))) => {
@@ -205,7 +206,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
     }
 }
 
-async fn heard_as_preference(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<(), Error> {
-    let heard = preference::hear(writer, statement).await?;
+async fn record_preference(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<(), Error> {
+    let heard = preference::record(writer, statement).await?;
     Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": heard })).await?)
 }

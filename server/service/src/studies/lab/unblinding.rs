@@ -26,6 +26,6 @@ pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reaso
     let detail = json!({ "reason": reason });
     audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;
     let session = lab_sessions::get(writer, id).await?;
-    answer::hear(writer, &session).await?;
+    answer::record_answer(writer, &session).await?;
     Ok(session)
 }
