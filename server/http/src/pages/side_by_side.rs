@@ -93,7 +93,7 @@ pub(super) async fn get(
         }
     };
     // The form proposes two different studies: the newest ones besides the chosen one.
-    let other_than = |taken| offered.iter().map(|study| study.id).find(|id| Some(*id) != taken);
+    let other_than = |taken: Option<StudyId>| offered.iter().map(|study| study.id).find(|id| Some(*id) != taken);
     let a = a.or_else(|| other_than(b));
     let b = b.or_else(|| other_than(a));
     page(&SideBySide { offered, a, b, compared })
