@@ -22,7 +22,7 @@ pub(super) struct Doctor {
 /// The outcome of a check.
 enum CheckOutcome {
     Good(String),
-    Bad(String),
+    Trouble(String),
 }
 use CheckOutcome::{Good, Trouble};
 
@@ -50,7 +50,7 @@ impl Doctor {
         for (what, found) in &checks {
             let (state, text) = match found {
                 Good(text) => ("ok", text),
-                Bad(text) => ("error", text),
+                Trouble(text) => ("error", text),
             };
             data(&format!("{state:<8}{what:<9}{text}"))?;
         }
@@ -68,9 +68,9 @@ fn disk(database: &Path, reserve: u64) -> CheckOutcome {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
     let folder = database.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     match free_bytes(folder) {
-        _ if !folder.is_dir() => Bad(format!("the folder {} does not exist", folder.display())),
+        _ if !folder.is_dir() => Trouble(format!("the folder {} does not exist", folder.display())),
         Some(free) if free < reserve => {
-            Bad(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
+            Trouble(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
         }
         Some(free) => Good(format!("{} free, reserve {}", gigabytes(free), gigabytes(reserve))),
         None => Good("this system does not report free space".to_owned()),
@@ -86,7 +86,7 @@ async fn record(database: &Path, anchors: &[PathBuf]) -> CheckOutcome {
             whole.seals.map_or(0, |(seals, _)| seals),
             whole.anchors.len()
         )),
-        Err(error) => Bad(error.to_string()),
+        Err(error) => Trouble(error.to_string()),
     }
 }
 
@@ -95,10 +95,10 @@ async fn clock_after(database: &Path) -> CheckOutcome {
     let present = now();
     match access_clock::latest_of_file(database).await {
         Ok(Some(latest)) if latest > present.plus_seconds(CLOCKS_DIFFER_S) => {
-            Bad(format!("{present} is earlier than {latest} in the record: the clock was set back"))
+            Trouble(format!("{present} is earlier than {latest} in the record: the clock was set back"))
         }
         Ok(_) => Good(present.to_string()),
-        Err(error) => Bad(error.to_string()),
+        Err(error) => Trouble(error.to_string()),
     }
 }
 
@@ -107,7 +107,7 @@ async fn broker(settings: &Settings) -> Result<CheckOutcome, Error> {
         #[cfg(feature = "nats")]
         Some((url, _)) => Ok(match nats::reach(url).await {
             Ok(version) => Good(format!("NATS {version} with JetStream")),
-            Err(error) => Bad(error.to_string()),
+            Err(error) => Trouble(error.to_string()),
         }),
         _ => Ok(Good("no NATS broker is set".to_owned())),
     }

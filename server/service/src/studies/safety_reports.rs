@@ -140,9 +140,9 @@ impl SafetyReports {
         &mut self,
         db: &mut Connection,
         (study, same_device): (StudyId, bool),
-        report: Vec<ReportedGait>,
+        reports: Vec<ReportedGait>,
     ) -> StoreResult<()> {
-        for report in report {
+        for report in reports {
             let trial = trials::get(db, report.trial).await?;
             let (number, motion) = (trial.number, GaitMotion::of(&trial));
             self.motions.push(ReportedMotion { report, study, number, same_device, motion });
@@ -195,7 +195,7 @@ impl SafetyReports {
                 continue;
             }
             if let Some(answer) = session.answer().filter(|answer| answer.judgement.is_about_safety()) {
-                // Naming one of the two gaits would reveal the allocation, so both are report until unblinding.
+                // Naming one of the two gaits would reveal the allocation, so both are kept from walking until unblinding.
                 let by =
                     format!("the subject in lab session {} (blinded, so either gait may be meant)", session.number);
                 let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
