@@ -1,6 +1,6 @@
 //! `gaitwright solve`: optimises one gait.
 
-use super::Ended;
+use super::CommandEnd;
 use super::flag_numbers::basin;
 use super::lineage::{Lineage, LineageStart, basin_of_answer};
 use super::multi_start_flags::MultiStartFlags;
@@ -115,7 +115,7 @@ impl Solve {
         Ok((problem, options, self.flags.warm_start(self.warm_basin)?))
     }
 
-    pub(super) async fn run(self) -> Result<Ended, Error> {
+    pub(super) async fn run(self) -> Result<CommandEnd, Error> {
         let (problem, mut options, start) = self.input()?;
         let warm = start.as_ref().map(|start| start.point.clone());
         // The result does not depend on the number of threads.
@@ -187,13 +187,13 @@ impl Solve {
             }
         }
         if outcome.report.status == SolveStatus::Cancelled {
-            return Ok(Ended::Interrupted);
+            return Ok(CommandEnd::Interrupted);
         }
         if let Some(out) = out {
             let kept = SolveFile { outcome: &outcome, lineage: &lineage };
             out.write(&serde_json::to_string(&kept).map_err(|e| Error::Internal(e.to_string()))?)?;
         }
-        Ok(Ended::Done)
+        Ok(CommandEnd::Done)
     }
 }
 

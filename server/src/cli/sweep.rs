@@ -1,7 +1,7 @@
 //! `gaitwright sweep`: optimises a gait for each row of a table of actions, in parallel. Results keep the order of the
 //! rows.
 
-use super::Ended;
+use super::CommandEnd;
 use super::flag_numbers::workers;
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -44,7 +44,7 @@ const COLUMNS: [&str; 6] =
 type Answer = Result<SolveOutcome, SolveError>;
 
 impl Sweep {
-    pub(super) async fn run(self) -> Result<Ended, Error> {
+    pub(super) async fn run(self) -> Result<CommandEnd, Error> {
         let actions = actions(&self.actions)?;
         let problem = self.flags.problem(TunedBounds::default())?;
         let (start, options) = (self.flags.warm_start(None)?, self.flags.options()?);
@@ -124,7 +124,7 @@ impl SweepTable {
         self.text.push_str(&line);
     }
 
-    fn end(self, stopped: bool) -> Result<Ended, Error> {
+    fn end(self, stopped: bool) -> Result<CommandEnd, Error> {
         if let (0, Some(error)) = (self.rows, self.refused) {
             return Err(error.into());
         }
@@ -132,7 +132,7 @@ impl SweepTable {
         if stopped {
             data(self.text.trim_end())?;
             tell(&format!("stopped: the rows were written to standard output; {path} was not written"));
-            return Ok(Ended::Interrupted);
+            return Ok(CommandEnd::Interrupted);
         }
         if let Err(error) = self.unwritten.map_or_else(|| self.out.finish(), Err) {
             data(self.text.trim_end())?;
@@ -140,7 +140,7 @@ impl SweepTable {
         }
         let rows = self.text.lines().count() - 1;
         tell(&format!("{} of {rows} converged; written to {path}", self.converged));
-        Ok(Ended::Done)
+        Ok(CommandEnd::Done)
     }
 }
 

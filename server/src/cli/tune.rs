@@ -1,6 +1,6 @@
 //! `gaitwright tune`: runs an unattended study.
 
-use super::Ended;
+use super::CommandEnd;
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
@@ -53,7 +53,7 @@ pub(super) struct Tune {
 }
 
 impl Tune {
-    pub(super) async fn run(self, settings: &Settings) -> Result<Ended, Error> {
+    pub(super) async fn run(self, settings: &Settings) -> Result<CommandEnd, Error> {
         let subject = self.body.subject()?;
         let (device, reference, gait_settings) =
             (self.files.device()?, self.files.reference()?, self.files.settings()?);
@@ -96,13 +96,13 @@ impl Tune {
                 "interrupted after {done} of {} trials; run the same command again to continue",
                 self.trials
             ));
-            return Ok(Ended::Interrupted);
+            return Ok(CommandEnd::Interrupted);
         }
         match unattended::failure(&ran.snapshot) {
-            None => Ok(Ended::Done),
+            None => Ok(CommandEnd::Done),
             Some(failure) => {
                 tell(&format!("gaitwright: {failure}"));
-                Ok(Ended::Failed)
+                Ok(CommandEnd::Failed)
             }
         }
     }

@@ -4,7 +4,7 @@ mod comparison;
 mod report;
 mod statements;
 
-use super::Ended;
+use super::CommandEnd;
 use super::flag_numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -79,7 +79,7 @@ pub(super) struct Reproduce {
 
 impl Reproduce {
     /// Runs two studies for each subject and seed, one trial at a time, so that results are reproducible bit for bit.
-    pub(super) async fn run(self) -> Result<Ended, Error> {
+    pub(super) async fn run(self) -> Result<CommandEnd, Error> {
         let reference = reference_of(self.reference.as_deref())?;
         let cannot = |e: std::io::Error| Error::Malformed(format!("Cannot create {}: {e}.", self.folder.display()));
         std::fs::create_dir_all(&self.folder).map_err(cannot)?;
@@ -91,7 +91,7 @@ impl Reproduce {
         store.close().await;
         let Some((outcomes, failures)) = outcomes? else {
             tell("interrupted; run the same command again to continue");
-            return Ok(Ended::Interrupted);
+            return Ok(CommandEnd::Interrupted);
         };
         let texts = [
             report::html(&outcomes, self.trials)?,
@@ -110,7 +110,7 @@ impl Reproduce {
         for failure in &failures {
             tell(&format!("gaitwright: {failure}"));
         }
-        Ok(if failures.is_empty() { Ended::Done } else { Ended::Failed })
+        Ok(if failures.is_empty() { CommandEnd::Done } else { CommandEnd::Failed })
     }
 
     /// Runs every study in order. Returns the results and the engineering failures, or `None` if a person stopped the
