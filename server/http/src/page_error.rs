@@ -46,7 +46,7 @@ impl IntoResponse for PageError {
 fn without_identifier(detail: &str) -> Option<String> {
     let (start, id) = detail.strip_suffix('.')?.rsplit_once(' ')?;
     let what = start.strip_prefix("There is no ")?;
-    // Every identifier has the form of a study's.
+    // All identifiers are UUIDs.
     id.parse::<StudyId>().ok()?;
     Some(format!("There is no such {what}, or you have no access to it."))
 }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, Optional, TypedDict, Union
 
-# Kind of access.
+# Kind of access: `view`, data were shown; `export`, data were downloaded as a file; `refused`, the request was refused.
 AccessKind = Literal["view", "export", "refused"]
 
 # What a person states instead of a preference between two gaits.
@@ -23,13 +23,15 @@ BackupId = str
 # Bytes that are not text, such as a picture or an archive.
 Binary = bytes
 
-# State of the certificate of a gait.
+# State of the certificate of a gait: `passed`, every check is within its limit, the walker does not fall and the gait
+# is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified; `not_certified`,
+# the gait has no certificate.
 CertificateState = Literal["passed", "failed", "being_certified", "not_certified"]
 
-# Condition of a walk.
+# Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
 Condition = Literal["normal", "gait_a", "gait_b"]
 
-# Kind of entry: consent or withdrawal.
+# Kind of entry: `given`, the subject gave consent; `withdrawn`, the subject withdrew it.
 ConsentKind = Literal["given", "withdrawn"]
 
 # The file that the controller of a device reads. It describes its own fields.
@@ -37,53 +39,61 @@ ControllerFile = dict[str, Any]
 
 DeviceId = str
 
-# Who evaluates trials.
+# What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report outcomes.
 Evaluation = Literal["optimizer", "script"]
 
 FeedbackId = str
 
-# Who answers comparisons.
+# Who answers comparisons: `automatic`, Gait RMSE answers every comparison; `human`, people answer, and the study waits
+# for them; `mixed`, Gait RMSE answers, and people can add answers.
 FeedbackMode = Literal["automatic", "human", "mixed"]
 
 # A gait as the optimiser writes it. `format_version` is the version of its layout.
 GaitDocument = dict[str, Any]
 
-# A time in the record.
+# A time in UTC (RFC 3339).
 Instant = str
 
-# Kind of job.
+# Kind of job: the `backup` of the record, the `solve` or `explanation` of a trial, or the `certificate` or
+# `execution_report` of a gait.
 JobKind = Literal["backup", "certificate", "execution_report", "explanation", "solve"]
 
-# State of a job.
+# State of a job: `queued` and `running`; `done`, it ended with a result; `failed`, it ended without one; `cancelled`,
+# by a user or a program.
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
-# File format of a recording.
+# File format of a recording of joint angles: `opensim`, a motion or storage file (.mot, .sto) of a gait model;
+# `camargo`, the `data` table of an `ik` file from the data set Camargo 2021 as CSV; `csv`, a CSV file as `/help/data-
+# files` describes it.
 JointAngleFormat = Literal["opensim", "camargo", "csv"]
 
-# Content of an assessment.
+# Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. Only the service
+# gives `retracted`.
 Judgement = Literal[
     "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
 ]
 
 LabSessionId = str
 
-# State of a session.
+# State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `closed`, the
+# session accepts no more data.
 LabSessionState = Literal["planned", "under_way", "closed"]
 
 MeasurementFileId = str
 
-# Format of a measurement file.
+# Format of a measurement file: `csv`, comma-separated values with column names in the first line; `opensim`, a motion
+# or storage file (.mot, .sto).
 MeasurementFormat = Literal["csv", "opensim"]
 
-# Kind of measurement file.
-MeasurementKind = Literal["electromyogram", "motion"]
+# Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
+MeasurementKind = Literal["emg", "motion"]
 
 MemberId = str
 
 # Kind of member.
 MemberKind = Literal["user", "token"]
 
-# Outcome of a trial.
+# Outcome of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too.
 Outcome = Literal["converged", "not_converged"]
 
 # Which of two gaits is better.
@@ -103,13 +113,18 @@ ReferenceGaitDocument = dict[str, Any]
 
 ReferenceGaitId = str
 
-# A right. The scopes of a token are rights.
+# A right of a user or a token: `read`, everything except blinded data; `run`, create, start, pause and stop studies,
+# plan lab sessions, and evaluate trials by scripts; `answer`, give preferences without blinding, and review safety
+# reports; `rate`, compare gaits blind, and record walks and answers in lab sessions; `device`, fetch the controller
+# files of walks; `administer`, manage users and tokens, unblind, read the audit trail and make backups. The scopes of a
+# token are rights other than `administer`.
 Right = Literal["read", "run", "answer", "rate", "device", "administer"]
 
-# Role of a user.
+# Role of a user: `admin` has every right; `clinician` runs studies and gives preferences; `rater` compares gaits blind
+# and records walks and answers in lab sessions.
 Role = Literal["admin", "clinician", "rater"]
 
-# Decision of a review.
+# Decision of a safety review: `walkable`, the gait is cleared for walking; `unsafe`, it remains marked as unsafe.
 SafetyDecision = Literal["walkable", "unsafe"]
 
 SafetyReportId = str
@@ -121,13 +136,17 @@ SessionId = str
 # Input for `gaitwright solve --problem`: subject, device, bounds, settings, reference gait, limits and warm start.
 SolveProblem = dict[str, Any]
 
-# How a solve ended.
+# How a solve ended: `converged`, every constraint is satisfied; `infeasible`, at a local minimum of the violation, with
+# no gait near it; `stalled`, without further progress; `iteration_limit` and `time_limit`, at that limit; `cancelled`,
+# by a user or a program.
 SolveStatus = Literal["converged", "infeasible", "stalled", "iteration_limit", "time_limit", "cancelled"]
 
-# Source of an entry.
+# Source of an entry: `convergence`, the end of a solve; `gait_rmse`, the lower Gait RMSE wins; `subject` and
+# `clinician`, a person; `script`, a lab script.
 Source = Literal["convergence", "gait_rmse", "subject", "clinician", "script"]
 
-# What a solve started from.
+# What a solve started from: `cold`, initial guesses; `warm`, the given warm start; `cold_after_warm`, initial guesses,
+# after the given warm start did not converge.
 StartedFrom = Literal["cold", "warm", "cold_after_warm"]
 
 # How to find right heel strikes: `force`, where the vertical force under the right foot rises above 20 N; `kinematics`,
@@ -137,7 +156,9 @@ Strikes = Literal["force", "kinematics", "ends"]
 
 StudyId = str
 
-# State of a study.
+# State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer of a
+# person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied; `stopped`, by
+# a user or a program.
 StudyState = Literal["draft", "running", "waiting", "paused", "finished", "stopped"]
 
 SubjectId = str
@@ -146,7 +167,8 @@ TokenId = str
 
 TrialId = str
 
-# State of a trial.
+# State of a trial. `queued` and `running` trials are open. `converged` and `not_converged` are results; `failed`
+# (error, crash or time limit), `lost` (the worker stopped responding) and `cancelled` are not.
 TrialState = Literal["queued", "running", "converged", "not_converged", "failed", "lost", "cancelled"]
 
 # Unit of angles.
@@ -199,9 +221,9 @@ class ActiveConstraint(TypedDict):
 
 
 class Answered(TypedDict):
-    """Confirmation of a rater's answer. The response is stored, to be sent again if the request is repeated. It
-    contains neither the gaits nor the answer, so that anybody who can read the study does not learn which gait was
-    shown on which side.
+    """Confirmation of a rater's answer. The response is stored, and sent again if the request is repeated. It omits
+    the gaits and the answer, because others who can read the study must not learn which gait was shown on which
+    side.
     """
 
     # Number of the pair for this rater.
@@ -212,13 +234,13 @@ class Ask(TypedDict, total=False):
     """A request for a trial."""
 
     # Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
-    worker: Optional[str]
+    script: Optional[str]
 
 
 class _AssessmentRequired(TypedDict):
     # The answer.
     answer: AssessmentAnswer
-    # Author.
+    # Name or pseudonym of the person who answered.
     author: str
     # Time of recording.
     created_at: Instant
@@ -228,7 +250,7 @@ class _AssessmentRequired(TypedDict):
     note: str
     # Who answered.
     source: Source
-    # The study.
+    # Identifier of the study.
     study_id: StudyId
     # The trial with gait A.
     trial_a: TrialId
@@ -261,19 +283,19 @@ class _AttemptResultRequired(TypedDict):
 class AttemptResult(_AttemptResultRequired, total=False):
     """Result of an attempt."""
 
-    # Figures of the solve. Figures that are not finite are omitted.
+    # Numerical results of the solve, without those that are not finite.
     report: Optional[SolveReport]
 
 
 class AuditRow(TypedDict):
     """Row of the audit trail."""
 
-    # Kind of change, such as `subject.add` or `study.pause`.
-    action: str
     # Who made the change.
     actor: str
+    # Kind of change, such as `subject.add` or `study.pause`.
+    change: str
     # Time of the change.
-    at: Instant
+    created_at: Instant
     # Details of the change, with the reason if there is one.
     detail: AuditDetail
     # Hash over this row and the hash of the previous row.
@@ -289,10 +311,10 @@ class AuditRow(TypedDict):
 class Backup(TypedDict):
     """A complete backup."""
 
-    # Time of completion.
-    at: Instant
     # Size in bytes.
     bytes: int
+    # Time of completion.
+    created_at: Instant
     # File name, in the folder of the database.
     file: str
     # Identifier.
@@ -342,11 +364,11 @@ class BoundAtLimit(TypedDict):
 
     # Name of the bound.
     bound: str
-    # Domains in which it is active, or `stride`.
+    # Domains in which the bound is active; `stride` for a constraint on the whole stride.
     domains: list[str]
     # What it limits, with its unit.
     meaning: str
-    # Given value.
+    # Value of the bound in the problem.
     value: float
 
 
@@ -420,7 +442,7 @@ class CertifiedDifference(TypedDict):
 
     # Value of the built-in problem; null if it is not set.
     built_in: Any
-    # Name, as in the gait: `settings.limits.friction`, `device.knee_torque_limit_n_m`.
+    # Path of the value in the gait document, such as `settings.limits.friction` or `device.knee_torque_limit_n_m`.
     name: str
     # Value of the gait; null if it is not set.
     value: Any
@@ -458,11 +480,12 @@ class CertifiedSubject(TypedDict):
 class Change(TypedDict, total=False):
     """Changes to a study. Absent fields keep their values."""
 
-    # Whether the study is archived, so that lists do not show it. Possible before its start and after its end.
+    # Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be archived
+    # before its start and after its end.
     archived: Optional[bool]
     # Name shown to users.
     name: Optional[str]
-    # Notes of people.
+    # Free-text notes.
     notes: Optional[str]
     # Number of trials that run in parallel.
     parallel_trials: Optional[int]
@@ -484,7 +507,7 @@ class _ConflictRequired(TypedDict):
     bounds: list[GivenBound]
     # Number of starting points of the search.
     starts: int
-    # Whether a solve gave up, so that infeasibility is not certain.
+    # Whether a solve gave up. If so, infeasibility is not certain.
     undecided: bool
     # Violations in the motion closest to feasibility that the search found, with all other tuned bounds at their
     # loosest, worst first.
@@ -523,8 +546,8 @@ class ControllerFileDownload(TypedDict):
 
     # Who fetched it.
     actor: str
-    # Time.
-    at: Instant
+    # Time of the download.
+    created_at: Instant
     # Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
     to_device: bool
     # Number of the walk, 2 or 3.
@@ -542,7 +565,7 @@ class Correction(TypedDict):
     created_at: Instant
     # Corrected body height, m.
     height_m: float
-    # Reason.
+    # Reason for the correction.
     reason: str
     # Sequence number.
     seq: int
@@ -558,13 +581,13 @@ class CreatedInvitation(TypedDict):
 
 
 class _FeedbackRowRequired(TypedDict):
-    # Author.
+    # Name or pseudonym of the person who answered.
     author: str
     # Whether it comes from a rater's blind comparison.
     by_rater: bool
     # Content of the entry.
     content: FeedbackContent
-    # Whether the rater could have known the allocation, so that the entry does not count as blind.
+    # Whether the rater could have known the allocation. If so, the entry does not count as blind.
     could_have_known: bool
     # Time of recording.
     created_at: Instant
@@ -576,7 +599,7 @@ class _FeedbackRowRequired(TypedDict):
     seq: int
     # Who or what it came from.
     source: Source
-    # The study.
+    # Identifier of the study.
     study_id: StudyId
 
 
@@ -603,7 +626,7 @@ class _TokenRequired(TypedDict):
     id: TokenId
     # Unique name that states its purpose.
     name: str
-    # Scopes.
+    # Rights of the token.
     scopes: list[Right]
 
 
@@ -628,7 +651,7 @@ class CycleActivity(TypedDict):
 
     # Name of the channel.
     channel: str
-    # Mean.
+    # Mean over strides.
     mean: list[float]
     # Standard deviation over strides; zero for one stride.
     standard_deviation: list[float]
@@ -720,7 +743,7 @@ class EmgReading(TypedDict, total=False):
     # Column of each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R). By default the columns have the names of the
     # channels.
     channels: dict[str, str]
-    # Name of the file, for people.
+    # Name of the file, as it is shown.
     file_name: Optional[str]
     # File format.
     format: MeasurementFormat
@@ -802,7 +825,7 @@ class _ExecutionReportRequired(TypedDict):
 
 
 class ExecutionReport(_ExecutionReportRequired, total=False):
-    """Simulated walks with a gait, outside the optimiser's model."""
+    """Simulated walks with a gait, by a model other than the optimiser's."""
 
     # Largest pushes survived. Null if the walker does not complete the undisturbed walk.
     pushes: Optional[SurvivedPushes]
@@ -821,7 +844,7 @@ class FeedbackContentLabel(TypedDict):
     # Category: 0 for not converged, 1 for converged.
     category: int
     kind: Literal["label"]
-    # The trial.
+    # Identifier of the trial.
     trial: TrialId
 
 
@@ -853,24 +876,6 @@ class FeedbackContentSuggestion(TypedDict):
     over: TrialId
     # Index of the suggested action.
     suggested: int
-
-
-class FigureDerivatives(TypedDict):
-    """Derivatives of figures per unit of a tuned bound."""
-
-    # Derivative of the mechanical cost of transport.
-    cost_of_transport: float
-    # Derivative of Gait RMSE, rad per unit of the bound.
-    gait_rmse_rad: float
-    # Derivatives of the largest angle over all nodes, rad per unit of the bound, for torso, hip_L, knee_L, ankle_L,
-    # hip_R, knee_R and ankle_R in this order.
-    largest_angles_rad: list[float]
-    # Of the objective.
-    objective: float
-    # Derivatives of the smallest angle over all nodes, in the order of the largest angles, rad per unit of the bound.
-    smallest_angles_rad: list[float]
-    # Derivative of the mean walking speed, m/s per unit of the bound.
-    speed_m_s: float
 
 
 class Fork(TypedDict, total=False):
@@ -1066,12 +1071,12 @@ class GivenBound(TypedDict):
     bound: str
     # What it limits, with its unit.
     meaning: str
-    # Given value.
+    # Value of the bound in the problem.
     value: float
 
 
 class GridStep(TypedDict):
-    """Change of a bound by one step of the grid, and changes of figures to first order."""
+    """One step of a bound in the search space, and the first-order changes of the results."""
 
     # Change of the mechanical cost of transport.
     cost_of_transport: float
@@ -1079,7 +1084,8 @@ class GridStep(TypedDict):
     gait_rmse_rad: float
     # Whether the same constraints stay active up to this value, to first order.
     keeps_active: bool
-    # The next stricter value, or the next less strict one if there is none.
+    # The next stricter value of the search space, or the next looser one if the bound is already at its strictest
+    # value.
     to: float
 
 
@@ -1128,7 +1134,7 @@ class Iteration(TypedDict):
     constraint_violation: float
     # Largest entry of the dual infeasibility.
     dual_infeasibility: float
-    # Initial guess it belongs to.
+    # Number of the initial guess to which this iteration belongs.
     guess: int
     # Number of the iteration over all phases.
     iteration: int
@@ -1156,7 +1162,7 @@ class Job(_JobRequired, total=False):
     progress: Optional[float]
     # Reason if it failed. Null otherwise.
     reason: Optional[str]
-    # Address of the result. Null until the job is done.
+    # URL of the result. Null until the job is done.
     result: Optional[str]
     # Attempts and worker of an open solve. Null otherwise.
     solve: Optional[OpenSolve]
@@ -1177,7 +1183,7 @@ class JointRelaxation(TypedDict):
     solves: int
     # Number of starting points of the search at the `not_with` values.
     starts: int
-    # Whether a solve at the `not_with` values gave up, so that infeasibility is not certain.
+    # Whether a solve at the `not_with` values gave up. If so, infeasibility is not certain.
     undecided: bool
 
 
@@ -1188,11 +1194,11 @@ class LabAnswer(TypedDict):
     actor: str
     # The answer. First is walk 2, second is walk 3.
     answer: Judgement
-    # Time of recording.
-    at: Instant
     # Whether the person who recorded the answer could have known the allocation: it was recorded after unblinding, or
     # by a user who had fetched a controller file.
     could_have_known: bool
+    # Time of recording.
+    created_at: Instant
     # Free text.
     note: str
     # Number of the answer, from 1. It increases by one when an answer is retracted.
@@ -1231,8 +1237,8 @@ class LabSessionStep(TypedDict):
 
     # Who did it.
     actor: str
-    # Time.
-    at: Instant
+    # Time of the step.
+    created_at: Instant
     # Reason or note.
     note: str
 
@@ -1255,7 +1261,7 @@ class _LabSessionViewRequired(TypedDict):
     planned_by: str
     # State of the session.
     state: LabSessionState
-    # The study.
+    # Identifier of the study.
     study_id: StudyId
     # The trial with the first of the two gaits. Does not imply the order of the walks.
     trial_a: TrialId
@@ -1418,7 +1424,7 @@ class _MeasurementFileRequired(TypedDict):
     kind: MeasurementKind
     # SHA-256 of the file.
     raw_sha256: str
-    # The session.
+    # Identifier of the lab session.
     session_id: LabSessionId
     # Number of the walk, 1 to 3.
     walk: int
@@ -1442,7 +1448,7 @@ class _MemberRequired(TypedDict):
     kind: MemberKind
     # Name of the user or the token.
     name: str
-    # The study.
+    # Identifier of the study.
     study_id: StudyId
 
 
@@ -1505,7 +1511,7 @@ class MotionReading(TypedDict, total=False):
 
     # Cut-off frequency of the low-pass filter before differentiation, Hz.
     cutoff_hz: float
-    # Name of the file, for people.
+    # Name of the file, as it is shown.
     file_name: Optional[str]
     # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     # knee_R_rad, ankle_R_rad.
@@ -1770,9 +1776,9 @@ class NewMotion(_NewMotionRequired, total=False):
 class _NewPreferenceRequired(TypedDict):
     # Which gait is better.
     answer: PairAnswer
-    # The first gait.
+    # The trial with gait A.
     trial_a: TrialId
-    # The second gait.
+    # The trial with gait B.
     trial_b: TrialId
 
 
@@ -1820,7 +1826,7 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
 class NewRole(TypedDict):
     """New role of a user."""
 
-    # Role.
+    # New role.
     role: Role
 
 
@@ -1836,7 +1842,8 @@ class NewSafetyReport(TypedDict, total=False):
 
 
 class _NewSafetyReviewRequired(TypedDict):
-    # `walkable`: the gait may be walked again. `unsafe`: the gait remains marked as unsafe, and the review is complete.
+    # `walkable`: the gait is cleared for walking. `unsafe`: the gait remains marked as unsafe, and the review is
+    # complete.
     decision: SafetyDecision
     # Reason, 1 to 2000 characters.
     reason: str
@@ -1847,13 +1854,13 @@ class NewSafetyReview(_NewSafetyReviewRequired, total=False):
 
     # Name or pseudonym of the reviewer. Defaults to the caller's name.
     author: Optional[str]
-    # The safety reports in force that the reviewer has seen. The decision is refused if one of them is missing. By
-    # default, all of them count as seen.
+    # The safety reports in force that the reviewer has seen. The decision is refused if a report in force is not
+    # listed. By default, all of them count as seen.
     reports: Optional[list[SafetyReportId]]
 
 
 class _NewStudyRequired(TypedDict):
-    # Subject of the study.
+    # Identifier of the subject.
     subject_id: SubjectId
 
 
@@ -1862,9 +1869,9 @@ class NewStudy(_NewStudyRequired, total=False):
 
     # Values of the bounds that are not tuned.
     base_bounds: BaseBounds
-    # Device. The built-in one by default.
+    # Identifier of the device. The built-in one by default.
     device_id: Optional[DeviceId]
-    # Who evaluates trials.
+    # What evaluates trials.
     evaluation: Evaluation
     # Who answers comparisons.
     feedback_mode: FeedbackMode
@@ -1881,7 +1888,7 @@ class NewStudy(_NewStudyRequired, total=False):
     parallel_trials: int
     # Priority, -10 to 10. Higher values run first.
     priority: int
-    # Reference gait for Gait RMSE. By default `falisse-2019`, whichever others are imported.
+    # Reference gait for Gait RMSE. By default `falisse-2019`, even if others have been imported.
     reference_gait_id: Optional[ReferenceGaitId]
     # Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
     # Defaults to the `repeats` setting of the learner. Has no effect if scripts evaluate the trials.
@@ -1892,7 +1899,7 @@ class NewStudy(_NewStudyRequired, total=False):
     search_space: Optional[SearchSpace]
     # Seed for all random draws except allocations.
     seed: int
-    # Limits of one solve.
+    # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
     # Total solve time, s, after which no new trial starts.
     solve_seconds_budget: Optional[float]
@@ -1984,11 +1991,11 @@ class Optimality(TypedDict):
 class Pair(TypedDict):
     """Pair to compare, as shown to a rater."""
 
-    # Address of the motion that is shown first.
+    # URL of the motion that is shown first.
     first: str
     # Number of the pair for this rater.
     number: int
-    # Address of the motion that is shown second.
+    # URL of the motion that is shown second.
     second: str
     # Token of the pair.
     token: str
@@ -2022,7 +2029,7 @@ class _PresentationRequired(TypedDict):
     shown_first: TrialId
     # Trial shown second.
     shown_second: TrialId
-    # The study.
+    # Identifier of the study.
     study_id: StudyId
 
 
@@ -2044,12 +2051,13 @@ class _ProblemRequired(TypedDict):
     status: int
     # Name of this kind of problem.
     title: str
-    # Address that identifies the kind of problem, and of a page that explains it. It does not change between versions.
+    # URI of the kind of error, which is also the address of a page that explains it. It does not change between
+    # versions.
     type: str
 
 
 class Problem(_ProblemRequired, total=False):
-    """A problem document."""
+    """An error response (problem details, RFC 9457)."""
 
     # Values that are accepted.
     allowed: Optional[str]
@@ -2109,7 +2117,7 @@ class RaterAnswer(_RaterAnswerRequired, total=False):
     response_ms: Optional[int]
 
 
-class _RaterFiguresRequired(TypedDict):
+class _RaterReliabilityRequired(TypedDict):
     # Number of answers.
     answered: int
     # Number of "cannot tell" answers.
@@ -2126,7 +2134,7 @@ class _RaterFiguresRequired(TypedDict):
     unsafe_gaits: int
 
 
-class RaterFigures(_RaterFiguresRequired, total=False):
+class RaterReliability(_RaterReliabilityRequired, total=False):
     """Reliability of a rater in a study."""
 
     # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Absent
@@ -2155,7 +2163,7 @@ class Recommended(_RecommendedRequired, total=False):
 class _RecommendationRequired(Recommended):
     # State of the certificate of its gait.
     certificate: CertificateState
-    # Whether gaits of the study are being certified, so that the recommendation may change.
+    # Whether gaits of the study are being certified. If so, the recommendation may change.
     certifying: bool
     # Reasons if the certificate failed.
     failures: list[str]
@@ -2214,7 +2222,7 @@ _RelaxationRequired = TypedDict(
     {
         # Name of the bound.
         "bound": "str",
-        # Given value.
+        # Value of the bound in the problem.
         "from": "float",
         # What it limits, with its unit.
         "meaning": "str",
@@ -2222,9 +2230,9 @@ _RelaxationRequired = TypedDict(
         "not_with": "float",
         # Number of solves.
         "solves": "int",
-        # Number of starting points of the search at the `not_with` values. 0 if unknown.
+        # Number of starting points of the search at the `not_with` value. 0 if unknown.
         "starts": "int",
-        # Whether the solve at the `not_with` value gave up, so that infeasibility is not certain.
+        # Whether the solve at the `not_with` value gave up. If so, infeasibility is not certain.
         "undecided": "bool",
     },
 )
@@ -2242,7 +2250,7 @@ _RelaxedBoundRequired = TypedDict(
     {
         # Name of the bound.
         "bound": "str",
-        # Given value.
+        # Value of the bound in the problem.
         "from": "float",
         # What it limits, with its unit.
         "meaning": "str",
@@ -2258,6 +2266,24 @@ class RelaxedBound(_RelaxedBoundRequired, total=False):
     # The value nearest to the given one that gives a gait together with the others. Null if not even the loosest value
     # does.
     to: Optional[float]
+
+
+class ResultDerivatives(TypedDict):
+    """Derivatives of the results with respect to a tuned bound."""
+
+    # Derivative of the mechanical cost of transport.
+    cost_of_transport: float
+    # Derivative of Gait RMSE, rad per unit of the bound.
+    gait_rmse_rad: float
+    # Derivatives of the largest angle over all nodes, rad per unit of the bound, for torso, hip_L, knee_L, ankle_L,
+    # hip_R, knee_R and ankle_R in this order.
+    largest_angles_rad: list[float]
+    # Derivative of the objective.
+    objective: float
+    # Derivatives of the smallest angle over all nodes, in the order of the largest angles, rad per unit of the bound.
+    smallest_angles_rad: list[float]
+    # Derivative of the mean walking speed, m/s per unit of the bound.
+    speed_m_s: float
 
 
 class _RetractRequired(TypedDict):
@@ -2315,9 +2341,9 @@ class _SafetyReportRequired(TypedDict):
     # Identifier of the report. A report from a blind pair, an assessment or a lab session has the identifier of that
     # object, so reports about both of its gaits share one identifier.
     id: SafetyReportId
-    # Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. The gait must
-    # not be walked.
-    open: bool
+    # Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. If so, the gait
+    # must not be used for walking.
+    in_force: bool
     # Trial of the gait.
     trial_id: TrialId
 
@@ -2332,15 +2358,15 @@ class SafetyReport(_SafetyReportRequired, total=False):
 class SafetyReview(TypedDict):
     """Safety review."""
 
-    # Reviewer.
+    # Name or pseudonym of the reviewer.
     author: str
     # Time of the review.
     created_at: Instant
-    # Decision.
+    # Decision about the reports.
     decision: SafetyDecision
     # Identifier.
     id: SafetyReviewId
-    # Reason.
+    # Reason for the decision.
     reason: str
     # The reports that the review covers. Another report about the same gait needs another review.
     reports: list[SafetyReportId]
@@ -2360,21 +2386,21 @@ class _SensitivityToBoundRequired(TypedDict):
     active: list[ActiveConstraint]
     # Name of the bound.
     bound: str
-    # Derivatives of the figures of the gait.
-    derivatives: FigureDerivatives
+    # Derivatives of the results of the gait.
+    derivatives: ResultDerivatives
     # Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
     # is null if there is no limit in that direction.
     interval: list[Optional[float]]
-    # Whether a constraint is about to become active or inactive, so that the derivatives on the two sides differ.
+    # Whether a constraint is about to become active or inactive, in which case the derivatives on the two sides differ.
     is_weakly_active: bool
-    # Its value.
+    # Value of the bound.
     value: float
 
 
 class SensitivityToBound(_SensitivityToBoundRequired, total=False):
     """Sensitivity with respect to one tuned bound. Derivatives are per unit of the bound."""
 
-    # Change of the bound by one step of the study's grid. Null if the study does not tune the bound.
+    # One step of the bound in the search space, and its effect. Null if the study does not tune the bound.
     grid_step: Optional[GridStep]
 
 
@@ -2437,7 +2463,7 @@ class SolveOptionsBasinChoice(TypedDict):
 
 
 class SolveOptions(TypedDict, total=False):
-    """Limits of one solve."""
+    """Options of the solver: limits, tolerance, initial guesses and retries."""
 
     # Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the
     # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.
@@ -2506,7 +2532,7 @@ class _SolveReportRequired(TypedDict):
 
 
 class SolveReport(_SolveReportRequired, total=False):
-    """The figures of one solve."""
+    """Numerical results of one solve."""
 
     # Breakdown of the linear algebra. Null if unknown.
     linear_algebra: Optional[LinearAlgebra]
@@ -2526,9 +2552,9 @@ class StridesOnYield(TypedDict):
 class _StudyPlanRequired(TypedDict):
     # Values of bounds that are not tuned.
     base_bounds: Bounds
-    # Device.
+    # Identifier of the device.
     device_id: DeviceId
-    # Who evaluates trials.
+    # What evaluates trials.
     evaluation: Evaluation
     # Who answers comparisons.
     feedback_mode: FeedbackMode
@@ -2545,7 +2571,7 @@ class _StudyPlanRequired(TypedDict):
     parallel_trials: int
     # Priority, -10 to 10. Higher values run first.
     priority: int
-    # Reference gait for Gait RMSE.
+    # Identifier of the reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
     # Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
     # Always true for studies created by versions without this setting.
@@ -2554,9 +2580,9 @@ class _StudyPlanRequired(TypedDict):
     search_space: SearchSpace
     # Seed for all random draws except allocations.
     seed: int
-    # Limits of one solve.
+    # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
-    # Subject of the study.
+    # Identifier of the subject.
     subject_id: SubjectId
     # Number of trials.
     trial_budget: int
@@ -2579,11 +2605,11 @@ class _StudyRequired(StudyPlan):
     created_at: Instant
     # Identifier.
     id: StudyId
-    # Notes of people.
+    # Free-text notes.
     notes: str
     # Revision, which increases with each change.
     revision: int
-    # State.
+    # State of the study.
     state: StudyState
     # Reason for the state; may be empty.
     state_reason: str
@@ -2594,9 +2620,10 @@ class _StudyRequired(StudyPlan):
 
 
 class Study(_StudyRequired, total=False):
-    """Study."""
+    """A tuning run for one subject: its set-up and state."""
 
-    # Time at which it was archived. Lists do not show archived studies unless asked.
+    # Time at which the study was archived. Lists leave out archived studies unless they are asked for; `GET
+    # /studies?archived=true` lists them.
     archived_at: Optional[Instant]
     # Parent, if the study is a fork.
     forked_from: Optional[StudyId]
@@ -2672,8 +2699,8 @@ class Subject(TypedDict):
 
 
 class _SuggestionRequired(TypedDict):
-    # Suggested values of tuned bounds, such as `{"a5": 0.026}`, each one of the values in the search space. Other
-    # bounds keep the values of the trial.
+    # Suggested values of tuned bounds, such as `{"a5": 0.026}`. Each must be a value of the search space. Other bounds
+    # keep their values from the trial.
     bounds: dict[str, float]
     # Trial whose gait could be better.
     over: TrialId
@@ -2732,9 +2759,9 @@ class _TrialRequired(TypedDict):
     number: int
     # Reason for the trial.
     reason: str
-    # State.
+    # State of the trial.
     state: TrialState
-    # The study it belongs to.
+    # Identifier of the study to which the trial belongs.
     study_id: StudyId
     # Most violated rows, worst first.
     violations: list[Violation]
@@ -2759,7 +2786,7 @@ class Trial(_TrialRequired, total=False):
     max_violation: Optional[float]
     # Objective of the solve.
     objective: Optional[float]
-    # All figures of the solve.
+    # All numerical results of the solve.
     report: Optional[SolveReport]
     # Wall time of the solve, s.
     seconds_total: Optional[float]
@@ -2885,12 +2912,12 @@ class _UserRequired(TypedDict):
     id: UserId
     # Name or code, unique ignoring case.
     name: str
-    # Role.
+    # Role, which determines the rights of the user.
     role: Role
 
 
 class User(_UserRequired, total=False):
-    """User."""
+    """A person who signs in: administrator, clinician or rater."""
 
     # Time at which the user was disabled, if disabled.
     disabled_at: Optional[Instant]
@@ -2966,7 +2993,7 @@ class WalksOnGround(TypedDict):
     completed_share_interval: list[float]
     # Walks that ended with a fall.
     fell: int
-    # Largest height and depth of the plateaus of the ground, m.
+    # Largest height of bumps and depth of dips in the ground, m.
     ground_height_m: float
     # Walks that ended with a halt: the walker took no further step.
     halted: int

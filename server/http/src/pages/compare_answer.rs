@@ -161,7 +161,7 @@ pub(super) async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &An
     // A safety report has a key of its own, because it is recorded even if the form was sent before with another answer.
     let key = if judgement.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
     let before = idempotency::find(&mut writer, &caller.actor, &key).await?;
-    // A report that staff have reviewed since is a new one.
+    // After a review, sending the report again records a new one.
     let is_reviewed = before.is_some() && !judgement.is_still_in_force(&mut writer, id).await?;
     if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;

@@ -13,7 +13,7 @@ from ..schemas import (
     BlindMotion,
     NextPair,
     RaterAnswer,
-    RaterFigures,
+    RaterReliability,
     StudyId,
     Unblind,
     UnblindedRater,
@@ -78,7 +78,7 @@ class BlindMethods(Transport):
             ),
         )
 
-    def list_rater_agreement(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[RaterFigures]:
+    def list_raters(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[RaterReliability]:
         """Get the reliability of raters.
 
         Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.
@@ -103,7 +103,7 @@ class BlindMethods(Transport):
             UnblindedRater,
             self.request_json(
                 "POST",
-                "/api/v1/studies/{id}/unblind",
+                "/api/v1/studies/{id}/raters/unblind",
                 {"id": study_id},
                 body=body,
                 key=idempotency_key,

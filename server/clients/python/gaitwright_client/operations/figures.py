@@ -48,9 +48,9 @@ class FiguresMethods(Transport):
     ) -> bytes:
         """Download a figure of the posterior.
 
-        x: The bound to show on the horizontal axis of a map. By default the one that matters most.
+        x: Bound on the horizontal axis of a map. The most important one by default.
 
-        y: The bound to show on the vertical axis of a map. By default the one that matters most of the others.
+        y: Bound on the vertical axis of a map. The second most important one by default.
         """
         return self.request_bytes(
             "GET",
@@ -62,7 +62,7 @@ class FiguresMethods(Transport):
     def get_study_figure(self, study_id: StudyId, file: str, *, other: Optional[StudyId] = None) -> bytes:
         """Download a figure of a study.
 
-        other: Study for comparison.
+        other: Identifier of a study for comparison.
         """
         return self.request_bytes(
             "GET",
@@ -76,7 +76,7 @@ class FiguresMethods(Transport):
 
         While the solve is running, shows its progress. With another trial, shows the joint angles of both.
 
-        other: Converged trial of the same study for comparison.
+        other: Identifier of a converged trial of the same study for comparison.
         """
         return self.request_bytes(
             "GET",

@@ -157,7 +157,7 @@ class LabMethods(Transport):
             ),
         )
 
-    def get_limit_cycles(self, lab_session_id: LabSessionId, *, page_size: Optional[int] = None) -> Pages[LimitCycles]:
+    def list_limit_cycles(self, lab_session_id: LabSessionId, *, page_size: Optional[int] = None) -> Pages[LimitCycles]:
         """Get limit cycles.
 
         Angle and velocity of every recorded joint, from the newest joint angles of each walk.

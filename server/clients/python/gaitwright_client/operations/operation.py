@@ -38,7 +38,7 @@ class OperationMethods(Transport):
 
         contains: Text to find in the kind, actor, address, object, study or pseudonym.
 
-        subject_id: Rows of this subject.
+        subject_id: Only rows of this subject.
         """
         return Pages(
             self,
@@ -77,9 +77,9 @@ class OperationMethods(Transport):
 
         Jobs that have not ended: backups, and those of studies that the caller can access.
 
-        kind: Jobs of this kind.
+        kind: Only jobs of this kind.
 
-        study_id: Jobs of this study.
+        study_id: Only jobs of this study.
         """
         return Pages(self, "/api/v1/jobs", query={"kind": kind, "study_id": study_id, "limit": page_size})
 

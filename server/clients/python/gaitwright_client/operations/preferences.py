@@ -151,7 +151,7 @@ class PreferencesMethods(Transport):
             ),
         )
 
-    def list_preferences_csv(self, study_id: StudyId) -> str:
+    def get_preferences_csv(self, study_id: StudyId) -> str:
         """Download preferences as CSV.
 
         In a preference, `trial_a` is the winner.
@@ -170,7 +170,7 @@ class PreferencesMethods(Transport):
     def list_suggestions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[FeedbackRow]:
         """List suggestions of a study.
 
-        Includes retracted preferences. Oldest first.
+        Includes retracted suggestions. Oldest first.
         """
         return Pages(self, "/api/v1/studies/{id}/suggestions", {"id": study_id}, query={"limit": page_size})
 
@@ -207,8 +207,8 @@ class PreferencesMethods(Transport):
     ) -> SafetyReport:
         """Report a gait as unsafe.
 
-        The gait, and every trial of the subject with the same motion, is not recommended, compared or walked until
-        staff have reviewed the report. The report does not reach the learner.
+        Until staff have reviewed the report, neither the gait nor any other trial of the subject with the same motion
+        is recommended, compared or used for walking. The report does not reach the learner.
 
         Fields: optionally author, note, source.
         """
@@ -232,9 +232,9 @@ class PreferencesMethods(Transport):
     ) -> SafetyReview:
         """Review the safety reports of a gait.
 
-        If the gait may be walked again, it can be recommended, compared and planned again, and the preferences derived
-        from the reports are retracted. If a lab session with a report about the gait is unblinded later, that report
-        makes the gait unsafe again.
+        If the gait is cleared, it can again be recommended, compared and used in lab sessions, and the preferences
+        derived from the reports are retracted. If a lab session with a report about the gait is unblinded later, that
+        report makes the gait unsafe again.
 
         Fields: decision, reason; optionally author, reports.
         """

@@ -37,8 +37,8 @@ class ReferenceGaitsMethods(Transport):
     ) -> ReferenceGait:
         """Import a reference gait from a recording.
 
-        Segments the recording at right heel strikes and averages its strides. An identical recording returns the
-        existing reference gait.
+        Segments the recording at right heel strikes and averages its strides. If the recording was already imported,
+        the response contains the existing reference gait.
 
         Fields: name, recording; optionally body_mass_kg, force_column, forces, format, heel_strikes_s, height_m,
         strikes, unit.

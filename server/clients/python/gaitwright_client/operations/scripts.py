@@ -28,7 +28,7 @@ class ScriptsMethods(Transport):
 
         Returns the same trial until its outcome is reported.
 
-        Fields: optionally worker.
+        Fields: optionally script.
         """
         return cast(
             Trial,

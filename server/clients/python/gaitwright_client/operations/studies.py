@@ -38,18 +38,31 @@ class StudiesMethods(Transport):
         self,
         *,
         subject_id: Optional[SubjectId] = None,
+        text: Optional[str] = None,
+        tag: Optional[str] = None,
         state: Optional[StudyState] = None,
+        archived: Optional[bool] = None,
         page_size: Optional[int] = None,
     ) -> Pages[StudyView]:
         """List studies.
 
         Newest first.
 
-        subject_id: Studies of this subject.
+        subject_id: Only studies of this subject.
 
-        state: Studies in this state.
+        text: Only studies whose name, tags, notes or pseudonym of the subject contain this text.
+
+        tag: Only studies with this tag.
+
+        state: Only studies in this state.
+
+        archived: Whether to list archived studies, or the others (the default).
         """
-        return Pages(self, "/api/v1/studies", query={"subject_id": subject_id, "state": state, "limit": page_size})
+        return Pages(
+            self,
+            "/api/v1/studies",
+            query={"subject_id": subject_id, "text": text, "tag": tag, "state": state, "archived": archived, "limit": page_size},
+        )
 
     def create_study(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewStudy]) -> StudyView:
         """Create a study.
@@ -79,7 +92,8 @@ class StudiesMethods(Transport):
     ) -> StudyView:
         """Update a study.
 
-        Changes the name, priority or number of parallel trials.
+        Changes the name, tags, notes, priority, number of parallel trials or archived state. Absent fields keep their
+        values.
 
         Fields: optionally archived, name, notes, parallel_trials, priority, tags.
         """
@@ -163,7 +177,7 @@ class StudiesMethods(Transport):
             ),
         )
 
-    def get_study_history(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Milestone]:
+    def list_study_history(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Milestone]:
         """Get the history of the recommendation.
 
         The best trial after each iteration of the study, that is, after each result.
@@ -298,7 +312,7 @@ class StudiesMethods(Transport):
             ),
         )
 
-    def compare_studies(self, *, ids: str, page_size: Optional[int] = None) -> Pages[StudyComparison]:
+    def list_study_comparisons(self, *, ids: str, page_size: Optional[int] = None) -> Pages[StudyComparison]:
         """Compare several studies.
 
         Results keep the order of `ids`.

@@ -159,7 +159,8 @@ class SubjectsMethods(Transport):
     ) -> Consent:
         """Withdraw consent.
 
-        Stops every study of the subject. The record is kept, but nothing can be added, shown or exported.
+        Stops every study of the subject. The data of the subject are kept, but nothing can be added to them, shown or
+        exported.
 
         Fields: reason.
         """

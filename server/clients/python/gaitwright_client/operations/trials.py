@@ -51,9 +51,9 @@ class TrialsMethods(Transport):
     ) -> Pages[Trial]:
         """List trials of a study.
 
-        In order of number, unless `sort` names another column.
+        Sorted by number, unless `sort` names another column.
 
-        state: Trials in this state.
+        state: Only trials in this state.
 
         sort: Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a
         value come last.
@@ -65,7 +65,7 @@ class TrialsMethods(Transport):
             query={"state": state, "sort": sort, "limit": page_size},
         )
 
-    def list_trials_csv(self, study_id: StudyId) -> str:
+    def get_trials_csv(self, study_id: StudyId) -> str:
         """Download trials as CSV."""
         return self.request_text("GET", "/api/v1/studies/{id}/trials.csv", {"id": study_id})
 
@@ -137,7 +137,7 @@ class TrialsMethods(Transport):
     def get_execution_report(self, trial_id: TrialId) -> TrialExecutionReport:
         """Get the execution report of a trial.
 
-        The newest report of walks that were simulated with the gait outside the optimiser's model.
+        The newest report of simulated walks with the gait. The simulation does not use the optimiser's model.
         """
         return cast(
             TrialExecutionReport,
@@ -252,7 +252,7 @@ class TrialsMethods(Transport):
     def get_sensitivities(self, trial_id: TrialId) -> TrialSensitivities:
         """Get the sensitivities of a trial.
 
-        How the figures of a gait change, to first order, with each tuned bound. Computed on request from the stored
+        How the results of a gait change, to first order, with each tuned bound. Computed on request from the stored
         solution.
         """
         return cast(TrialSensitivities, self.request_json("GET", "/api/v1/trials/{id}/sensitivities", {"id": trial_id}))

@@ -24,7 +24,7 @@ const TOGETHER: Duration = Duration::from_millis(10);
 
 impl Scheduler {
     pub(super) async fn keep_planning(&self, task: &Task) -> Result<(), Error> {
-        // Once at the start: later leases belong to running solves.
+        // Only at the start; afterwards every lease belongs to a running solve.
         self.0.leases_taken_back.get_or_try_init(|| self.take_back_leases()).await?;
         let pause = IDLE.min(self.0.engine.lease() / HEARTBEATS_PER_LEASE);
         let mut plans = Plans::default();
