@@ -57,8 +57,11 @@ fn commands_solve_certify_and_convert_a_gait() {
 
     // Figures that the file states are compared with those of its gait.
     for (figure, expected) in [
-        ("cost_of_transport", "it states cost_of_transport as 0.01; computed from the gait it is 0."),
-        ("gait_rmse_rad", "it states gait_rmse_rad as 0.01; with the reference gait \"Falisse 2019, subject 1\" it is"),
+        ("cost_of_transport", "the file says that cost_of_transport is 0.01; computed from the gait it is 0."),
+        (
+            "gait_rmse_rad",
+            "the file says that gait_rmse_rad is 0.01; with the reference gait \"Falisse 2019, subject 1\" it is",
+        ),
     ] {
         let mut forged = outcome.clone();
         forged["report"][figure] = json!(0.01);

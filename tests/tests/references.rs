@@ -263,10 +263,10 @@ async fn import_does_not_change_the_reference_gait_of_new_studies() {
         let chosen = match (is_chosen, is_measured) {
             (true, _) => "",
             (false, true) => {
-                "is the nearest to the subject in height and body mass. The distance of the chosen one is 2."
+                "is the nearest to the subject in height and body mass. The distance of the chosen reference gait is 2."
             }
             (false, false) => {
-                "is the nearest to the subject in height and body mass. The distance of the chosen one is unknown."
+                "is the nearest to the subject in height and body mass. The distance of the chosen reference gait is unknown."
             }
         };
         assert_eq!(shown.contains("the chosen one"), !is_chosen, "{checked}");

@@ -94,7 +94,7 @@ impl<'a> Solves<'a> {
     pub(super) fn new(problem: &'a GaitProblem, options: &SolveOptions, cancel: &'a CancelToken) -> Self {
         let options = SolveOptions {
             max_iterations: options.max_iterations.min(MAX_ITERATIONS),
-            // Convergence does not depend on it.
+            // Tightening between nodes begins after convergence.
             tightening_rounds: 0,
             ..*options
         };

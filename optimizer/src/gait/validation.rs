@@ -55,7 +55,7 @@ fn check_times(trajectory: &DomainTrajectory, start_s: f64) -> Result<(), String
 /// Checks that a trajectory belongs to the domain. The error is the reason.
 fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result<(), String> {
     if trajectory.name != domain.name() {
-        return Err(format!("the name is {:?}", trajectory.name));
+        return Err(format!("the name is {:?}, expected {:?}", trajectory.name, domain.name()));
     }
     let points = trajectory.q.len();
     if points < 3 || points.is_multiple_of(2) {

@@ -28,7 +28,9 @@ impl PointSensitivities {
     ) -> Result<Self, GaitSensitivityError> {
         let program = problem.program(problem.muscles).map_err(SolveError::from)?;
         if solution.muscles != problem.muscles || solution.mesh != problem.settings.mesh {
-            return Err(SolveError::WarmStartShape("it has another variant or mesh than the problem".to_owned()).into());
+            return Err(
+                SolveError::WarmStartShape("its variant or mesh differs from that of the problem".to_owned()).into()
+            );
         }
         check_shape(&program, solution)?;
         let program = program.tightened(&solution.margins);

@@ -43,7 +43,7 @@ fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
         for part in &body {
             let place = part.segment.placement(figure).transform();
             write!(svg, "<path class=\"{}\" transform=\"{place}\" d=\"{}\"", part.class, part.outline)?;
-            // The page of a rater moves the first one.
+            // Only the first figure is animated, on the page of a rater.
             if tile == 0 {
                 write!(svg, " data-segment=\"{}\"", part.segment.name())?;
             }

@@ -40,10 +40,10 @@ use utoipa_axum::router::OpenApiRouter;
             name = "preferences",
             description = "Answers about gaits: preferences, assessments, suggestions, safety reports and their reviews."
         ),
-        (name = "reference-gaits", description = "Gaits against which Gait RMSE measures."),
+        (name = "reference-gaits", description = "Gaits against which Gait RMSE is measured."),
         (name = "scripts", description = "Trials that lab scripts ask for and evaluate."),
         (name = "studies", description = "Tuning runs."),
-        (name = "subjects", description = "People who walk: body measures, consent and muscles."),
+        (name = "subjects", description = "People who walk: height and mass, consent and muscle values."),
         (name = "trials", description = "Evaluated actions of a study, and their gaits.")
     )
 )]

@@ -12,7 +12,7 @@ const LEARNER: [Described; 27] = [
         "How the next action is chosen: `linecospar`, the best action of a posterior sample on a random line through the best \
          action; `eubo`, the action whose comparison with the best one is expected to be most useful; `thompson`, the best \
          action of a posterior sample over the whole search space; `information_gain`, the action whose feedback is expected \
-         to tell most about the utility; `random`, a random action that was not tried.",
+         to tell the most about the utility; `random`, a random action that has not been tried.",
     ),
     (
         "LearnerSettings",
@@ -43,8 +43,8 @@ const LEARNER: [Described; 27] = [
     (
         "LearnerSettings",
         "labels",
-        "What labels tell about: `in_utility`, the utility, as in the literature; `separate`, the feasibility of actions, a \
-         second Gaussian process.",
+        "What labels are evidence of: `in_utility`, the utility, as in the literature; `separate`, the feasibility of \
+         actions, modelled by a second Gaussian process.",
     ),
     ("LearnerSettings", "feasibility_lengthscale_factor", "Factor on every lengthscale of feasibility."),
     (
@@ -79,7 +79,7 @@ const LEARNER: [Described; 27] = [
          threshold of labels, unless no other action is left. ROIAL uses -0.45. Null disables the region.",
     ),
     ("LearnerSettings", "samples_per_iteration", "Number of actions in a batch."),
-    ("LearnerSettings", "repeats", "Whether `linecospar` may propose an action again that was tried."),
+    ("LearnerSettings", "repeats", "Whether `linecospar` may propose an action that has already been tried."),
     (
         "LearnerSettings",
         "lines",
@@ -233,7 +233,7 @@ const GAIT_SETTINGS: [Described; 51] = [
 ];
 
 const OTHERS: [Described; 11] = [
-    ("DeviceDefinition", "name", "Name, which no other device has."),
+    ("DeviceDefinition", "name", "Unique name."),
     (
         "DeviceDefinition",
         "carried_limb",

@@ -94,8 +94,9 @@ impl NewKey {
 
 #[derive(Debug, Args)]
 pub(super) struct Prune {
-    /// Delete the trajectories of gaits in studies that ended more than this many days ago. Keeps those of gaits that are
-    /// or may be recommended, of the gaits from which these were warm-started, and of gaits of lab sessions.
+    /// Delete the trajectories of gaits in studies that ended more than this many days ago. Keeps the
+    /// trajectories of gaits that are or may be recommended, of the gaits that warm-started them, and of gaits in lab
+    /// sessions.
     #[arg(long, value_name = "DAYS", value_parser = days, allow_negative_numbers = true)]
     older_than_days: u32,
     #[command(flatten)]

@@ -49,12 +49,12 @@ fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -
     match figures.difference(&GaitResults::stated_in(report)) {
         None => Ok(()),
         Some((name, computed, stated)) if name.starts_with("gait_rmse") => Err(format!(
-            "it states {name} as {stated}; with the reference gait {:?} it is {computed}. If the solve used \
-             another reference gait, give it with --reference.",
+            "the file says that {name} is {stated}; with the reference gait {:?} it is {computed}. If the solve \
+             used another reference gait, name that one with --reference.",
             reference.name
         )),
         Some((name, computed, stated)) => {
-            Err(format!("it states {name} as {stated}; computed from the gait it is {computed}."))
+            Err(format!("the file says that {name} is {stated}; computed from the gait it is {computed}."))
         }
     }
 }

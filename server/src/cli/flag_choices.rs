@@ -14,7 +14,10 @@ pub(super) const JOINT_ANGLE_FORMATS: [FlagChoice; 3] = [
         "camargo",
         "The `data` table of an `ik` file from the data set Camargo 2021, exported as CSV with MATLAB's writetable",
     ),
-    ("csv", "time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad; optionally knee_R_rad, right_force_n"),
+    (
+        "csv",
+        "CSV file with the columns time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad, and optionally knee_R_rad and right_force_n",
+    ),
 ];
 /// Units of angles.
 pub(super) const ANGLE_UNITS: [FlagChoice; 2] = [("degrees", "Angles in degrees"), ("radians", "Angles in radians")];

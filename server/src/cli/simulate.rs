@@ -16,7 +16,7 @@ pub(super) struct Simulate {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// Number of simulated walks with random disturbances on each ground.
+    /// Number of simulated walks with random disturbances on each kind of ground.
     #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().walks, value_parser = walks, allow_negative_numbers = true)]
     walks: u32,
     /// Largest height of bumps and depth of dips in the ground, 0 (level) to 50 mm (default: 0, 5 and 10 in turn).
@@ -106,7 +106,7 @@ fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
     let [low, high] = ground.completed_share_interval;
     [
         format!(
-            "  {}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; {} falls, {} halts",
+            "  {}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; falls: {}, halts: {}",
             ground.ground_in_words(),
             ground.completed,
             ground.walks,

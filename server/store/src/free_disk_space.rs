@@ -84,7 +84,7 @@ fn can_allocate(folder: &Path, bytes: u64) -> bool {
     let nameless = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
     let allocated = open(folder, nameless, Mode::RUSR | Mode::WUSR)
         .and_then(|file| fallocate(&file, FallocateFlags::empty(), 0, bytes));
-    // File systems that know no such files do not say.
+    // Without O_TMPFILE, assume that there is space.
     !matches!(allocated, Err(Errno::NOSPC | Errno::DQUOT))
 }
 

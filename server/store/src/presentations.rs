@@ -47,8 +47,8 @@ impl FromStr for Kind {
     }
 }
 
-/// Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. Only the service
-/// gives `retracted`.
+/// Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. `retracted` is
+/// reserved for the service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {

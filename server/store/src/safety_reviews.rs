@@ -37,7 +37,7 @@ impl FromStr for SafetyDecision {
     }
 }
 
-/// Safety review.
+/// A decision about the safety reports of a gait.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SafetyReview {
     /// Identifier.

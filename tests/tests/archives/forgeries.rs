@@ -61,13 +61,13 @@ pub(super) fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
 pub(super) const FORGERIES: [Forgery; 68] = [
-    ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its figures differ from its solve report"),
+    ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its results differ from its solve report"),
     ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated gait_rmse_rad is 0.01"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
     (
         "a better cost",
         |r| r.first("trials")["cost_of_transport"] = 0.01.into(),
-        "its figures differ from its solve report",
+        "its results differ from its solve report",
     ),
     (
         "a violation that converges",

@@ -180,7 +180,7 @@ impl KktSolver for Ladder {
                 continue;
             }
             self.in_use = k;
-            // A skipped method has not factorised the matrix from which only the diagonal differs.
+            // A method that was skipped has no factorisation to update, so it must factorise everything.
             let change = if std::mem::replace(&mut self.up_to_date[k], true) {
                 MatrixChange::Diagonal
             } else {

@@ -102,7 +102,7 @@ impl Write for Chunks {
 
 /// List the imports of a study
 ///
-/// One import for each record that the study passed through; empty for a study that was created here.
+/// One entry for each time the study was imported into a record. Empty if the study was created in this record.
 #[utoipa::path(
     get,
     path = "/studies/{id}/imports",

@@ -39,7 +39,7 @@ pub(super) async fn list(
 
 /// Add a device from a data file
 ///
-/// If there is a device with the same file, the response contains it.
+/// If a device with the same definition exists, the response contains it.
 #[utoipa::path(
     post,
     path = "/devices",

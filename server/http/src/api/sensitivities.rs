@@ -49,15 +49,15 @@ struct SensitivityToBound {
     grid_step: Option<GridStep>,
 }
 
-/// One step of a bound in the search space, and the first-order changes of the results.
+/// One step of a bound in the search space, and the first-order changes in the results.
 #[derive(Debug, Serialize, ToSchema)]
 struct GridStep {
     /// The next stricter value of the search space, or the next looser one if the bound is already at its strictest
     /// value.
     to: f64,
-    /// Change of the mechanical cost of transport.
+    /// Change in the mechanical cost of transport.
     cost_of_transport: f64,
-    /// Change of Gait RMSE, rad.
+    /// Change in Gait RMSE, rad.
     gait_rmse_rad: f64,
     /// Whether the same constraints stay active up to this value, to first order.
     keeps_active: bool,

@@ -64,10 +64,10 @@ pub(super) struct Filter {
     tag = "studies",
     params(
         ("subject_id" = Option<SubjectId>, Query, description = "Only studies of this subject"),
-        ("text" = Option<String>, Query, description = "Only studies whose name, tags, notes or pseudonym of the subject contain this text"),
+        ("text" = Option<String>, Query, description = "Only studies whose name, tags, notes or subject's pseudonym contains this text"),
         ("tag" = Option<String>, Query, description = "Only studies with this tag"),
         ("state" = Option<StudyState>, Query, description = "Only studies in this state"),
-        ("archived" = Option<bool>, Query, description = "Whether to list archived studies, or the others (the default)")
+        ("archived" = Option<bool>, Query, description = "If true, only archived studies. If false (the default), only studies that are not archived")
     ),
     responses((status = 200, description = "A page", body = Page<StudyView>)),
     security(("token" = ["read"]), ("session" = ["read"])),

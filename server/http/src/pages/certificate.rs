@@ -29,7 +29,7 @@ impl InWords {
         let mut figures = Vec::new();
         if let Some(certified) = &certificate.certified {
             figures.push(("Gait (SHA-256)", certified.gait_sha256.clone()));
-            figures.push(("Walker", certified.walker_in_words()));
+            figures.push(("Subject and device", certified.walker_in_words()));
             let differences: Vec<String> = certified.differences.iter().map(Difference::in_words).collect();
             let words = if differences.is_empty() { "none".to_owned() } else { differences.join("; ") };
             figures.push(("Differences from the built-in device and the default settings", words));

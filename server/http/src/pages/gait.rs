@@ -235,7 +235,7 @@ fn draw(
     };
     let walker = |gait: &Gait| {
         let figure = WalkerFigure::new(gait)?.with_ghost(Ghost::of_reference(gait, reference)?);
-        let svg = figure.svg("The walker");
+        let svg = figure.svg("A person walking one stride");
         Ok::<_, Error>(PageChart { svg, ..drawn(&gait_charts::animation(figure)) })
     };
     let unchanged = trial.report.as_ref().map_or(&[][..], |report| &report.unchanged_bounds);

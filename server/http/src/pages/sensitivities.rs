@@ -21,7 +21,7 @@ pub(super) struct SensitivityRow {
     pub(super) step: String,
     /// Change of cost of transport, %.
     pub(super) cost: String,
-    /// Change of Gait RMSE, rad.
+    /// Change in Gait RMSE, rad.
     pub(super) rmse: String,
     /// Whether other constraints become active before the end of the step.
     pub(super) beyond: bool,

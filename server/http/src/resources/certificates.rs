@@ -157,11 +157,12 @@ impl From<certificate::Check> for CertificateCheck {
 /// Stability of a gait, from the stride-to-stride map.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ReturnMap {
-    /// Largest change of the state over one stride from the gait's own first state, rad and rad/s.
+    /// Largest change in a coordinate or velocity over one stride that starts at the gait's initial state, rad and
+    /// rad/s.
     gait_residual: f64,
     /// Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
     fixed_point_residual: f64,
-    /// Largest component of the difference between the gait's first state and the fixed point, rad and rad/s.
+    /// Largest component of the difference between the gait's initial state and the fixed point, rad and rad/s.
     fixed_point_distance: f64,
     /// Multipliers from variational equations and saltation matrices, largest first.
     multipliers: Vec<Multiplier>,
@@ -204,7 +205,7 @@ impl From<certificate::ReturnMap> for ReturnMap {
     }
 }
 
-/// A multiplier of the stride-to-stride map.
+/// A Floquet multiplier: an eigenvalue of the linearised stride-to-stride map.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Multiplier {
     /// Real part.

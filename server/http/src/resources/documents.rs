@@ -22,7 +22,7 @@ pub(crate) struct ControllerFile(BTreeMap<String, Value>);
 #[derive(Debug, ToSchema)]
 pub(crate) struct ReferenceGaitDocument(BTreeMap<String, Value>);
 
-/// A device: measurements of the prosthesis, each with its range.
+/// Definition of a device: name, masses, lengths and limits of the prosthesis.
 #[derive(Debug, ToSchema)]
 pub(crate) struct DeviceDefinition(BTreeMap<String, Value>);
 

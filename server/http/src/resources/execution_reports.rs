@@ -137,7 +137,7 @@ impl From<execution::StridesOnYield> for StridesOnYield {
     }
 }
 
-/// Largest pushes, of a fixed series of increasing ones, that the walker survives without other disturbances.
+/// Largest pushes in a fixed, increasing series that the walker survives without other disturbances.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SurvivedPushes {
     /// Forwards, N s; 0 if it survives none.

@@ -43,13 +43,13 @@ impl From<explanation::GivenBound> for GivenBound {
     }
 }
 
-/// Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait was found with all of these, but
+/// Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait satisfied all of these bounds, but
 /// relaxing any one of them gave a gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Conflict {
     /// The bounds. Empty if the fixed constraints conflict with each other.
     bounds: Vec<GivenBound>,
-    /// Bounds of other conflicts that were relaxed when this one was found.
+    /// Bounds of other conflicts that were relaxed when this conflict was found.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(value_type = Option<Vec<String>>)]
     without: Vec<String>,

@@ -86,8 +86,8 @@ pub(crate) struct LabSessionView {
     answer: Option<AnswerView>,
     /// Who unblinded the session, when and why. Absent while it is blinded.
     unblinded: Option<LabSessionStep>,
-    /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
-    /// it.
+    /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
+    /// and then imported.
     allocation_included: bool,
     /// Who fetched controller files of the walks.
     controller_files: Vec<ControllerFileDownload>,

@@ -5,7 +5,7 @@ use gaitwright_store::{Instant, SafetyReportId, SafetyReviewId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Safety review.
+/// A decision about the safety reports of a gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SafetyReview {
     /// Identifier.

@@ -196,7 +196,7 @@ impl From<gait_optimizer::UnchangedBound> for UnchangedBound {
 /// One attempt within a solve, from one starting point.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SolveAttempt {
-    /// Strategy, in words.
+    /// Starting point and method in words, such as `warm start`.
     strategy: String,
     /// How it ended.
     status: SolveStatus,
@@ -311,7 +311,8 @@ pub(crate) struct Iteration {
     /// Number of the iteration over all phases.
     #[schema(value_type = u64)]
     iteration: usize,
-    /// Phase of the solve.
+    /// `tracking` or `muscle_tracking`, of the reference gait without or with muscles; `plain_cost` or `cost`, minimisation of the
+    /// cost of transport without or with muscles; `inter_node`, minimisation with tightened bounds.
     #[schema(value_type = String)]
     phase: SolvePhase,
     /// Objective of the phase.

@@ -41,6 +41,6 @@ pub async fn ask(
     if scheduler.simulate(id, (!exists).then_some(asked)) {
         Ok(())
     } else {
-        Err(Error::NotReady("This service simulates no walks.".to_owned()))
+        Err(Error::NotReady("This service does not simulate walks.".to_owned()))
     }
 }

@@ -172,7 +172,7 @@ pub async fn choose(
     let explained = explanations::find(&mut db, id).await?;
     let known = explained.map(|made| relaxations(&made.explanation)).unwrap_or_default();
     let relaxation = known.get(place).ok_or_else(|| {
-        Error::invalid("relaxation", place, "the place of a relaxation in the explanation of the trial")
+        Error::invalid("relaxation", place, "the index of a relaxation in the explanation of the trial, counted from 0")
     })?;
     let RelaxedTrial { bounds, action, .. } = possible(&mut db, &study, &trial, relaxation).await??;
     let snapshot = StudySnapshot::read(&mut db, study).await?;

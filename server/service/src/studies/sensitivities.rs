@@ -32,9 +32,9 @@ pub struct BoundStep {
     /// The next stricter value of the search space, or the next looser one if the bound is already at its strictest
     /// value.
     pub to: f64,
-    /// Change of the mechanical cost of transport.
+    /// Change in the mechanical cost of transport.
     pub cost_of_transport: f64,
-    /// Change of Gait RMSE, rad.
+    /// Change in Gait RMSE, rad.
     pub gait_rmse_rad: f64,
     /// Whether the same constraints stay active up to this value, to first order.
     pub keeps_active: bool,

@@ -164,7 +164,7 @@ pub(super) fn conclusion(pair_comparisons: &[PairComparison]) -> String {
     let answer = match throughout {
         _ if pairs == 0 => "cannot be tested: there is no pair of studies",
         1 if pairs == 1 => {
-            "holds in the only pair, which says little: local optima can tip the result either way, so repeat with more seeds"
+            "holds in the only pair, which is weak evidence, because local optima can tip the result either way"
         }
         all if all == pairs => "holds in every pair",
         0 => "holds in no pair",
@@ -318,7 +318,7 @@ mod tests {
         assert!(words.contains("only some pairs, depending on local optima (1 of 2)."), "{words}");
         assert!(words.contains("lower with muscles at 4 of 5 iterations, and at the end in 1 of 2 pairs"), "{words}");
         assert!(words.contains("by a median of 0.050 rad (-0.100 to 0.200)"), "{words}");
-        assert!(conclusion(&found[1..]).contains("holds in the only pair, which says little"));
+        assert!(conclusion(&found[1..]).contains("holds in the only pair, which is weak evidence"));
         assert!(conclusion(&[found[1].clone(), found[1].clone()]).contains("holds in every pair (2 of 2)"));
         assert!(conclusion(&found[..1]).contains("muscles raise the final Gait RMSE by a median of 0.100 rad"));
         assert!(conclusion(&[]).contains("cannot be tested"));

@@ -22,8 +22,7 @@ pub(in crate::cli) struct AnchoredFlags {
     #[command(flatten)]
     pub(super) record: RecordFlags,
     /// Second anchor file, for the newest hashes of the record, preferably on another disk; the first one is next to
-    /// the database (default: none). With an empty name there is none, whatever the
-    /// settings file says.
+    /// the database (default: no second one). An empty name means none, even if the settings file names one.
     #[arg(long, value_name = "FILE")]
     pub(super) anchor: Option<String>,
 }

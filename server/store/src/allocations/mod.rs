@@ -48,8 +48,8 @@ async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
 /// What may be known of the allocation of a session.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OfSession {
-    /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
-    /// it.
+    /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
+    /// and then imported.
     pub included: bool,
     /// Whether walk 2 uses gait A; `None` while the session is blinded.
     pub gait_a_first: Option<bool>,

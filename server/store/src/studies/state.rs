@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer of a
+/// State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer from a
 /// person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied; `stopped`,
 /// by a user or a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -64,8 +64,8 @@ fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> Strin
         }
         Some(first) => {
             let chosen = chosen.distance.map_or_else(
-                || "The distance of the chosen one is unknown.".to_owned(),
-                |distance| format!("The distance of the chosen one is {distance:.2}."),
+                || "The distance of the chosen reference gait is unknown.".to_owned(),
+                |distance| format!("The distance of the chosen reference gait is {distance:.2}."),
             );
             format!(
                 "{}{} is the nearest to the subject in height and body mass. {chosen}",

@@ -89,8 +89,8 @@ pub struct LabSessionView {
     pub answer: Option<AnswerView>,
     /// Who unblinded the session, when and why. Absent while it is blinded.
     pub unblinded: Option<LabSessionStep>,
-    /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
-    /// it.
+    /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
+    /// and then imported.
     pub allocation_included: bool,
     /// Who fetched controller files of the walks.
     pub controller_files: Vec<ControllerFileDownload>,

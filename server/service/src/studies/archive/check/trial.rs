@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// certificate cannot check the duration of SS1, because the closed loop has no clock there.
 const HIP_PROGRESS_M: f64 = 1e-5;
 
-/// Checks an action, and the figures of a trial against its state and its report.
+/// Checks an action, and the results of a trial against its state and its report.
 pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     if trial.action_index.0 >= plan.search_space.len() {
         return Err(format!("action_index {} is not in the search space", trial.action_index.0));
@@ -24,9 +24,16 @@ pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     if action.map_err(|e| e.to_string())? != trial.action {
         return Err("the action does not match its index".to_owned());
     }
-    let figures = [trial.gait_rmse_rad, trial.cost_of_transport, trial.max_violation, trial.seconds_total];
-    if figures.iter().flatten().any(|figure| !figure.is_finite() || *figure < 0.0) {
-        return Err("a figure is negative or not finite".to_owned());
+    let results = [
+        ("gait_rmse_rad", trial.gait_rmse_rad),
+        ("cost_of_transport", trial.cost_of_transport),
+        ("max_violation", trial.max_violation),
+        ("seconds_total", trial.seconds_total),
+    ];
+    for (field, value) in results.iter().filter_map(|(field, value)| Some((field, (*value)?))) {
+        if !value.is_finite() || value < 0.0 {
+            return Err(format!("{field} is {value}; it must be a finite number of at least 0"));
+        }
     }
     if trial.asked_by.is_some() || !trial.state.is_result() {
         let none = trial.report.is_none() && trial.status.is_none();
@@ -53,7 +60,7 @@ pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         && trial.iterations.is_some_and(|count| count as usize == report.iterations)
         && trial.seconds_total == Some(report.seconds_total);
     if !same {
-        return Err("its figures differ from its solve report".to_owned());
+        return Err("its results differ from its solve report".to_owned());
     }
     if converged && report.max_violation > CONVERGED_VIOLATION {
         return Err(format!("it is converged, but its violation is {}", report.max_violation));
