@@ -269,7 +269,7 @@ async fn import_does_not_change_the_reference_gait_of_new_studies() {
                 "is the nearest to the subject in height and body mass. The distance of the chosen reference gait is unknown."
             }
         };
-        assert_eq!(shown.contains("the chosen one"), !is_chosen, "{checked}");
+        assert_eq!(shown.contains("the chosen reference gait"), !is_chosen, "{checked}");
         assert!(shown.contains(chosen), "{chosen}: {checked}");
     }
     let default = service.study(|_| ()).await;
