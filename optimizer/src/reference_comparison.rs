@@ -14,7 +14,7 @@ const LARGEST_SHIFT: f64 = 0.1;
 /// Number of shifts on each side of zero.
 const SHIFTS: i32 = 40;
 
-/// The distances of a gait from a reference gait.
+/// How much a gait differs from a reference gait.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReferenceComparison {
     /// Name of the reference gait.

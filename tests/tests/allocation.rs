@@ -479,7 +479,6 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
     let left_out = [
         "/metrics",
         "/system",
-        "/api/v1/events",
         "/api/v1/studies/{id}/events",
         "/api/v1/backups",
         "/api/v1/access-log",

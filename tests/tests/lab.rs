@@ -502,7 +502,7 @@ async fn measurement_file_is_downloaded_unchanged() {
     assert_eq!(answer.headers["etag"], format!("\"{}\"", kept["raw_sha256"].as_str().unwrap()));
     assert_eq!(answer.content_type(), "text/csv; charset=utf-8");
     let name = answer.headers["content-disposition"].to_str().unwrap();
-    assert!(name.starts_with("attachment; filename=\"walk-1-electromyogram-"), "{name}");
+    assert!(name.starts_with("attachment; filename=\"walk-1-emg-"), "{name}");
     assert!(service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text.contains(&format!("href=\"{path}\"")));
     let unknown = service.fetch(&format!("/api/v1/measurement-files/{study}/content")).await;
     assert_eq!(unknown.status, StatusCode::NOT_FOUND, "{}", unknown.text);

@@ -1,4 +1,4 @@
-//! Derivatives of the figures of a gait along a direction of its variables.
+//! Derivatives of the results of a gait along a direction of its variables.
 
 use crate::gait::Gait;
 use crate::gait_problem::{GaitProblem, GaitProgram, gait_of};
@@ -6,7 +6,7 @@ use crate::solve::GaitResults;
 use interior_point::Sensitivity;
 use serde::Serialize;
 
-/// Largest change of a scaled variable in the differences. The figures are smooth functions of the variables, except where
+/// Largest change of a scaled variable in the differences. The results are smooth functions of the variables, except where
 /// two nodes share the peak of a joint.
 const LARGEST_CHANGE: f64 = 1e-5;
 

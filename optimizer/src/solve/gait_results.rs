@@ -1,4 +1,4 @@
-//! The figures of a solve report that the gait determines.
+//! The results of a solve report that the gait determines.
 
 use super::report::SolveReport;
 use crate::body::WalkerModel;
@@ -9,10 +9,10 @@ use crate::model_error::ModelError;
 use crate::quadrature::simpson;
 use crate::reference::ReferenceGait;
 
-/// Relative tolerance between two computations of a figure, which may run on different processors.
+/// Relative tolerance between two computations of a result, which may run on different processors.
 const ROUNDING: f64 = 1e-9;
 
-/// The figures of a report that follow from the gait and the reference gait.
+/// The results of a report that follow from the gait and the reference gait.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaitResults {
     /// Mechanical cost of transport, dimensionless.
@@ -32,7 +32,7 @@ pub struct GaitResults {
 }
 
 impl GaitResults {
-    /// The figures of a gait from a file.
+    /// The results of a gait from a file.
     ///
     /// # Errors
     /// [`ModelError`] if the gait is malformed.
@@ -41,7 +41,7 @@ impl GaitResults {
         Ok(Self::of_well_formed(gait, &WalkerModel::new(&gait.subject, &gait.device)?, reference))
     }
 
-    /// The figures of a well-formed gait of this walker.
+    /// The results of a well-formed gait of this walker.
     pub(crate) fn of_well_formed(gait: &Gait, model: &WalkerModel, reference: &ReferenceGait) -> Self {
         let rmse = gait_rmse(gait, reference);
         let energy_j: f64 = gait.domains.iter().map(|domain| energy_j(gait, domain)).sum();
@@ -56,7 +56,7 @@ impl GaitResults {
         }
     }
 
-    /// The figures that a report states.
+    /// The results that a report states.
     pub fn stated_in(report: &SolveReport) -> Self {
         Self {
             cost_of_transport: report.cost_of_transport,
@@ -69,7 +69,7 @@ impl GaitResults {
         }
     }
 
-    /// The first figure that differs from that of `other` by more than rounding: its name, and both values.
+    /// The first result that differs from that of `other` by more than rounding: its name, and both values.
     pub fn difference(&self, other: &Self) -> Option<(&'static str, f64, f64)> {
         let pairs = self.named().into_iter().zip(other.named());
         let mut pairs = pairs.flat_map(|((name, one), (_, other))| {

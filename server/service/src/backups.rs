@@ -31,8 +31,7 @@ pub struct Backup {
     /// Size in bytes.
     pub bytes: u64,
     /// Time of completion.
-    #[serde(rename = "created_at")]
-    pub at: Instant,
+    pub created_at: Instant,
 }
 
 /// The backups that this process makes, and those that it could not make.

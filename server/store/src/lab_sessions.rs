@@ -65,9 +65,9 @@ pub struct LabSession {
     pub study_id: StudyId,
     /// Number in the study, from 1.
     pub number: u32,
-    /// The trial with the first of the two gaits.
+    /// The trial with gait A.
     pub trial_a: TrialId,
-    /// The trial with the second of the two gaits.
+    /// The trial with gait B.
     pub trial_b: TrialId,
     /// What may be known of its allocation.
     pub allocation: OfSession,
@@ -108,9 +108,9 @@ pub struct NewLabSession<'a> {
     pub study_id: StudyId,
     /// Number in the study, from 1.
     pub number: u32,
-    /// The trial with the first of the two gaits.
+    /// The trial with gait A.
     pub trial_a: TrialId,
-    /// The trial with the second of the two gaits.
+    /// The trial with gait B.
     pub trial_b: TrialId,
     /// Free text.
     pub notes: &'a str,

@@ -560,7 +560,7 @@ async fn browser_does_not_offer_an_answered_comparison_as_the_next_one() {
         site.service.wait_for(study, &[StudyState::Waiting]).await;
     }
     other.wait_until("document.querySelector('.notice.bad[role=alert]:not([data-unsent])') !== null").await;
-    assert!(!other.text("main").await.contains("stands below"));
+    assert!(!other.text("main").await.contains("is below"));
     browser.close().await;
 }
 

@@ -43,7 +43,7 @@ pub(super) async fn of_study(
 /// Record an assessment of two gaits
 ///
 /// States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
-/// recommended, compared or planned for lab sessions until staff have reviewed the report.
+/// recommended, compared or planned for lab sessions until staff have cleared the gait.
 #[utoipa::path(
     post,
     path = "/studies/{id}/assessments",

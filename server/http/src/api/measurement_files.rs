@@ -20,7 +20,8 @@ use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, CheckedFile, MeasurementFormat, NewEmg, NewMotion, UploadedFile};
-use gaitwright_store::{LabSessionId, MeasurementFileId, measurement_files};
+use gaitwright_store::measurement_files::{self, MeasurementKind};
+use gaitwright_store::{LabSessionId, MeasurementFileId};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -87,7 +88,7 @@ pub(super) async fn content(
         MeasurementFormat::Csv => ("text/csv; charset=utf-8", "csv"),
         MeasurementFormat::Opensim => ("text/plain; charset=utf-8", "sto"),
     };
-    let name = format!("walk-{}-{}-{}.{ending}", recording.walk, recording.kind.as_str(), id.short());
+    let name = format!("walk-{}-{}-{}.{ending}", recording.walk, kind_of_file(recording.kind), id.short());
     let tag = HeaderValue::from_str(&format!("\"{}\"", recording.raw_sha256));
     let mut answer = exports::file(kind, &name, text);
     answer.headers_mut().insert(header::ETAG, tag.map_err(|e| Error::Internal(e.to_string()))?);
@@ -246,4 +247,12 @@ pub(super) async fn limit_cycles(
     paging: Paging<usize>,
 ) -> Result<Json<Page<LimitCycles>>, Refusal> {
     Ok(Json(paging.cut_by_place(lab::limit_cycles(app.store_mut(), id).await?)?.map(LimitCycles::from)))
+}
+
+/// The kind of a measurement file, in its name.
+fn kind_of_file(kind: MeasurementKind) -> &'static str {
+    match kind {
+        MeasurementKind::Emg => "emg",
+        MeasurementKind::Motion => "motion",
+    }
 }

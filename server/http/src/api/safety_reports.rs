@@ -52,7 +52,7 @@ impl From<ReportedGait> for SafetyReport {
 /// List safety reports of a study
 ///
 /// Includes safety reports from raters, assessments and lab sessions, and reports about a single gait. A report stays
-/// in the list after its gait is cleared for walking; a retracted report does not. A report from a blinded lab session
+/// in the list after its gait is cleared for walking. A report from a blinded lab session
 /// is listed for both of its gaits.
 #[utoipa::path(
     get,
@@ -80,7 +80,7 @@ pub(super) async fn of_study(
 
 /// Report a gait as unsafe
 ///
-/// Until staff have reviewed the report, neither the gait nor any other trial of the subject with the same motion is
+/// Until staff have cleared the gait, neither the gait nor any other trial of the subject with the same motion is
 /// recommended, compared or used for walking. The report does not reach the learner.
 #[utoipa::path(
     post,

@@ -160,7 +160,7 @@ pub(super) async fn try_relaxed(
             return Ok(Redirect::to(&format!("/trials/{trial}")));
         }
     }
-    Err(Error::conflict("The study is changing too fast. Try again.").into())
+    Err(Error::conflict("The study was changed at the same time. Try again.").into())
 }
 
 /// `POST /trials/{id}/explain`.

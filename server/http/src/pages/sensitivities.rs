@@ -17,7 +17,7 @@ pub(super) struct SensitivityTable {
 /// A bound that the study tunes.
 pub(super) struct SensitivityRow {
     pub(super) bound: &'static str,
-    /// One step of the grid.
+    /// One step in the search space.
     pub(super) step: String,
     /// Change of cost of transport, %.
     pub(super) cost: String,

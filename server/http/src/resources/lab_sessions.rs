@@ -74,9 +74,9 @@ pub(crate) struct LabSessionView {
     number: u32,
     /// State of the session.
     state: LabSessionState,
-    /// The trial with the first of the two gaits. Does not imply the order of the walks.
+    /// The trial with gait A. Does not imply the order of the walks.
     trial_a: TrialId,
-    /// The trial with the second of the two gaits.
+    /// The trial with gait B.
     trial_b: TrialId,
     /// Free text.
     notes: String,

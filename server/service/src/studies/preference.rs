@@ -84,8 +84,8 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
-    let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.forbid(trial));
-    let heard = judgement.feedback(pair).filter(|_| both_open && !is_same_gait(&first, &second));
+    let neither_is_reported = [&first, &second].iter().all(|trial| !grounds.safety_reports.forbids(trial));
+    let heard = judgement.feedback(pair).filter(|_| neither_is_reported && !is_same_gait(&first, &second));
     match heard {
         Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),

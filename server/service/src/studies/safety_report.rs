@@ -1,5 +1,5 @@
 //! Records a report that one gait is unsafe. Takes effect at once: the gait, and every trial of the subject with the same
-//! motion, is neither recommended nor compared nor walked until staff have reviewed the report.
+//! motion, is neither recommended nor compared nor walked until staff have cleared the gait.
 
 use super::answer::attribution;
 use super::walkable::NotWalkable;

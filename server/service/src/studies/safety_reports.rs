@@ -62,8 +62,9 @@ impl ReportedGait {
 pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
     let mut found = Vec::new();
     for study in studies::with_safety_reports(db, reach, limit).await? {
-        let report = SafetyReports::read(db, study.id).await?.in_force.into_iter();
-        let waiting: HashSet<TrialId> = report.filter(|c| c.review.is_none()).map(|c| c.trial).collect();
+        let reports = SafetyReports::read(db, study.id).await?.in_force.into_iter();
+        let waiting: HashSet<TrialId> =
+            reports.filter(|report| report.review.is_none()).map(|report| report.trial).collect();
         if !waiting.is_empty() {
             found.push((study, waiting.len()));
         }
@@ -255,7 +256,7 @@ impl SafetyReports {
     }
 
     /// Whether the gait of this trial has a report in force.
-    pub fn forbid(&self, trial: &Trial) -> bool {
+    pub fn forbids(&self, trial: &Trial) -> bool {
         self.about_motion_of(trial).is_some()
     }
 

@@ -17,16 +17,16 @@ pub struct PackedSolution {
     space: SearchSpace,
 }
 
-/// The sensitivities of a gait, and what they predict for the grid of its study.
+/// The sensitivities of a gait, and what they predict for the search space of its study.
 #[derive(Debug)]
 pub struct StudySensitivities {
     /// The sensitivities.
     pub found: GaitSensitivities,
-    /// The change of each bound by one step of the grid; `None` if the study does not tune the bound.
+    /// One step of each bound in the search space; `None` if the study does not tune the bound.
     pub steps: Vec<Option<BoundStep>>,
 }
 
-/// A change of a bound by one step of the grid, and the changes of figures to first order.
+/// One step of a bound in the search space, and the first-order changes in the results.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundStep {
     /// The next stricter value of the search space, or the next looser one if the bound is already at its strictest
@@ -79,7 +79,7 @@ impl PackedSolution {
     }
 }
 
-/// One step of the grid for a bound.
+/// One step of a bound in the search space.
 fn step(bound: &BoundSensitivity, space: &SearchSpace) -> Option<BoundStep> {
     let values = &space.dimensions().iter().find(|dimension| dimension.name == bound.bound)?.values;
     let place = TunedBounds::NAMES.iter().position(|name| *name == bound.bound)?;
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn step_goes_to_the_next_stricter_value_of_the_grid_where_there_is_one() {
+    fn step_goes_to_the_next_stricter_value_where_there_is_one() {
         let space = table_i().unwrap();
         let to = |name, value| step(&bound(name, value, (None, None)), &space).unwrap().to;
         assert_eq!((to("a5", 0.013), to("a5", 0.039)), (0.026, 0.026), "a lower bound is stricter the larger it is");

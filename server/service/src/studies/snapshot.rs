@@ -153,7 +153,8 @@ impl StudySnapshot {
     /// Actions whose gaits Gait RMSE compares: converged, without a safety report in force. Nobody walks because of such a
     /// comparison, so it needs no certificate.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
-        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.forbid(trial);
+        let shown =
+            |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.forbids(trial);
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 

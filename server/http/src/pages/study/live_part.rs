@@ -27,11 +27,9 @@ use gaitwright_service::studies::safety_reports::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::workers::Track;
-use gaitwright_store::assessments::{self};
-use gaitwright_store::feedback::{self};
 use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
-use gaitwright_store::{Instant, StudyId, TrialId, explanations, gaits, jobs, studies, trials};
+use gaitwright_store::{Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, jobs, studies, trials};
 use std::sync::Arc;
 
 /// The part that changes while the study runs.

@@ -16,7 +16,7 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::format::{self};
+use crate::format;
 use crate::page_error::{PageError, PageResult, page};
 use crate::units::Units;
 use crate::visible::Visible;

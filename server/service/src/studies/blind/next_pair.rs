@@ -21,10 +21,10 @@ pub struct Drawn {
 }
 
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
-/// earlier presentations of this rater; `closed` lists trials with a safety report in force.
-pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], closed: &[TrialId]) -> Drawn {
+/// earlier presentations of this rater; `reported` lists trials with a safety report in force.
+pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], reported: &[TrialId]) -> Drawn {
     let retracted = before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != Kind::Null);
-    if let Some(last) = retracted.filter(|last| !last.has_one_of(closed)) {
+    if let Some(last) = retracted.filter(|last| !last.has_one_of(reported)) {
         // A rater who confused the sides must find them unchanged.
         let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
         let is_question = is_same_pair(last.pair(), question);
@@ -42,15 +42,15 @@ pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], clo
         repeats: Some(earlier.id),
         again: None,
     };
-    repeatable(before, closed, lot / REPEAT_ONE_IN).map_or(new, repeat)
+    repeatable(before, reported, lot / REPEAT_ONE_IN).map_or(new, repeat)
 }
 
 /// An earlier pair with a plain answer that has not been repeated.
-fn repeatable<'a>(before: &'a [Presentation], closed: &[TrialId], lot: u64) -> Option<&'a Presentation> {
+fn repeatable<'a>(before: &'a [Presentation], reported: &[TrialId], lot: u64) -> Option<&'a Presentation> {
     let plain = |shown: &&Presentation| {
         shown.kind == Kind::New
             && shown.answer.is_some_and(is_plain)
-            && !shown.has_one_of(closed)
+            && !shown.has_one_of(reported)
             && !before.iter().any(|other| other.repeats == Some(shown.id))
     };
     let candidates: Vec<&Presentation> = before.iter().filter(plain).collect();

@@ -84,7 +84,7 @@ pub async fn next<'a>(
     let safety_reports = SafetyReports::read(&mut writer, study).await?;
     let mut own = presentations::of_study(&mut writer, study).await?;
     own.retain(|shown| shown.rater == caller.name);
-    let closed = closed_among(&mut writer, &safety_reports, own.iter().map(Presentation::pair)).await?;
+    let reported = reported_among(&mut writer, &safety_reports, own.iter().map(Presentation::pair)).await?;
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
         // An imported study does not have the sides of pairs that were still blinded.
         let settled = open.kind == Kind::New && is_answered(&mut writer, study, open.pair(), &caller.name).await?;
@@ -104,7 +104,7 @@ pub async fn next<'a>(
         return Ok((writer, None));
     }
     let lot = Lot::draw()?;
-    let drawn = draw(lot.number(), pair, &own, &closed);
+    let drawn = draw(lot.number(), pair, &own, &reported);
     let token = secret::fresh()?;
     let new = NewPresentation {
         token: token.clone(),
@@ -124,18 +124,18 @@ pub async fn next<'a>(
 }
 
 /// The trials of pairs whose gaits have a safety report in force.
-async fn closed_among(
+async fn reported_among(
     db: &mut Connection,
     safety_reports: &SafetyReports,
     pairs: impl Iterator<Item = (TrialId, TrialId)>,
 ) -> Result<Vec<TrialId>, Error> {
-    let mut closed = Vec::new();
+    let mut reported = Vec::new();
     for trial in pairs.flat_map(|(a, b)| [a, b]).collect::<BTreeSet<_>>() {
-        if safety_reports.forbid(&trials::get(db, trial).await?) {
-            closed.push(trial);
+        if safety_reports.forbids(&trials::get(db, trial).await?) {
+            reported.push(trial);
         }
     }
-    Ok(closed)
+    Ok(reported)
 }
 
 async fn is_answered(

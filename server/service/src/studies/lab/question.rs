@@ -25,8 +25,7 @@ pub struct AnswerView {
     /// Who recorded it.
     pub actor: String,
     /// Time of recording.
-    #[serde(rename = "created_at")]
-    pub at: Instant,
+    pub created_at: Instant,
     /// Whether the person who recorded the answer could have known the allocation: it was recorded after unblinding, or
     /// by a user who had fetched a controller file.
     pub could_have_known: bool,
@@ -40,7 +39,7 @@ impl AnswerView {
             answer: row.judgement,
             note: row.note.clone(),
             actor: row.actor.clone(),
-            at: row.at,
+            created_at: row.at,
             could_have_known: unblinded || has_file(session, &row.actor, row.at),
         }
     }

@@ -77,9 +77,9 @@ pub struct LabSessionView {
     pub number: u32,
     /// State of the session.
     pub state: LabSessionState,
-    /// The trial with the first of the two gaits. Does not imply the order of the walks.
+    /// The trial with gait A. Does not imply the order of the walks.
     pub trial_a: TrialId,
-    /// The trial with the second of the two gaits.
+    /// The trial with gait B.
     pub trial_b: TrialId,
     /// Free text.
     pub notes: String,
