@@ -99,17 +99,3 @@ impl BasinChoice {
         }
     }
 }
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used)]
-mod tests {
-    use super::super::progress::SolvePhase;
-    use super::SolveOptions;
-
-    #[test]
-    fn names_in_older_records_are_read() {
-        let options: SolveOptions = serde_json::from_str(r#"{"cold_guesses": 3}"#).unwrap();
-        assert_eq!(options.initial_guesses, 3);
-        assert_eq!(serde_json::from_str::<SolvePhase>("\"between_points\"").unwrap(), SolvePhase::InterNode);
-    }
-}

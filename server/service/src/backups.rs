@@ -151,7 +151,7 @@ pub async fn get(db: &mut Connection, id: BackupId) -> Result<Backup, Error> {
     let AuditRow { detail, at, .. } =
         complete.ok_or_else(|| Error::NotFound { what: "backup".to_owned(), id: id.to_string() })?;
     let file = detail["file"].as_str().unwrap_or_default().to_owned();
-    Ok(Backup { id, file, bytes: detail["bytes"].as_u64().unwrap_or_default(), at })
+    Ok(Backup { id, file, bytes: detail["bytes"].as_u64().unwrap_or_default(), created_at: at })
 }
 
 /// Records that a backup is cancelled.
