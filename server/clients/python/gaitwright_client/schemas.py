@@ -67,8 +67,8 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 # files` describes it.
 JointAngleFormat = Literal["opensim", "camargo", "csv"]
 
-# Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. Only the service
-# gives `retracted`.
+# Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. `retracted` is
+# reserved for the service.
 Judgement = Literal[
     "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
 ]
@@ -156,7 +156,7 @@ Strikes = Literal["force", "kinematics", "ends"]
 
 StudyId = str
 
-# State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer of a
+# State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer from a
 # person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied; `stopped`, by
 # a user or a program.
 StudyState = Literal["draft", "running", "waiting", "paused", "finished", "stopped"]
@@ -515,14 +515,14 @@ class _ConflictRequired(TypedDict):
 
 
 class Conflict(_ConflictRequired, total=False):
-    """Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait was found with all of these,
+    """Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait satisfied all of these bounds,
     but relaxing any one of them gave a gait.
     """
 
     # Requirements for natural walking that take part in a conflict between fixed constraints, in words; absent if there
     # are none.
     naturalness_terms: Optional[list[str]]
-    # Bounds of other conflicts that were relaxed when this one was found.
+    # Bounds of other conflicts that were relaxed when this conflict was found.
     without: Optional[list[str]]
 
 
@@ -705,7 +705,7 @@ class _DeviceDefinitionRequired(TypedDict):
     knee_housing_mass_kg: float
     # Largest knee torque.
     knee_torque_limit_n_m: float
-    # Name, which no other device has.
+    # Unique name.
     name: str
     # Distance of the shank's centre of mass below the knee, in shank lengths.
     shank_com_fraction: float
@@ -720,7 +720,7 @@ class _DeviceDefinitionRequired(TypedDict):
 
 
 class DeviceDefinition(_DeviceDefinitionRequired, total=False):
-    """A device: measurements of the prosthesis, each with its range."""
+    """Definition of a device: name, masses, lengths and limits of the prosthesis."""
 
     # Source of each value, by the name of its field.
     sources: dict[str, str]
@@ -1076,11 +1076,11 @@ class GivenBound(TypedDict):
 
 
 class GridStep(TypedDict):
-    """One step of a bound in the search space, and the first-order changes of the results."""
+    """One step of a bound in the search space, and the first-order changes in the results."""
 
-    # Change of the mechanical cost of transport.
+    # Change in the mechanical cost of transport.
     cost_of_transport: float
-    # Change of Gait RMSE, rad.
+    # Change in Gait RMSE, rad.
     gait_rmse_rad: float
     # Whether the same constraints stay active up to this value, to first order.
     keeps_active: bool
@@ -1140,7 +1140,8 @@ class Iteration(TypedDict):
     iteration: int
     # Objective of the phase.
     objective: float
-    # Phase of the solve.
+    # `tracking` or `muscle_tracking`, of the reference gait without or with muscles; `plain_cost` or `cost`,
+    # minimisation of the cost of transport without or with muscles; `inter_node`, minimisation with tightened bounds.
     phase: str
     # Primal step length.
     step: float
@@ -1244,8 +1245,8 @@ class LabSessionStep(TypedDict):
 
 
 class _LabSessionViewRequired(TypedDict):
-    # Whether the allocation is in this record. A study that was imported while the session was blinded does not have
-    # it.
+    # Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
+    # and then imported.
     allocation_included: bool
     # Who fetched controller files of the walks.
     controller_files: list[ControllerFileDownload]
@@ -1263,9 +1264,9 @@ class _LabSessionViewRequired(TypedDict):
     state: LabSessionState
     # Identifier of the study.
     study_id: StudyId
-    # The trial with the first of the two gaits. Does not imply the order of the walks.
+    # The trial with gait A. Does not imply the order of the walks.
     trial_a: TrialId
-    # The trial with the second of the two gaits.
+    # The trial with gait B.
     trial_b: TrialId
     # The three walks.
     walks: list[WalkView]
@@ -1303,8 +1304,8 @@ class LearnerSettings(TypedDict, total=False):
     # Method of approximate inference: `laplace`, a normal distribution at the mode of the posterior;
     # `expectation_propagation`, which needs the link `probit`.
     inference: Literal["laplace", "expectation_propagation"]
-    # What labels tell about: `in_utility`, the utility, as in the literature; `separate`, the feasibility of actions, a
-    # second Gaussian process.
+    # What labels are evidence of: `in_utility`, the utility, as in the literature; `separate`, the feasibility of
+    # actions, modelled by a second Gaussian process.
     labels: Literal["in_utility", "separate"]
     # Number of trials after which lengthscales and preference noise are learned again. Null keeps them as they are set.
     learn_every: Optional[int]
@@ -1319,7 +1320,7 @@ class LearnerSettings(TypedDict, total=False):
     # How the next action is chosen: `linecospar`, the best action of a posterior sample on a random line through the
     # best action; `eubo`, the action whose comparison with the best one is expected to be most useful; `thompson`, the
     # best action of a posterior sample over the whole search space; `information_gain`, the action whose feedback is
-    # expected to tell most about the utility; `random`, a random action that was not tried.
+    # expected to tell the most about the utility; `random`, a random action that has not been tried.
     method: Literal["linecospar", "eubo", "thompson", "information_gain", "random"]
     # Variance added to the diagonal of the prior covariance, called *GP noise* in the literature.
     nugget: float
@@ -1335,7 +1336,7 @@ class LearnerSettings(TypedDict, total=False):
     partner: Literal["previous", "incumbent", "every"]
     # Noise scale of preferences, in units of utility.
     preference_noise: float
-    # Whether `linecospar` may propose an action again that was tried.
+    # Whether `linecospar` may propose an action that has already been tried.
     repeats: bool
     # Number of actions in a batch.
     samples_per_iteration: int
@@ -1521,7 +1522,7 @@ class MotionReading(TypedDict, total=False):
 
 
 class Multiplier(TypedDict):
-    """A multiplier of the stride-to-stride map."""
+    """A Floquet multiplier: an eigenvalue of the linearised stride-to-stride map."""
 
     # Imaginary part.
     imaginary: float
@@ -1670,7 +1671,7 @@ class _NewAssessmentRequired(TypedDict):
 
 
 class NewAssessment(_NewAssessmentRequired, total=False):
-    """An assessment."""
+    """An assessment to record."""
 
     # Name or pseudonym of the author. Defaults to the caller's name.
     author: Optional[str]
@@ -2314,11 +2315,11 @@ class ReturnMap(TypedDict):
 
     # Resolution of the finite differences.
     differences_resolve: float
-    # Largest component of the difference between the gait's first state and the fixed point, rad and rad/s.
+    # Largest component of the difference between the gait's initial state and the fixed point, rad and rad/s.
     fixed_point_distance: float
     # Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
     fixed_point_residual: float
-    # Largest change of the state over one stride from the gait's own first state, rad and rad/s.
+    # Largest change in a coordinate or velocity over one stride that starts at the gait's initial state, rad and rad/s.
     gait_residual: float
     # Largest modulus of the multipliers.
     largest: float
@@ -2356,7 +2357,7 @@ class SafetyReport(_SafetyReportRequired, total=False):
 
 
 class SafetyReview(TypedDict):
-    """Safety review."""
+    """A decision about the safety reports of a gait."""
 
     # Name or pseudonym of the reviewer.
     author: str
@@ -2443,7 +2444,7 @@ class _SolveAttemptRequired(TypedDict):
     seconds: float
     # How it ended.
     status: SolveStatus
-    # Strategy, in words.
+    # Starting point and method in words, such as `warm start`.
     strategy: str
 
 
@@ -2718,7 +2719,7 @@ class Suggestion(_SuggestionRequired, total=False):
 
 
 class SurvivedPushes(TypedDict):
-    """Largest pushes, of a fixed series of increasing ones, that the walker survives without other disturbances."""
+    """Largest pushes in a fixed, increasing series that the walker survives without other disturbances."""
 
     # Backwards, N s.
     backwards_n_s: float

@@ -32,7 +32,7 @@ class DevicesMethods(Transport):
     def create_device(self, *, idempotency_key: Optional[str] = None, **body: Unpack[DeviceDefinition]) -> Device:
         """Add a device from a data file.
 
-        If there is a device with the same file, the response contains it.
+        If a device with the same definition exists, the response contains it.
 
         Fields: adapter_gyration_radius_m, adapter_mass_kg, ankle_height_m, ankle_max_rad, ankle_min_rad,
         ankle_torque_limit_n_m, carried_limb, foot_com_down_m, foot_com_forward_m, foot_inertia_kg_m2, foot_mass_kg,

@@ -107,7 +107,7 @@ class PreferencesMethods(Transport):
         """Record an assessment of two gaits.
 
         States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
-        recommended, compared or planned for lab sessions until staff have reviewed the report.
+        recommended, compared or planned for lab sessions until staff have cleared the gait.
 
         Fields: answer, trial_a, trial_b; optionally author, note, source.
         """
@@ -162,8 +162,8 @@ class PreferencesMethods(Transport):
         """List safety reports of a study.
 
         Includes safety reports from raters, assessments and lab sessions, and reports about a single gait. A report
-        stays in the list after its gait is cleared for walking; a retracted report does not. A report from a blinded
-        lab session is listed for both of its gaits.
+        stays in the list after its gait is cleared for walking. A report from a blinded lab session is listed for both
+        of its gaits.
         """
         return Pages(self, "/api/v1/studies/{id}/safety-reports", {"id": study_id}, query={"limit": page_size})
 
@@ -207,8 +207,8 @@ class PreferencesMethods(Transport):
     ) -> SafetyReport:
         """Report a gait as unsafe.
 
-        Until staff have reviewed the report, neither the gait nor any other trial of the subject with the same motion
-        is recommended, compared or used for walking. The report does not reach the learner.
+        Until staff have cleared the gait, neither the gait nor any other trial of the subject with the same motion is
+        recommended, compared or used for walking. The report does not reach the learner.
 
         Fields: optionally author, note, source.
         """

@@ -50,13 +50,13 @@ class StudiesMethods(Transport):
 
         subject_id: Only studies of this subject.
 
-        text: Only studies whose name, tags, notes or pseudonym of the subject contain this text.
+        text: Only studies whose name, tags, notes or subject's pseudonym contains this text.
 
         tag: Only studies with this tag.
 
         state: Only studies in this state.
 
-        archived: Whether to list archived studies, or the others (the default).
+        archived: If true, only archived studies. If false (the default), only studies that are not archived.
         """
         return Pages(
             self,
@@ -194,7 +194,7 @@ class StudiesMethods(Transport):
     def list_study_imports(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Import]:
         """List the imports of a study.
 
-        One import for each record that the study passed through; empty for a study that was created here.
+        One entry for each time the study was imported into a record. Empty if the study was created in this record.
         """
         return Pages(self, "/api/v1/studies/{id}/imports", {"id": study_id}, query={"limit": page_size})
 
