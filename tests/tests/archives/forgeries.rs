@@ -63,7 +63,7 @@ type Forgery = (&'static str, fn(&mut Rows), &'static str);
 pub(super) const FORGERIES: [Forgery; 68] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its results differ from its solve report"),
     ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated gait_rmse_rad is 0.01"),
-    ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
+    ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "it must be a finite number of at least 0"),
     (
         "a better cost",
         |r| r.first("trials")["cost_of_transport"] = 0.01.into(),
