@@ -385,7 +385,7 @@ async fn command_line_repeats_the_solve_of_a_trial_bit_for_bit() {
         let file = format!("problem-trial-{}.json", trial.number);
         let address = format!("/api/v1/trials/{}/problem.json", trial.id);
         let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-        assert!(page.contains(&format!("href=\"{address}\" download=\"{file}\"")), "{page}");
+        assert!(page.contains(&format!("href=\"{address}\" download")), "{page}");
         let problem = service.fetch(&address).await;
         assert!(problem.headers["content-disposition"].to_str().unwrap().contains(&file));
         assert_eq!(problem.json()["warm_start"].is_object(), trial.warm_started_from.is_some());
