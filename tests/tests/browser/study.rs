@@ -95,7 +95,7 @@ async fn browser_follows_a_running_solve() {
 async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left() {
     let Some(browser) = Chromium::launch().await else { return };
     // Slow enough for the page to be open before the first result.
-    let site = Site::start(Analytic::slow(Duration::from_millis(250))).await;
+    let site = Site::start(Analytic::slow(Duration::from_millis(150))).await;
     let study = site.service.study(|new| new.trial_budget = 200).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.resize(1280, 800).await;
