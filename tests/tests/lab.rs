@@ -86,7 +86,7 @@ async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     service.post(&format!("{api}/walks"), &json!({"walk": 3, "note": "tired"})).await;
     let told = service.fetch(&api).await.json();
     let row: LabSessionId = id(&session).parse().unwrap();
-    let drawn = if gait_a_first(&service.store, row).await { ["trial_a", "trial_b"] } else { ["trial_b", "trial_a"] };
+    let drawn = if gait_a_first(&service.store, row).await { ["gait_a", "gait_b"] } else { ["gait_b", "gait_a"] };
     assert_eq!(conditions(&told), [json!("normal"), json!(drawn[0]), json!(drawn[1])]);
     let after: Vec<_> = told["walks"].as_array().unwrap().iter().map(|walk| &walk["after_unblinding"]).collect();
     assert_eq!(after, [&json!(false), &json!(false), &json!(true)]);
@@ -183,8 +183,8 @@ async fn each_walk_gets_the_controller_file_of_its_own_gait() {
         assert!(none.text.contains("without the device"), "{}", none.text);
         let told = service.post(&format!("{api}/unblind"), &json!({"reason": "a test"})).await.json();
         let expected = [1, 2].map(|place| match told["walks"][place]["condition"].as_str() {
-            Some("trial_a") => one.clone(),
-            Some("trial_b") => two.clone(),
+            Some("gait_a") => one.clone(),
+            Some("gait_b") => two.clone(),
             other => panic!("{other:?}"),
         });
         assert!(sent == expected, "the order is {}", told["walks"]);
@@ -292,7 +292,7 @@ async fn unsafe_walk_excludes_both_gaits_until_unblinding() {
     let (_, of_walk_three) = row.walked().unwrap();
     assert_eq!(closed().await, [gaits[0].id == of_walk_three, gaits[1].id == of_walk_three]);
     let assessments = service.fetch(&format!("/api/v1/studies/{study}/assessments")).await.items();
-    assert_eq!((&assessments[0]["answer"], &assessments[0]["note"]), (&json!("unsafe_second"), &json!("stumbled")));
+    assert_eq!((&assessments[0]["answer"], &assessments[0]["note"]), (&json!("unsafe_b"), &json!("stumbled")));
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert_eq!(page.matches(">unsafe</a> by ").count(), 1, "{page}");
     service.stop().await;
