@@ -123,7 +123,7 @@ fn description_of_rater_answers_matches_the_accepted_ones() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let answer = &document["components"]["schemas"]["RaterAnswer"]["properties"]["answer"];
     let words = answer["enum"].as_array().unwrap();
-    assert!(words.contains(&json!("cannot_tell")) && words.contains(&json!("unsafe_a")), "{words:?}");
+    assert!(words.contains(&json!("cannot_tell")) && words.contains(&json!("unsafe_first")), "{words:?}");
 }
 
 /// Every refusal and failure is a problem document with the request identifier of the header.
