@@ -69,14 +69,12 @@ fn groups(document: &Value) -> Vec<OperationGroup> {
         for (method, operation) in item.as_object().into_iter().flatten() {
             let name = operation["tags"][0].as_str().unwrap_or("other").to_owned();
             let described = described(document, path, method, operation);
-            match groups.iter_mut().find(|group| group.name == name) {
-                Some(group) => group.operations.push(described),
-                None => {
-                    let tag =
-                        document["tags"].as_array().into_iter().flatten().find(|tag| tag["name"] == name.as_str());
-                    let meaning = tag.and_then(|tag| tag["description"].as_str()).unwrap_or_default().to_owned();
-                    groups.push(OperationGroup { name, meaning, operations: vec![described] });
-                }
+            if let Some(group) = groups.iter_mut().find(|group| group.name == name) {
+                group.operations.push(described);
+            } else {
+                let tag = document["tags"].as_array().into_iter().flatten().find(|tag| tag["name"] == name.as_str());
+                let meaning = tag.and_then(|tag| tag["description"].as_str()).unwrap_or_default().to_owned();
+                groups.push(OperationGroup { name, meaning, operations: vec![described] });
             }
         }
     }
