@@ -32,7 +32,7 @@ impl<'a> Walk<'a> {
     }
 
     /// The page answers the question: an element with these words, in view without scrolling. The time is printed, not tested.
-    async fn is_answered_by(self, selector: &str, words: &str, presses: u32) {
+    async fn ends_at(self, selector: &str, words: &str, presses: u32) {
         self.page.wait_for(selector).await;
         let seconds = self.begun.elapsed().as_secs_f64();
         let text = self.page.text(selector).await;
@@ -61,12 +61,12 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
 
     let mut walk = Walk::begin(&browser, &site, "which gait is best, and how sure is that").await;
     walk.press(&link(finished)).await;
-    walk.is_answered_by("[data-part=best]", "Gait RMSE", 1).await;
+    walk.ends_at("[data-part=best]", "Gait RMSE", 1).await;
 
     let mut walk = Walk::begin(&browser, &site, "how do two studies compare").await;
     walk.press(".heading a[href='/studies/compare']").await;
     walk.press("form.filter button").await;
-    walk.is_answered_by("main h2", "The best gaits", 2).await;
+    walk.ends_at("main h2", "The best gaits", 2).await;
 
     let trials = site.service.trials(finished).await;
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
@@ -99,7 +99,7 @@ async fn browser_reaches_a_running_study_and_its_comparison_in_few_presses() {
     site.service.wait_for(running, &[StudyState::Running]).await;
     let mut walk = Walk::begin(&browser, &site, "how far is a running study").await;
     walk.press(&link(running)).await;
-    walk.is_answered_by("[data-part=state]", "of 400 trials", 1).await;
+    walk.ends_at("[data-part=state]", "of 400 trials", 1).await;
     site.service.post(&format!("/api/v1/studies/{running}/stop"), &json!({})).await;
 
     let asking = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
@@ -110,7 +110,7 @@ async fn browser_reaches_a_running_study_and_its_comparison_in_few_presses() {
     walk.page.fill("#author", "K1").await;
     let better = walk.page.answer("b").await;
     walk.press(&better).await;
-    walk.is_answered_by(".notice.good", "is better than", 2).await;
+    walk.ends_at(".notice.good", "is better than", 2).await;
     browser.close().await;
 }
 
@@ -127,6 +127,6 @@ async fn browser_reaches_the_conflict_of_a_trial_without_a_gait_in_two_presses()
         .wait_until("document.body.innerText.includes('relaxing a5 (swing-foot clearance) alone gives a gait')")
         .await;
     walk.press("[data-part=state] a[href$='#explanation']").await;
-    walk.is_answered_by("#explanation .headline", "swing-foot clearance", 2).await;
+    walk.ends_at("#explanation .headline", "swing-foot clearance", 2).await;
     browser.close().await;
 }

@@ -139,6 +139,7 @@ impl From<execution::StridesOnYield> for StridesOnYield {
 
 /// Largest pushes in a fixed, increasing series that the walker survives without other disturbances.
 #[derive(Debug, Serialize, ToSchema)]
+#[allow(clippy::struct_field_names)] // their unit
 pub(crate) struct SurvivedPushes {
     /// Forwards, N s; 0 if it survives none.
     forwards_n_s: f64,

@@ -307,6 +307,7 @@ impl From<gait_optimizer::Violation> for Violation {
 
 /// One iteration of a solve.
 #[derive(Debug, Serialize, ToSchema)]
+#[allow(clippy::struct_field_names)] // the number of the iteration
 pub(crate) struct Iteration {
     /// Number of the iteration over all phases.
     #[schema(value_type = u64)]
