@@ -225,7 +225,7 @@ fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>
     match path {
         // These gaits may be reported as unsafe, so no other operation uses them.
         path if path.ends_with("/assessments") => {
-            BTreeMap::from([("first", gaits(&trials[6..8])), ("second", gaits(&trials[8..10]))])
+            BTreeMap::from([("trial_a", gaits(&trials[6..8])), ("trial_b", gaits(&trials[8..10]))])
         }
         path if path.ends_with("/members") => BTreeMap::from([("name", vec![json!(MEMBER)])]),
         path if path.ends_with("/measurement-files/emg") => BTreeMap::from([
