@@ -15,4 +15,4 @@ mod rater;
 mod sign_in;
 mod site;
 mod study;
-mod walks;
+mod visits;

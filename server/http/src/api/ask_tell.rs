@@ -10,12 +10,10 @@ use axum::response::Response;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab_script::{self, Ask, Tell};
+use gaitwright_service::studies::snapshot::{MOST_TRIES, has_changed};
 use gaitwright_store::{StudyId, TrialId};
 use serde::Deserialize;
 use std::sync::Arc;
-
-/// How often a decision is repeated because the study has changed in the meantime.
-const TRIES: usize = 20;
 
 /// Ask for a trial to evaluate
 ///
@@ -36,7 +34,7 @@ pub(super) async fn ask(
     IdempotentWith(request, ask): IdempotentWith<Run, Ask>,
 ) -> Result<Response, Refusal> {
     let script = ask.script.as_deref().unwrap_or(&request.caller.name).trim();
-    for _ in 0..TRIES {
+    for _ in 0..MOST_TRIES {
         let beliefs = Arc::clone(&app.beliefs);
         let suggestion = lab_script::suggest(app.store_mut(), id, script, &beliefs).await;
         let mut writer = match request.begin(&app).await? {
@@ -47,7 +45,7 @@ pub(super) async fn ask(
             return request.done(&app, writer, &Trial::from(trial)).await;
         }
     }
-    Err(Error::conflict("The study was changed at the same time. Try again.").into())
+    Err(has_changed().into())
 }
 
 /// Gives out a trial again, unless its bounds were reported as unsafe in the meantime.
@@ -80,7 +78,7 @@ pub(super) async fn tell(
     Id(id, _): Id<TrialId, Run>,
     IdempotentWith(request, tell): IdempotentWith<Run, Tell>,
 ) -> Result<Response, Refusal> {
-    for _ in 0..TRIES {
+    for _ in 0..MOST_TRIES {
         let checked = lab_script::check_outcome(app.store_mut(), id, &tell).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
@@ -90,5 +88,5 @@ pub(super) async fn tell(
             return request.done(&app, writer, &Trial::from(trial)).await;
         }
     }
-    Err(Error::conflict("The study was changed at the same time. Try again.").into())
+    Err(has_changed().into())
 }

@@ -15,6 +15,7 @@ use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, Elapsed, ExplanationEffort, ExplanationState};
 use gaitwright_service::studies::relaxed_trial::{self, NoRelaxedTrial, Relaxation, RelaxedTrial};
+use gaitwright_service::studies::snapshot::{MOST_TRIES, has_changed};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{Connection, TrialId, commit};
@@ -134,23 +135,20 @@ fn with_unit(bound: &str, value: f64) -> String {
     format!("{bound} = {value}{}", unit_after_number(format::meaning(bound)))
 }
 
-/// The place of the relaxation in the explanation.
+/// Which relaxation of the explanation to try, counted from 0.
 #[derive(Debug, Deserialize)]
-pub(super) struct Chosen {
+pub(super) struct ChosenRelaxation {
     relaxation: usize,
 }
-
-/// How often a trial is chosen again because the study has changed in the meantime.
-const TRIES: usize = 20;
 
 /// `POST /trials/{id}/relaxed-trial`.
 pub(super) async fn try_relaxed(
     authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    Form(form): Form<Chosen>,
+    Form(form): Form<ChosenRelaxation>,
 ) -> Result<Redirect, PageError> {
-    for _ in 0..TRIES {
+    for _ in 0..MOST_TRIES {
         let beliefs = Arc::clone(&app.beliefs);
         let chosen = relaxed_trial::choose(app.store_mut(), id, form.relaxation, &beliefs).await?;
         let mut writer = app.write().await?;
@@ -160,7 +158,7 @@ pub(super) async fn try_relaxed(
             return Ok(Redirect::to(&format!("/trials/{trial}")));
         }
     }
-    Err(Error::conflict("The study was changed at the same time. Try again.").into())
+    Err(has_changed().into())
 }
 
 /// `POST /trials/{id}/explain`.

@@ -1,6 +1,7 @@
 //! Commands for studies (start, pause, resume, stop) and trials (cancel, retry), each in one transaction.
 
 use super::lifecycle::{self, StudyTransition};
+use super::snapshot::has_changed;
 use super::trial_result;
 use crate::error::Error;
 use crate::printable;
@@ -62,7 +63,7 @@ pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Re
 async fn move_on(writer: &mut Writer, study: &Study, act: StudyTransition, reason: &str) -> Result<(), Error> {
     let state = lifecycle::after(study.state, act)?;
     if !studies::set_state(writer, study, state, reason).await? {
-        return Err(Error::conflict("The study was changed at the same time. Try again."));
+        return Err(has_changed());
     }
     Ok(events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": reason })).await?)
 }

@@ -2,6 +2,7 @@
 
 use super::search_space;
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
+use crate::error::Error;
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
@@ -9,6 +10,14 @@ use gaitwright_store::studies::{Evaluation, FeedbackMode, Study};
 use gaitwright_store::trials::{NewTrial, Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, studies, trials};
 use std::collections::{HashMap, HashSet};
+
+/// How often a decision is repeated because the study has changed in the meantime.
+pub const MOST_TRIES: usize = 20;
+
+/// Refuses a decision because the study has changed in the meantime.
+pub fn has_changed() -> Error {
+    Error::conflict("The study was changed at the same time. Try again.")
+}
 
 /// Everything on which the next decision of a study depends, read at one instant.
 #[derive(Debug, Clone)]

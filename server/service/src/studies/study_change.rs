@@ -1,6 +1,7 @@
 //! Changes a study: its name, tags, notes and limits, its trial budget, or a fork of it. For pages and REST.
 
 use super::lifecycle::{self, StudyTransition};
+use super::snapshot::has_changed;
 use super::study_plan;
 use crate::error::{Error, FieldError};
 use crate::printable;
@@ -175,7 +176,7 @@ pub(super) async fn raise_budget(
     };
     studies::set_limits(writer, study.id, &limits).await?;
     if state != study.state && !studies::set_state(writer, study, state, "extended").await? {
-        return Err(Error::conflict("The study was changed at the same time. Try again."));
+        return Err(has_changed());
     }
     Ok(())
 }

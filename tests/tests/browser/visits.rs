@@ -11,15 +11,15 @@ use gaitwright_tests::measured::electromyogram;
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-/// A walk of a visitor from the home page.
-struct Walk<'a> {
+/// A visit that begins on the home page.
+struct Visit<'a> {
     question: &'a str,
     page: Tab,
     presses: u32,
     begun: Instant,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> Visit<'a> {
     async fn begin(browser: &Chromium, site: &Site, question: &'a str) -> Self {
         let page = browser.open(&site.origin).await;
         page.resize(1280, 800).await;
@@ -59,14 +59,14 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
     let other = site.service.study(|new| new.trial_budget = 4).await;
     site.service.wait_for(other, &[StudyState::Finished]).await;
 
-    let mut walk = Walk::begin(&browser, &site, "which gait is best, and how sure is that").await;
-    walk.press(&link(finished)).await;
-    walk.ends_at("[data-part=best]", "Gait RMSE", 1).await;
+    let mut visit = Visit::begin(&browser, &site, "which gait is best, and how sure is that").await;
+    visit.press(&link(finished)).await;
+    visit.ends_at("[data-part=best]", "Gait RMSE", 1).await;
 
-    let mut walk = Walk::begin(&browser, &site, "how do two studies compare").await;
-    walk.press(".heading a[href='/studies/compare']").await;
-    walk.press("form.filter button").await;
-    walk.ends_at("main h2", "The best gaits", 2).await;
+    let mut visit = Visit::begin(&browser, &site, "how do two studies compare").await;
+    visit.press(".heading a[href='/studies/compare']").await;
+    visit.press("form.filter button").await;
+    visit.ends_at("main h2", "The best gaits", 2).await;
 
     let trials = site.service.trials(finished).await;
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
@@ -80,14 +80,14 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
         site.service.post(&format!("{session}/measurement-files/emg"), &emg).await;
     }
     site.service.post(&format!("{session}/emg-results"), &json!({})).await;
-    let mut walk = Walk::begin(&browser, &site, "what was the muscle activity of a visit").await;
-    walk.press(&link(finished)).await;
-    walk.press("#lab a[href^='/lab-sessions/']").await;
-    walk.page.wait_for("h1").await;
-    let emg = walk.page.text("main").await;
+    let mut visit = Visit::begin(&browser, &site, "what was the muscle activity of a visit").await;
+    visit.press(&link(finished)).await;
+    visit.press("#lab a[href^='/lab-sessions/']").await;
+    visit.page.wait_for("h1").await;
+    let emg = visit.page.text("main").await;
     assert!(emg.contains("EMG, left rectus femoris"), "{emg}");
-    assert_eq!(walk.presses, 2);
-    println!("{}: 2 presses, {:.1} s", walk.question, walk.begun.elapsed().as_secs_f64());
+    assert_eq!(visit.presses, 2);
+    println!("{}: 2 presses, {:.1} s", visit.question, visit.begun.elapsed().as_secs_f64());
     browser.close().await;
 }
 
@@ -97,20 +97,20 @@ async fn browser_reaches_a_running_study_and_its_comparison_in_few_presses() {
     let site = Site::start(Analytic::slow(Duration::from_millis(300))).await;
     let running = site.service.study(|new| new.trial_budget = 400).await;
     site.service.wait_for(running, &[StudyState::Running]).await;
-    let mut walk = Walk::begin(&browser, &site, "how far is a running study").await;
-    walk.press(&link(running)).await;
-    walk.ends_at("[data-part=state]", "of 400 trials", 1).await;
+    let mut visit = Visit::begin(&browser, &site, "how far is a running study").await;
+    visit.press(&link(running)).await;
+    visit.ends_at("[data-part=state]", "of 400 trials", 1).await;
     site.service.post(&format!("/api/v1/studies/{running}/stop"), &json!({})).await;
 
     let asking = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
     site.service.wait_for(asking, &[StudyState::Waiting]).await;
     // Who answers is asked once.
-    let mut walk = Walk::begin(&browser, &site, "answer the comparison that waits").await;
-    walk.press("[aria-labelledby=waits] a").await;
-    walk.page.fill("#author", "K1").await;
-    let better = walk.page.answer("b").await;
-    walk.press(&better).await;
-    walk.ends_at(".notice.good", "is better than", 2).await;
+    let mut visit = Visit::begin(&browser, &site, "answer the comparison that waits").await;
+    visit.press("[aria-labelledby=waits] a").await;
+    visit.page.fill("#author", "K1").await;
+    let better = visit.page.answer("b").await;
+    visit.press(&better).await;
+    visit.ends_at(".notice.good", "is better than", 2).await;
     browser.close().await;
 }
 
@@ -121,12 +121,13 @@ async fn browser_reaches_the_conflict_of_a_trial_without_a_gait_in_two_presses()
     let study =
         site.service.study(|new| (new.trial_budget, new.search_space) = (2, Some(without_gaits().into()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let mut walk = Walk::begin(&browser, &site, "why is there no gait").await;
-    walk.press(&link(study)).await;
-    walk.page
+    let mut visit = Visit::begin(&browser, &site, "why is there no gait").await;
+    visit.press(&link(study)).await;
+    visit
+        .page
         .wait_until("document.body.innerText.includes('relaxing a5 (swing-foot clearance) alone gives a gait')")
         .await;
-    walk.press("[data-part=state] a[href$='#explanation']").await;
-    walk.ends_at("#explanation .headline", "swing-foot clearance", 2).await;
+    visit.press("[data-part=state] a[href$='#explanation']").await;
+    visit.ends_at("#explanation .headline", "swing-foot clearance", 2).await;
     browser.close().await;
 }
