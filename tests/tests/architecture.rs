@@ -163,7 +163,7 @@ fn rows_of_the_record_are_not_served() {
     }
     assert!(vocabulary > 10 && documents.contains(&"GaitSimulated"), "{vocabulary} {documents:?}");
 
-    // The compiler refuses to serve a type that is not serialised. Only documents of the record are.
+    // The compiler refuses to serve a type without `Serialize`, which only documents of the record have.
     let mut bodies = 0;
     for (file, text) in sources::below("server/http/src/api") {
         for body in ["Json<", "body = "].into_iter().flat_map(|start| text.split(start).skip(1)) {

@@ -112,7 +112,7 @@ mod tests {
             ((None, Some(0.5)), "for values of 0.5 or less."),
             ((Some(0.25), Some(0.5)), "for values of 0.25 to 0.5."),
             ((Some(0.3), Some(0.300_01)), "for values of about 0.3."),
-            // Ends outside the range of the bound are none.
+            // Beyond the range of the bound there is no limit.
             ((Some(-1.0), Some(100.0)), "for any value."),
         ] {
             let sentence = of(interval).sentence(1.0);

@@ -187,7 +187,7 @@ pub(super) async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &An
     Ok(Given::Saved(saved))
 }
 
-/// The answer in force of the same author to the same comparison, given in another tab or elsewhere.
+/// The current answer of the same author to the same comparison, given in another tab or elsewhere.
 async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerForm) -> Result<Option<Recorded>, Error> {
     let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;

@@ -25,7 +25,7 @@ pub(super) struct Explainer {
 struct Durations(VecDeque<u64>);
 
 impl Durations {
-    /// How many durations the expected duration is the median of.
+    /// The expected duration is the median of at most this many durations.
     const KEPT: usize = 9;
 
     /// Records the duration of an explanation, s.

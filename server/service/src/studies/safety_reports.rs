@@ -208,7 +208,7 @@ impl SafetyReports {
         Ok(found)
     }
 
-    /// Sorts out the reports about which the newest review says that the gait may be walked again.
+    /// Moves the reports whose newest review cleared the gait for walking to `cleared`.
     fn review(&mut self, reviews: &[SafetyReview]) {
         for mut report in std::mem::take(&mut self.in_force) {
             let id = report.id();

@@ -61,7 +61,7 @@ impl StudySnapshot {
             && safety_reviews::version(writer, study).await? == self.safety)
     }
 
-    /// Whether, besides, the study itself has not changed, and no trial was added.
+    /// Whether the study has the same revision, and no answer, safety report or trial was added.
     ///
     /// # Errors
     /// Errors of the database.
@@ -71,7 +71,7 @@ impl StudySnapshot {
             && studies::get(writer, self.study.id).await?.revision == self.study.revision)
     }
 
-    /// People and the scheduler add trials at the same time.
+    /// A person may add a trial while the scheduler chooses one.
     async fn has_every_trial(&self, db: &mut Connection) -> StoreResult<bool> {
         Ok(trials::counts(db, self.study.id).await?.total as usize == self.trials.len())
     }

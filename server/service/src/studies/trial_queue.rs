@@ -182,7 +182,7 @@ impl<R: Clone> TrialQueue<R> {
 
     /// Ends the running job.
     pub(super) fn end(&mut self) {
-        // Cancelling has removed it already.
+        // A cancelled job is no longer there.
         self.running = None;
     }
 
