@@ -7,7 +7,7 @@ use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright_service::access::{Right, Role};
 use gaitwright_service::workers::{Assignment, Evaluate};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::presentations::{self, Kind, Presentation};
+use gaitwright_store::presentations::{self, Presentation, PresentationKind};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
@@ -132,7 +132,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, "first").await;
         let shown = shown(&service, study).await;
-        if shown.iter().any(|pair| pair.kind == Kind::Repeat) {
+        if shown.iter().any(|pair| pair.kind == PresentationKind::Repeat) {
             with_repeats = Some((study, shown));
             break;
         }
@@ -142,8 +142,12 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let heard: Vec<_> = feedback.iter().filter(|row| row.by_rater).collect();
     assert_eq!(heard.len(), shown.len());
     assert!(heard.iter().all(|row| !row.could_have_known), "a rater who may not read answers blindly");
-    let repeats = shown.iter().filter(|p| p.kind == Kind::Repeat).count();
-    assert!(repeats > 0 && shown.iter().all(|p| p.kind != Kind::Null), "{repeats} repeats of {}", shown.len());
+    let repeats = shown.iter().filter(|p| p.kind == PresentationKind::Repeat).count();
+    assert!(
+        repeats > 0 && shown.iter().all(|p| p.kind != PresentationKind::Null),
+        "{repeats} repeats of {}",
+        shown.len()
+    );
 
     let figures = format!("/api/v1/studies/{study}/raters");
     let before = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
@@ -339,7 +343,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
         }
         let word = if turn == 0 {
             "cannot_tell"
-        } else if unsafe_trial.is_none() && last.kind == Kind::New {
+        } else if unsafe_trial.is_none() && last.kind == PresentationKind::New {
             unsafe_trial = sides(&service.store, study).await.last().map(|(_, second)| *second);
             "unsafe_second"
         } else {
@@ -354,7 +358,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
     let skipped = shown[0].pair();
     let again = shown[1..].iter().filter(|p| {
         let pair = p.pair();
-        p.kind == Kind::New && (pair == skipped || pair == (skipped.1, skipped.0))
+        p.kind == PresentationKind::New && (pair == skipped || pair == (skipped.1, skipped.0))
     });
     assert_eq!(again.count(), 0);
     service.stop().await;

@@ -81,7 +81,7 @@ pub(super) struct BlindMotion {
 /// Motion of a pair.
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Side {
+pub(super) enum PairSide {
     First,
     Second,
 }
@@ -96,7 +96,7 @@ pub(super) enum Side {
     tag = "blind",
     params(
         ("token" = String, Path, description = "Token of the pair"),
-        ("side" = inline(Side), Path, description = "Which motion of the pair")
+        ("side" = inline(PairSide), Path, description = "Which motion of the pair")
     ),
     responses((status = 200, description = "Motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["rate"]), ("session" = ["rate"])),
@@ -104,14 +104,14 @@ pub(super) enum Side {
 pub(super) async fn motion(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
-    Path((token, side)): Path<(String, Side)>,
+    Path((token, side)): Path<(String, PairSide)>,
 ) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
     let shown = blind::own_to_show(&mut reader, &authorized.caller, &token).await?;
     let (first, second) = shown.shown();
     let trial = match side {
-        Side::First => first,
-        Side::Second => second,
+        PairSide::First => first,
+        PairSide::Second => second,
     };
     let gait = gaits::get(&mut reader, trial).await;
     drop(reader);

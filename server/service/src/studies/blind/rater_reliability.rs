@@ -2,7 +2,7 @@
 
 use super::next_pair::{is_plain, is_same_pair};
 use gaitwright_store::allocations::Sided;
-use gaitwright_store::presentations::{Judgement, Kind, Presentation};
+use gaitwright_store::presentations::{Judgement, Presentation, PresentationKind};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -87,7 +87,8 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterReliabil
 fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
     let mut own = sides.iter().filter(|sided| sided.presentation.rater == rater).peekable();
     own.peek()?;
-    let blind = own.filter(|sided| !sided.presentation.could_have_known && sided.presentation.kind != Kind::Null);
+    let blind =
+        own.filter(|sided| !sided.presentation.could_have_known && sided.presentation.kind != PresentationKind::Null);
     let answers: Vec<Judgement> = blind.filter_map(Sided::answer).collect();
     let count =
         |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
@@ -98,7 +99,7 @@ fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
 /// Compares each plain answer with the previous one to the same pair.
 fn repeats_agree(own: &[&Presentation]) -> Share {
     let plain = |shown: &&Presentation| {
-        !shown.could_have_known && shown.kind != Kind::Null && shown.answer.is_some_and(is_plain)
+        !shown.could_have_known && shown.kind != PresentationKind::Null && shown.answer.is_some_and(is_plain)
     };
     let answered: Vec<&Presentation> = own.iter().copied().filter(plain).collect();
     let (mut agree, mut of) = (0_u32, 0_u32);
