@@ -14,7 +14,7 @@ use axum::response::Response;
 use gaitwright_service::access::{Administer, Rate, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, Answered, RaterAnswer, RaterReliability, UnblindedPair};
-use gaitwright_store::{StudyId, allocations, gaits, presentations, studies};
+use gaitwright_store::{StudyId, gaits, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -172,9 +172,7 @@ pub(super) async fn raters(
 ) -> Result<Json<Page<RaterReliability>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let shown = presentations::of_study(&mut reader, id).await?;
-    let sides = allocations::of_unblinded_raters(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(blind::figures(&shown, &sides))?))
+    Ok(Json(paging.cut_by_place(blind::reliability(&mut reader, id).await?)?))
 }
 
 /// Rater to unblind, with the reason.

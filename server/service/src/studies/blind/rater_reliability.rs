@@ -1,8 +1,10 @@
 //! Reliability of raters: agreement with their own earlier answers, position bias, and unblinded answers.
 
 use super::next_pair::{is_plain, is_same_pair};
-use gaitwright_store::allocations::Sided;
-use gaitwright_store::presentations::{Judgement, Presentation, PresentationKind};
+use crate::error::Error;
+use gaitwright_store::allocations::{self, Sided};
+use gaitwright_store::presentations::{self, Judgement, Presentation, PresentationKind};
+use gaitwright_store::{Connection, StudyId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -58,8 +60,18 @@ pub struct RaterReliability {
     pub could_have_known: u32,
 }
 
+/// The reliability of every rater of a study, by name.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> Result<Vec<RaterReliability>, Error> {
+    let shown = presentations::of_study(db, study).await?;
+    let sides = allocations::of_unblinded_raters(db, study).await?;
+    Ok(figures(&shown, &sides))
+}
+
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-pub fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterReliability> {
+fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterReliability> {
     let mut raters: Vec<&str> = presentations.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
