@@ -16,7 +16,7 @@ pub struct MuscleOverride {
     /// Maximum isometric force, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_force_n: Option<f64>,
-    /// Maximum shortening speed, optimal lengths per second.
+    /// Maximum shortening speed, optimal fibre lengths per second.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_speed: Option<f64>,
     /// Optimal fibre length, m.
@@ -77,7 +77,7 @@ impl MuscleOverride {
         ),
         field(
             "max_speed",
-            "maximum shortening speed, optimal lengths per second",
+            "maximum shortening speed, optimal fibre lengths per second",
             (2.0, 30.0),
             |g| g.max_speed,
             |m| Some(m.max_speed),

@@ -174,7 +174,7 @@ const GAIT_SETTINGS: [Described; 51] = [
     (
         "GaitSettings",
         "limits/torso_tolerance_rad",
-        "Minimum half width of the range of torso lean, rad. It applies if a6 is smaller.",
+        "Minimum half-width of the range of torso lean, rad. It applies if a6 is smaller.",
     ),
     ("GaitSettings", "limits/toe_touchdown_m_s", "Minimum downward velocity of the toe at toe strike, m/s."),
     ("GaitSettings", "limits/heel_touchdown_m_s", "Minimum downward velocity of the heel at heel strike, m/s."),
@@ -216,7 +216,7 @@ const GAIT_SETTINGS: [Described; 51] = [
         "regularisation/activation_bend",
         "Weight of the second differences of muscle activations over adjacent nodes of a domain.",
     ),
-    ("GaitSettings", "naturalness", "Naturalness terms beyond the paper."),
+    ("GaitSettings", "naturalness", "Naturalness terms, which the paper does not have."),
     (
         "GaitSettings",
         "naturalness/reference_weight",
@@ -229,7 +229,7 @@ const GAIT_SETTINGS: [Described; 51] = [
         "Minimum share of the weight of the walker on the trailing foot at heel strike of the other foot. It decreases \
          linearly to 0 at toe-off. 0 disables the term.",
     ),
-    ("GaitSettings", "muscles", "Differences of the subject's muscles from the published table."),
+    ("GaitSettings", "muscles", "Muscle values of the subject that differ from the default values."),
 ];
 
 const OTHERS: [Described; 11] = [

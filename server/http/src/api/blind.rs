@@ -129,6 +129,8 @@ pub(super) async fn motion(
 }
 
 /// Answer a blind pair
+///
+/// The first answer to a pair counts. A safety report takes effect at once.
 #[utoipa::path(
     post,
     path = "/blind-pairs/{token}/answer",

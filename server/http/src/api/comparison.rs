@@ -34,6 +34,7 @@ pub(super) struct Which {
 /// Study in a comparison.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct StudyComparison {
+    /// Identifier of the study.
     id: StudyId,
     /// Name of the study.
     name: String,
@@ -43,17 +44,21 @@ pub(super) struct StudyComparison {
     seed: u64,
     /// Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId,
+    /// State of the study.
     state: StudyState,
+    /// Numbers of trials by state.
     trials: TrialCounts,
-    /// Number of the recommended trial.
+    /// Number of the recommended trial. Null if there is no recommendation.
     best_trial: Option<u32>,
-    /// Action of the recommended trial.
+    /// Action of the recommended trial. Null if there is no recommendation.
     #[schema(value_type = Option<study_plan_schemas::Bounds>)]
     best_action: Option<TunedBounds>,
-    /// Gait RMSE of the recommended trial, rad. Null in every row if the compared studies have different reference gaits,
-    /// because values against different reference gaits cannot be compared.
+    /// Gait RMSE of the recommended trial, rad. Null if there is no recommendation, or if the script that evaluated the
+    /// trial did not report it. Null in every row if the compared studies have different reference gaits, because
+    /// values against different reference gaits cannot be compared.
     best_gait_rmse_rad: Option<f64>,
-    /// Cost of transport of the recommended trial.
+    /// Cost of transport of the recommended trial. Null if there is no recommendation, or if the script that evaluated
+    /// the trial did not report it.
     best_cost_of_transport: Option<f64>,
     /// Total time of all solves, s.
     solve_seconds: f64,

@@ -47,7 +47,7 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |recording| recording.id)?.map(MeasurementFile::from)))
 }
 
-/// Get a measurement file
+/// Get the description of a measurement file
 #[utoipa::path(
     get,
     path = "/measurement-files/{id}",

@@ -34,7 +34,7 @@ const NO_LONGER_SHOWN: &str = "This pair is no longer shown. Continue with the n
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RaterAnswer {
-    /// The answer. `retracted` is reserved for the service.
+    /// The answer.
     pub answer: Judgement,
     /// Response time of the rater, ms.
     #[serde(default)]
