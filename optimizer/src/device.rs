@@ -100,9 +100,12 @@ impl Device {
             (0.0, 0.5),
             |d| d.knee_housing_inertia_kg_m2,
         ),
-        field("adapter_mass_kg", "mass of the adapter, which is midway between the human knee and the prosthetic knee, kg", (0.0, 10.0), |d| {
-            d.adapter_mass_kg
-        }),
+        field(
+            "adapter_mass_kg",
+            "mass of the adapter, which is midway between the human knee and the prosthetic knee, kg",
+            (0.0, 10.0),
+            |d| d.adapter_mass_kg,
+        ),
         field("adapter_gyration_radius_m", "radius of gyration of the adapter, m", (0.0, 0.5), |d| {
             d.adapter_gyration_radius_m
         }),
@@ -127,15 +130,20 @@ impl Device {
         field("foot_com_down_m", "distance of the foot's centre of mass below the ankle, m", (0.0, 0.15), |d| {
             d.foot_com_down_m
         }),
-        field("foot_inertia_kg_m2", "moment of inertia of the foot about its centre of mass, kg m²", (1e-4, 0.2), |d| {
-            d.foot_inertia_kg_m2
-        }),
+        field(
+            "foot_inertia_kg_m2",
+            "moment of inertia of the foot about its centre of mass, kg m²",
+            (1e-4, 0.2),
+            |d| d.foot_inertia_kg_m2,
+        ),
         field("ankle_height_m", "height of the ankle above the sole, m", (0.01, 0.2), |d| d.ankle_height_m),
         field("heel_behind_m", "distance of the heel contact behind the ankle, m", (0.01, 0.15), |d| d.heel_behind_m),
         field("toe_ahead_m", "distance of the toe contact ahead of the ankle, m", (0.05, 0.3), |d| d.toe_ahead_m),
         field("knee_torque_limit_n_m", "largest knee torque, N m", (1.0, 500.0), |d| d.knee_torque_limit_n_m),
         field("ankle_torque_limit_n_m", "largest ankle torque, N m", (1.0, 500.0), |d| d.ankle_torque_limit_n_m),
-        field("joint_speed_limit_rad_s", "largest knee and ankle speed, rad/s", (0.5, 50.0), |d| d.joint_speed_limit_rad_s),
+        field("joint_speed_limit_rad_s", "largest knee and ankle speed, rad/s", (0.5, 50.0), |d| {
+            d.joint_speed_limit_rad_s
+        }),
         field("ankle_min_rad", "plantarflexion stop, rad (dorsiflexion positive)", (-1.2, -0.02), |d| d.ankle_min_rad),
         field("ankle_max_rad", "dorsiflexion stop, rad", (0.02, 1.2), |d| d.ankle_max_rad),
     ];

@@ -183,10 +183,10 @@ impl MuscleParameters {
                 if let Some(value) = lever
                     && !spans
                 {
-                    return Err(ModelError::Unknown {
+                    return Err(ModelError::MustBeAbsent {
                         field: format!("muscles.{kind}.{}_lever_m", joint.name()),
-                        value: value.to_string(),
-                        known: format!("absent, because {kind} does not span the {}", joint.name()),
+                        value,
+                        reason: format!("{kind} does not span the {}", joint.name()),
                     });
                 }
             }
@@ -274,7 +274,10 @@ mod tests {
         }
         for (text, expected) in [
             (r#"{"ta": {"max_force_n": 1.0}}"#, "muscles.ta.max_force_n is 1; it must be 50 to 20000."),
-            (r#"{"sol": {"knee_lever_m": 0.05}}"#, "muscles.sol.knee_lever_m is \"0.05\"; it must be absent"),
+            (
+                r#"{"sol": {"knee_lever_m": 0.05}}"#,
+                "muscles.sol.knee_lever_m must be absent, because sol does not span the knee.",
+            ),
         ] {
             let refusal = read(text).validate().unwrap_err().to_string();
             assert!(refusal.contains(expected), "{refusal}");

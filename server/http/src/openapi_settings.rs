@@ -83,14 +83,15 @@ fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Val
     schema
 }
 
-/// The range in an error: `0.1 to 5` of a field, or `must be 0.1 to 5` of a learner setting.
+/// The range in an error: `0.1 to 5` of a field, or `must be 0.1 to 5` of a learner setting. A unit or a relation to
+/// another field can follow it.
 fn range_in(error: &Error) -> Option<(f64, f64)> {
-    if let Error::Invalid(field) | Error::Unreadable(field) = error {
-        let (least, most) = field.allowed.as_deref()?.split_once(" to ")?;
-        return Some((least.trim().parse().ok()?, most.trim().parse().ok()?));
-    }
     let text = error.to_string();
-    let (least, most) = text.split_once("must be ")?.1.split_once(" to ")?;
+    let range = match error {
+        Error::Invalid(field) | Error::Unreadable(field) => field.allowed.as_deref()?,
+        _ => text.split_once("must be ")?.1,
+    };
+    let (least, most) = range.split_once(" to ")?;
     let most: String = most.chars().take_while(|c| c.is_ascii_digit() || "+-.e".contains(*c)).collect();
     Some((least.trim().parse().ok()?, most.trim_end_matches('.').parse().ok()?))
 }

@@ -302,7 +302,7 @@ pub(super) const FORGERIES: [Forgery; 68] = [
                 r.add("feedback", row.clone());
             }
         },
-        "has answered this comparison already",
+        "has already answered this comparison",
     ),
     (
         "an answer from before its trials",

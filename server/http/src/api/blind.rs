@@ -124,7 +124,7 @@ pub(super) async fn motion(
     // The error must not reveal the trial, the subject or the device.
     motion.map(|figures| Json(BlindMotion { figures })).map_err(|error| {
         tracing::error!(%error, "cannot show a gait to a rater");
-        Refusal(Error::NotFound { what: "motion of the comparison".to_owned(), id: "with this token".to_owned() })
+        Refusal(Error::NotFound { what: "motion of the blind pair".to_owned(), id: "with this token".to_owned() })
     })
 }
 

@@ -72,7 +72,7 @@ pub(super) struct StudyComparison {
     path = "/study-comparison",
     operation_id = "list_study_comparisons",
     tag = "studies",
-    params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of studies")),
+    params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of different studies")),
     responses((status = 200, description = "One row for each study", body = Page<StudyComparison>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -88,10 +88,13 @@ pub(super) async fn get(
             Error::invalid("ids", which.ids.as_str(), &format!("2 to {MOST} comma-separated identifiers")).into()
         );
     }
-    let mut rows = Vec::with_capacity(named.len());
+    let mut rows: Vec<StudyComparison> = Vec::with_capacity(named.len());
     for id in named {
         let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "the identifier of a study"))?;
         let id = id.accessible(&mut *app.read().await?, authorized.caller.reach()).await?;
+        if rows.iter().any(|row| row.id == id) {
+            return Err(Error::invalid("ids", which.ids.as_str(), "identifiers of different studies").into());
+        }
         rows.push(row(&mut app, id).await?);
     }
     if rows.windows(2).any(|pair| pair[0].reference_gait_id != pair[1].reference_gait_id) {
@@ -128,6 +131,7 @@ async fn row(app: &mut AppState, id: StudyId) -> Result<StudyComparison, Refusal
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        // `sum` of nothing is -0.0.
+        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).fold(0.0, |all, own| all + own),
     })
 }

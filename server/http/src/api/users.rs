@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::authorization::SignedIn;
+use crate::authorization::{SignedIn, not_signed_in};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
@@ -41,7 +41,7 @@ pub(super) struct Me {
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> {
-    let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
+    let caller = caller.ok_or_else(not_signed_in)?;
     let rights = Right::ALL.into_iter().filter(|right| caller.may(*right)).collect();
     Ok(Json(Me { name: caller.name, role: caller.role, rights }))
 }

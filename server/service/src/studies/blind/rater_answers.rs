@@ -328,5 +328,5 @@ async fn own_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<S
 }
 
 fn unknown_pair() -> Error {
-    Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() }
+    Error::NotFound { what: "blind pair".to_owned(), id: "with this token".to_owned() }
 }

@@ -206,9 +206,7 @@ impl MotionReading {
     /// [`Error::Invalid`] with line and column, or the field.
     pub fn portraits(&self, text: &str) -> Result<Vec<PhasePortrait>, Error> {
         self.joints(text)?.portraits(self.cutoff_hz).map_err(|error| match error {
-            ModelError::OutOfRange { field, value, minimum, maximum } => {
-                ModelError::OutOfRange { field: format!("reading.{field}"), value, minimum, maximum }.into()
-            }
+            ModelError::OutOfRange { .. } => FieldError::from(error).within("reading").into(),
             other => other.into(),
         })
     }
