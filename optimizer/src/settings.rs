@@ -194,12 +194,11 @@ impl GaitLimits {
         for (field, value, minimum, maximum) in checks {
             ModelError::check_range(&format!("limits.{field}"), value, minimum, maximum)?;
         }
-        for (field, value, lower, (minimum, maximum)) in [
+        for (field, value, lower, range) in [
             ("speed_max_m_s", self.speed_max_m_s, "speed_min_m_s", (self.speed_min_m_s + 1e-3, 3.0)),
             ("step_max_m", self.step_max_m, "step_min_m", (self.step_min_m + 1e-3, 1.5)),
         ] {
             let relation = format!("above {lower}");
-            let range = (minimum, maximum);
             ModelError::check_related_range(&format!("limits.{field}"), value, range, ("", &relation))?;
         }
         let (low, high) = (self.duration_min_s, self.duration_max_s);

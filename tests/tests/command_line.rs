@@ -48,8 +48,8 @@ fn malformed_bounds_are_refused_by_name() {
     refused(&["solve", "--bounds", "a1=20,"], "expected NAME=VALUE");
     refused(&["solve", "--bounds", "a5=high"], "the value is not a number");
     refused(&["solve", "--bounds", "a5=0.1,a5=0.2"], "given twice");
-    refused(&["solve", "--bounds", "a1=1000"], "a1 is 1000; it must be 1 to 100.");
-    refused(&["solve", "--bounds", "a3=1.4,a4=1.2"], "a3 is 1.4;");
+    refused(&["solve", "--bounds", "a1=1000"], "a1 is 1000; it must be 1 to 100 rad/s.");
+    refused(&["solve", "--bounds", "a3=1.4,a4=1.2"], "a3 is 1.4; it must be 0.05 to 1.199 m/s, below a4.");
 }
 
 #[test]

@@ -139,7 +139,7 @@ pub(super) async fn link(
 
 /// Disable a user
 ///
-/// Ends the user's sessions, and revokes the user's links and tokens.
+/// Ends the user's sign-in sessions, and revokes the user's links and tokens.
 #[utoipa::path(
     post,
     path = "/users/{id}/disable",
