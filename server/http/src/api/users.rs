@@ -13,7 +13,6 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Administer, Right, Role};
-use gaitwright_service::error::Error;
 use gaitwright_store::{UserId, users};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
