@@ -152,11 +152,11 @@ async fn study_form_checks_every_field() {
         ("parallel_trials", "1.5", "it must be 1 to 64"),
         ("seed", "-1", "it must be 0 to 9007199254740991"),
         (
-            "basin_within_percent",
+            "nearest_within_percent",
             "101",
             "\u{201c}Objective tolerance, %\u{201d} is \u{201c}101\u{201d}; it must be 0 to 100, or empty",
         ),
-        ("basin_within_percent", "all", "it must be 0 to 100, or empty"),
+        ("nearest_within_percent", "all", "it must be 0 to 100, or empty"),
         ("subject", "paper-1", "a subject from the list"),
         ("pseudonym", "S09", "A new subject"),
         ("height_m", "1.8", "A new subject"),
@@ -168,10 +168,10 @@ async fn study_form_checks_every_field() {
     assert_eq!(send(("muscles", "on")).await.status, StatusCode::SEE_OTHER);
     let lowest = json!("lowest_objective");
     let nearest = json!({"nearest_to_reference": {"within_percent": 5.0}});
-    assert_eq!(send(("basin_within_percent", "5")).await.status, StatusCode::SEE_OTHER);
+    assert_eq!(send(("nearest_within_percent", "5")).await.status, StatusCode::SEE_OTHER);
     let made = service.fetch("/api/v1/studies").await.items();
     for (study, expected) in made.as_array().unwrap().iter().zip([nearest, lowest]) {
-        assert_eq!(study["solve_options"]["basin_choice"], expected, "{study}");
+        assert_eq!(study["solve_options"]["local_optimum_choice"], expected, "{study}");
     }
     service.stop().await;
 }

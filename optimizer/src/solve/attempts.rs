@@ -3,7 +3,7 @@
 
 use super::error::SolveError;
 use super::multi_start::InitialGuess;
-use super::options::BasinChoice;
+use super::options::LocalOptimumChoice;
 use super::phases::{AttemptRun, SolveContext};
 use super::progress::{IterationRecord, SolvePhase};
 use super::report::{CONVERGED_VIOLATION, LinearAlgebra, SolveAttempt, SolveStatus};
@@ -62,7 +62,7 @@ impl Candidate {
             objective: self.objective,
             gait_rmse_rad: self.rmse,
             reason: run.reason.clone(),
-            basin: None,
+            local_optimum: None,
             chosen: false,
         }
     }
@@ -123,7 +123,7 @@ pub(super) fn try_warm(
 }
 
 /// Numbers the local optima of the attempts. Attempts with the same objective and Gait RMSE share a local optimum.
-pub(super) fn number_basins(tried: &mut [Tried]) {
+pub(super) fn number_local_optima(tried: &mut [Tried]) {
     let mut known: Vec<(f64, f64)> = Vec::new();
     for attempt in tried.iter_mut().map(|t| &mut t.attempt).filter(|a| a.status == SolveStatus::Converged) {
         let (objective, rmse) = (attempt.objective, attempt.gait_rmse_rad);
@@ -134,7 +134,7 @@ pub(super) fn number_basins(tried: &mut [Tried]) {
             known.push((objective, rmse));
             known.len() - 1
         });
-        attempt.basin = Some(number + 1);
+        attempt.local_optimum = Some(number + 1);
     }
 }
 
@@ -162,7 +162,7 @@ pub(super) fn enforce_between_nodes(
         run.guess = tried.len();
         let result = run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)?;
         let mut next = Tried::new(context, result, "bounds tightened between nodes", margins, &run);
-        next.attempt.basin = tried[chosen].attempt.basin.filter(|_| next.candidate.status == SolveStatus::Converged);
+        next.attempt.local_optimum = tried[chosen].attempt.local_optimum.filter(|_| next.candidate.status == SolveStatus::Converged);
         let status = next.candidate.status;
         tried.push(next);
         if !matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {
@@ -263,7 +263,7 @@ pub(super) fn try_multi_start(
 /// Index of the outcome: a cancelled attempt, otherwise a converged one by `choice`, otherwise the one with the
 /// smallest violation. Among the latter, stationary points of the violation come first, because they show which
 /// constraints conflict.
-pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
+pub(super) fn choose(tried: &[Tried], choice: LocalOptimumChoice) -> usize {
     if let Some(cancelled) = tried.iter().position(|t| t.candidate.status == SolveStatus::Cancelled) {
         return cancelled;
     }
@@ -284,8 +284,8 @@ pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
             .map_or(0, |(index, _)| index);
     };
     match choice {
-        BasinChoice::LowestObjective => lowest,
-        BasinChoice::NearestToReference { within_percent } => {
+        LocalOptimumChoice::LowestObjective => lowest,
+        LocalOptimumChoice::NearestToReference { within_percent } => {
             least(&|c| c.rmse, objective + 0.01 * within_percent * objective.abs()).map_or(lowest, |(index, _)| index)
         }
     }

@@ -116,9 +116,9 @@ impl NewStudyPage {
     fn expert(&self) -> bool {
         let (typed, default) = (&self.fields, NewStudyFields::default());
         let fields = |fields: &NewStudyFields| {
-            let NewStudyFields { learner, unchanged_limit, parallel_trials, seed, basin_within_percent, .. } =
+            let NewStudyFields { learner, unchanged_limit, parallel_trials, seed, nearest_within_percent, .. } =
                 fields.clone();
-            [learner, unchanged_limit, parallel_trials, seed, basin_within_percent]
+            [learner, unchanged_limit, parallel_trials, seed, nearest_within_percent]
         };
         fields(typed) != fields(&default) || typed.repeat_results.is_some()
     }
