@@ -17,7 +17,8 @@ mod tuned_actions;
 use arguments::argument;
 use gait_optimizer::execution::{ExecutionOptions, WalksOnGround, simulate};
 use gait_optimizer::{
-    LocalOptimumChoice, CancelToken, Gait, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, solve,
+    CancelToken, Gait, GaitProblem, LocalOptimumChoice, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
+    solve,
 };
 use golden_gaits::golden_gait;
 use splitmix::SplitMix;

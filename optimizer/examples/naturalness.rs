@@ -9,7 +9,9 @@ mod arguments;
 use arguments::argument;
 use gait_optimizer::body::{Axis, Side};
 use gait_optimizer::gait::DomainTrajectory;
-use gait_optimizer::{LocalOptimumChoice, CancelToken, Gait, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve};
+use gait_optimizer::{
+    CancelToken, Gait, GaitProblem, GaitSettings, LocalOptimumChoice, Mesh, SolveOptions, Subject, solve,
+};
 use std::error::Error;
 use std::path::Path;
 
@@ -33,7 +35,11 @@ impl Variant {
 
     /// Of four initial guesses the gait nearest to the reference among those that cost at most 3 % more than the cheapest.
     fn nearest_to_reference(self) -> Self {
-        Self { initial_guesses: 4, local_optimum_choice: LocalOptimumChoice::NearestToReference { within_percent: 3.0 }, ..self }
+        Self {
+            initial_guesses: 4,
+            local_optimum_choice: LocalOptimumChoice::NearestToReference { within_percent: 3.0 },
+            ..self
+        }
     }
 }
 

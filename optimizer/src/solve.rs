@@ -17,7 +17,9 @@ mod solver_settings;
 mod warm_start;
 
 pub use crate::cancel_token::CancelToken;
-use attempts::{Tried, choose, enforce_between_nodes, number_local_optima, try_guesses, try_multi_start, try_warm};
+use attempts::{
+    FinishedAttempt, choose, enforce_between_nodes, number_local_optima, try_guesses, try_multi_start, try_warm,
+};
 pub use error::SolveError;
 pub use gait_results::GaitResults;
 pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
@@ -27,8 +29,8 @@ use phases::SolveContext;
 pub(crate) use phases::final_settings;
 pub use progress::{IterationRecord, SolvePhase};
 pub use report::{
-    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport, SolveStatus,
-    StartedFrom, Violation,
+    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport,
+    SolveStatus, StartedFrom, Violation,
 };
 pub use warm_start::WarmStart;
 pub(crate) use warm_start::check_shape;
@@ -62,7 +64,7 @@ pub fn solve(
     if let Some(start) = start {
         tried.push(try_warm(&context, start, observer)?);
     }
-    if !tried.iter().any(Tried::is_final) {
+    if !tried.iter().any(FinishedAttempt::is_final) {
         tried.extend(try_multi_start(&context, observer)?);
     }
     number_local_optima(&mut tried);
@@ -122,7 +124,7 @@ pub fn solve_from_guesses(
 /// The outcome of the attempts.
 fn finish(
     context: &SolveContext<'_>,
-    tried: Vec<Tried>,
+    tried: Vec<FinishedAttempt>,
     chosen: usize,
     started_from: StartedFrom,
 ) -> Result<SolveOutcome, SolveError> {
@@ -136,7 +138,8 @@ fn finish(
         tally.linear_algebra.add(&one.linear_algebra);
         if index == chosen {
             answer = Some((one.candidate, one.margins));
-        } else if let Some(local_optimum) = one.attempt.local_optimum.filter(|local_optimum| Some(*local_optimum) != chosen_local_optimum)
+        } else if let Some(local_optimum) =
+            one.attempt.local_optimum.filter(|local_optimum| Some(*local_optimum) != chosen_local_optimum)
             && others.iter().all(|other| other.local_optimum != local_optimum)
         {
             others.push(other_local_optimum(context, one.candidate, &one.attempt, local_optimum));

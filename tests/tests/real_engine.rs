@@ -10,7 +10,7 @@ use gaitwright_service::access::Reach;
 use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
-use gaitwright_service::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
+use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Evaluate, GaitSolver};
 use gaitwright_store::studies::{FeedbackMode, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
@@ -71,7 +71,10 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     let many = json_of(&gaitwright(folder, &[&many[..], &COARSE].concat()));
     let attempts = many["attempts"].as_array().unwrap();
     let answer = attempts.iter().find(|attempt| attempt["chosen"] == true).unwrap()["local_optimum"].as_u64().unwrap();
-    let other = attempts.iter().find(|attempt| attempt["local_optimum"].as_u64().is_some_and(|local_optimum| local_optimum != answer)).unwrap();
+    let other = attempts
+        .iter()
+        .find(|attempt| attempt["local_optimum"].as_u64().is_some_and(|local_optimum| local_optimum != answer))
+        .unwrap();
     let number = other["local_optimum"].to_string();
     let again = ["solve", "--json", "--warm", "many.json", "--warm-local-optimum", &number];
     let again = json_of(&gaitwright(folder, &[&again[..], &COARSE].concat()));
@@ -79,8 +82,11 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     let away = again["attempts"][0]["gait_rmse_rad"].as_f64().unwrap() - other["gait_rmse_rad"].as_f64().unwrap();
     assert!(away.abs() < 1e-3, "{away}");
     assert_eq!(again["lineage"]["ancestors"][0]["local_optimum"].as_u64(), other["local_optimum"].as_u64());
-    let unknown =
-        cli::run(BINARY, folder, &[&["solve", "--warm", "many.json", "--warm-local-optimum", "9"][..], &COARSE].concat());
+    let unknown = cli::run(
+        BINARY,
+        folder,
+        &[&["solve", "--warm", "many.json", "--warm-local-optimum", "9"][..], &COARSE].concat(),
+    );
     assert_eq!(unknown.status.code(), Some(2));
     assert!(
         String::from_utf8_lossy(&unknown.stderr)
@@ -431,8 +437,8 @@ fn broker_delivers_a_result_with_muscles() {
     let iterations: Vec<_> = iterations.iter().cycle().take(3000).copied().collect();
     order.warm_start = Some(outcome.warm_start.clone());
     let order = pack(&SolveOrder { program: String::new(), assignment: order }).unwrap().len();
-    let finding = Finding::Ended { outcome: Box::new(outcome), iterations };
-    let result = pack(&ResultMessage { attempt, worker: "worker".to_owned(), finding }).unwrap().len();
+    let result = AssignmentResult::Ended { outcome: Box::new(outcome), iterations };
+    let result = pack(&ResultMessage { attempt, worker: "worker".to_owned(), result }).unwrap().len();
     eprintln!("a job takes {order} bytes, a result {result}");
     assert!(order.max(result) < 512 << 10, "a job takes {order} bytes, a result {result}");
 }

@@ -37,7 +37,7 @@ pub(super) fn loosened(bounds: &TunedBounds, set: BoundSet, level: Level) -> Res
 }
 
 /// Bounds at a fraction of the way to looser ones, geometrically if possible, rounded to few digits.
-fn moved(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds, ModelError> {
+fn interpolated(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds, ModelError> {
     let (mut values, ends) = (from.to_array(), to.to_array());
     for (value, end) in values.iter_mut().zip(ends).filter(|(value, end)| **value != *end) {
         *value = between(*value, end, share);
@@ -47,7 +47,7 @@ fn moved(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds
 
 /// Bounds halfway between two sets of bounds.
 pub(super) fn halfway(a: &TunedBounds, b: &TunedBounds) -> Result<TunedBounds, ModelError> {
-    moved(a, b, 0.5)
+    interpolated(a, b, 0.5)
 }
 
 fn between(from: f64, to: f64, share: f64) -> f64 {
@@ -100,7 +100,7 @@ pub(super) fn least_move<E: From<ModelError>>(
     let (mut none, mut gait) = ((0.0, *from), (1.0, *to));
     while gait.0 - none.0 > RESOLUTION && !are_close(&none.1, &gait.1) {
         let share = gait.0 - STEP * (gait.0 - none.0);
-        let tried = moved(from, to, share)?;
+        let tried = interpolated(from, to, share)?;
         if tried == none.1 || tried == gait.1 {
             break;
         }

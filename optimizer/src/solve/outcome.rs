@@ -4,7 +4,8 @@ use super::attempts::Candidate;
 use super::gait_results::GaitResults;
 use super::phases::SolveContext;
 use super::report::{
-    LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
+    LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
+    Violation,
 };
 use super::warm_start::WarmStart;
 use crate::gait_problem::margins::Margins;
@@ -35,7 +36,7 @@ pub(super) fn outcome(
     let Candidate { result, gait, status, .. } = candidate;
     let x = &result.x;
     let figures = GaitResults::of_well_formed(&gait, &program.model, &problem.reference);
-    let margins = margins.bearing_on(program, x);
+    let margins = margins.relevant_at(program, x);
     let violations = program.violations(x);
     let warm_start = warm_start(context, &result, margins);
     let converged = ConvergedGait {

@@ -11,7 +11,7 @@ use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
 use gait_optimizer::settings::Naturalness;
-use gait_optimizer::{LocalOptimumChoice, Device, GaitSettings, SolveOptions, Subject, TunedBounds};
+use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
@@ -75,7 +75,7 @@ pub(super) fn state(document: &mut Value) {
         ] {
             add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
-        for component in ["Tell", "StudyActionReason"] {
+        for component in ["Tell", "TransitionReason"] {
             add(schemas, component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["NewSubject", "NewLabSession"] {

@@ -81,8 +81,8 @@ impl AccessLog {
         }
         if let Some(mut spool) = access_spool::take(store.path())? {
             // If this ends early, rows are written twice rather than lost.
-            while let Some(noted) = spool.more()? {
-                append(store, &noted).await?;
+            while let Some(accesses) = spool.more()? {
+                append(store, &accesses).await?;
             }
             spool.clear()?;
         }

@@ -2,7 +2,7 @@
 
 use super::flag_numbers::{number, whole};
 use clap::Args;
-use gait_optimizer::{LocalOptimumChoice, InitialGuess, ModelError, SolveOptions};
+use gait_optimizer::{InitialGuess, LocalOptimumChoice, ModelError, SolveOptions};
 use gaitwright_service::error::Error;
 
 fn initial_guesses(text: &str) -> Result<usize, String> {

@@ -151,7 +151,8 @@ impl ProblemFlags {
         let Some(local_optimum) = local_optimum.filter(|local_optimum| Some(*local_optimum) != answers) else {
             return Ok(Some(LineageStart::answer(outcome, lineage)));
         };
-        let mut known: Vec<usize> = answers.into_iter().chain(outcome.other_local_optima.iter().map(|o| o.local_optimum)).collect();
+        let mut known: Vec<usize> =
+            answers.into_iter().chain(outcome.other_local_optima.iter().map(|o| o.local_optimum)).collect();
         known.sort_unstable();
         let other = outcome.other_local_optima.into_iter().find(|other| other.local_optimum == local_optimum);
         let refused = || {

@@ -97,7 +97,7 @@ impl Serve {
         let engine: Arc<dyn Dispatch> = match settings.nats()? {
             #[cfg(feature = "nats")]
             Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
-            _ => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
+            _ => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).with_lower_priority()),
         };
         let scheduler = Scheduler::new(&store, engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
@@ -162,7 +162,7 @@ impl Serve {
             return Ok(None);
         }
         let mut writer = store.write().await?;
-        let admin = user_administration::way_in(&mut writer).await?;
+        let admin = user_administration::operator_administrator(&mut writer).await?;
         let secret = user_administration::link(&mut writer, &Actor::terminal(), admin.id).await?;
         commit(writer).await?;
         Ok(Some(secret))

@@ -298,7 +298,9 @@ fn local_optima_in_words(report: &SolveReport) -> Vec<String> {
     let answer = chosen_local_optimum(report);
     let mut lines: Vec<String> = Vec::new();
     for attempt in &report.attempts {
-        let Some(local_optimum) = attempt.local_optimum.filter(|local_optimum| *local_optimum > lines.len()) else { continue };
+        let Some(local_optimum) = attempt.local_optimum.filter(|local_optimum| *local_optimum > lines.len()) else {
+            continue;
+        };
         let chosen = if attempt.local_optimum == answer { ", chosen" } else { "" };
         lines.push(format!(
             "  local optimum {local_optimum:<5}objective {:.5}   Gait RMSE {:.4} rad{chosen}",

@@ -1,6 +1,6 @@
 //! Stored results of attempts, including results that arrived too late.
 
-use super::{Connection, Instant, StoreResult, TrialId, json_columns, now};
+use super::{Connection, Instant, StoreResult, TrialId, former_documents, json_columns, now};
 use gait_optimizer::{SolveReport, SolveStatus};
 use sqlx::Row;
 
@@ -25,7 +25,7 @@ pub struct AttemptResult {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn keep(
+pub async fn insert(
     db: &mut Connection,
     (trial, attempt): (TrialId, u32),
     worker: &str,
@@ -62,7 +62,7 @@ pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<At
                 worker: row.try_get("worker")?,
                 taken: row.try_get("taken")?,
                 status: json_columns::column(row, "status")?,
-                report: json_columns::optional_column(row, "report")?,
+                report: row.try_get::<Option<&str>, _>("report")?.map(former_documents::solve_report).transpose()?,
                 received_at: row.try_get("received_at")?,
             })
         })

@@ -231,7 +231,17 @@ impl From<gait_optimizer::SolveAttempt> for SolveAttempt {
             local_optimum,
             chosen,
         } = attempt;
-        Self { strategy, status: status.into(), iterations, seconds, objective, gait_rmse_rad, reason, local_optimum, chosen }
+        Self {
+            strategy,
+            status: status.into(),
+            iterations,
+            seconds,
+            objective,
+            gait_rmse_rad,
+            reason,
+            local_optimum,
+            chosen,
+        }
     }
 }
 

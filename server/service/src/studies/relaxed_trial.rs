@@ -83,7 +83,7 @@ pub struct RelaxedTrial {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn possible(
+pub async fn of(
     db: &mut Connection,
     study: &Study,
     trial: &Trial,
@@ -174,7 +174,7 @@ pub async fn choose(
     let relaxation = known.get(place).ok_or_else(|| {
         Error::invalid("relaxation", place, "the index of a relaxation in the explanation of the trial, counted from 0")
     })?;
-    let RelaxedTrial { bounds, action, .. } = possible(&mut db, &study, &trial, relaxation).await??;
+    let RelaxedTrial { bounds, action, .. } = of(&mut db, &study, &trial, relaxation).await??;
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let beliefs = Arc::clone(beliefs);
