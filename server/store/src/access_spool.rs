@@ -42,14 +42,14 @@ pub fn note(record: &Path, access: &Access) -> StoreResult<()> {
     file.lock().and_then(|()| file.write_all(text.as_bytes())).and_then(|()| file.sync_all()).map_err(failed)
 }
 
-/// The noted accesses, oldest first. While this is held, no command can add any.
+/// The accesses that commands logged, oldest first. While this is held, no command can add any.
 #[derive(Debug)]
 pub struct Spool {
     file: BufReader<File>,
     path: PathBuf,
 }
 
-/// Takes the accesses that were noted next to a record, if any.
+/// Takes the accesses that were logged next to a record, if any.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -103,13 +103,13 @@ impl Spool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::access_log::Kind;
+    use super::super::access_log::AccessKind;
     use super::*;
 
     fn access(object: String) -> Access {
         let text = |text: &str| text.to_owned();
         Access {
-            kind: Kind::Export,
+            kind: AccessKind::Export,
             actor: text("command line"),
             address: String::new(),
             method: String::new(),

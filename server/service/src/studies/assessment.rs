@@ -74,7 +74,13 @@ pub(super) async fn write(writer: &mut Writer, statement: AttributedJudgement<'_
     let AttributedJudgement { study, pair, judgement, attribution, .. } = statement;
     let id = assessments::insert(
         writer,
-        &assessments::NewAssessment { study, pair, answer: judgement.try_into()?, attribution, feedback: feedback_id },
+        &assessments::UnsavedAssessment {
+            study,
+            pair,
+            answer: judgement.try_into()?,
+            attribution,
+            feedback: feedback_id,
+        },
     )
     .await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": feedback_id, "assessment_id": id }))

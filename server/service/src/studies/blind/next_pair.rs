@@ -1,7 +1,7 @@
 //! Chooses the pair that a rater is shown next, as a pure function of the pending comparison, earlier presentations and
 //! a random number of the operating system. `store::allocations` draws the sides.
 
-use gaitwright_store::presentations::{Judgement, Kind, Presentation};
+use gaitwright_store::presentations::{Judgement, Presentation, PresentationKind};
 use gaitwright_store::{PresentationId, TrialId};
 
 /// One in this many presentations repeats an earlier pair.
@@ -11,7 +11,7 @@ const REPEAT_ONE_IN: u64 = 10;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NextPair {
     /// Why it is shown.
-    pub kind: Kind,
+    pub kind: PresentationKind,
     /// The two gaits, the newer one first.
     pub pair: (TrialId, TrialId),
     /// The earlier presentation that it repeats.
@@ -23,22 +23,23 @@ pub struct NextPair {
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
 /// earlier presentations of this rater; `reported` lists trials with a safety report in force.
 pub fn next_pair(random: u64, question: (TrialId, TrialId), before: &[Presentation], reported: &[TrialId]) -> NextPair {
-    let retracted = before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != Kind::Null);
+    let retracted =
+        before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != PresentationKind::Null);
     if let Some(last) = retracted.filter(|last| !last.has_one_of(reported)) {
         // A rater who confused the sides must find them unchanged.
         let repeated =
             NextPair { kind: last.kind, pair: last.pair(), repeats: last.repeats, same_sides_as: Some(last.id) };
         let is_question = is_same_pair(last.pair(), question);
-        if last.kind == Kind::Repeat || is_question {
+        if last.kind == PresentationKind::Repeat || is_question {
             return repeated;
         }
     }
-    let new = NextPair { kind: Kind::New, pair: question, repeats: None, same_sides_as: None };
+    let new = NextPair { kind: PresentationKind::New, pair: question, repeats: None, same_sides_as: None };
     if !random.is_multiple_of(REPEAT_ONE_IN) {
         return new;
     }
     let repeat = |earlier: &Presentation| NextPair {
-        kind: Kind::Repeat,
+        kind: PresentationKind::Repeat,
         pair: earlier.pair(),
         repeats: Some(earlier.id),
         same_sides_as: None,
@@ -49,7 +50,7 @@ pub fn next_pair(random: u64, question: (TrialId, TrialId), before: &[Presentati
 /// An earlier pair with a plain answer that has not been repeated.
 fn repeatable<'a>(before: &'a [Presentation], reported: &[TrialId], random: u64) -> Option<&'a Presentation> {
     let plain = |shown: &&Presentation| {
-        shown.kind == Kind::New
+        shown.kind == PresentationKind::New
             && shown.answer.is_some_and(is_plain)
             && !shown.has_one_of(reported)
             && !before.iter().any(|other| other.repeats == Some(shown.id))
@@ -104,14 +105,14 @@ mod tests {
             let next = next_pair(u64::from(number) * 7, question(), &before, &[]);
             if let Some(repeats) = next.repeats {
                 let earlier = before.iter().find(|shown| shown.id == repeats).unwrap();
-                assert_eq!((next.kind, next.pair), (Kind::Repeat, earlier.pair()));
+                assert_eq!((next.kind, next.pair), (PresentationKind::Repeat, earlier.pair()));
                 assert!(!before.iter().any(|shown| shown.repeats == Some(repeats)));
             }
             before.push(shown(number, next));
         }
-        let repeats = before.iter().filter(|shown| shown.kind == Kind::Repeat).count();
+        let repeats = before.iter().filter(|shown| shown.kind == PresentationKind::Repeat).count();
         assert_eq!(repeats, 40);
-        assert!(before.iter().all(|shown| shown.kind != Kind::Null));
+        assert!(before.iter().all(|shown| shown.kind != PresentationKind::Null));
     }
 
     #[test]
@@ -140,7 +141,7 @@ mod tests {
         let next = next_pair(1, question(), &[], &[]);
         let before: Vec<Presentation> = (1..=50).map(|number| shown(number, next)).collect();
         for random in 0..50 {
-            assert_eq!(next_pair(10 * random, question(), &before, &[next.pair.1]).kind, Kind::New);
+            assert_eq!(next_pair(10 * random, question(), &before, &[next.pair.1]).kind, PresentationKind::New);
         }
     }
 }

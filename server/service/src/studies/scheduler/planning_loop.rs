@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 /// The longest time between two rounds of planning.
 const IDLE: Duration = Duration::from_secs(5);
-/// Pause before asking an engine in trouble again whether it can take jobs.
+/// Pause before asking an engine that cannot work now whether it can take jobs.
 const ENGINE_AGAIN: Duration = Duration::from_millis(100);
 /// Changes within this time are planned together.
 const TOGETHER: Duration = Duration::from_millis(10);

@@ -48,21 +48,21 @@ impl JetStream {
         let link = BrokerConnection::open(url, queue, lease).await?;
         let (events, messages) = mpsc::channel(WAITING);
         let ends = CancellationToken::new();
-        let (trouble, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
+        let (problem, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
         let storages = Arc::<AtomicU64>::default();
         for task in [0, 1] {
-            let (link, events, ends, trouble) = (link.clone(), events.clone(), ends.clone(), trouble.clone());
+            let (link, events, ends, problem) = (link.clone(), events.clone(), ends.clone(), problem.clone());
             let mut storage = Storage { created: None, count: Arc::clone(&storages) };
             tokio::spawn(ends.run_until_cancelled_owned(async move {
                 loop {
                     let ended = match task {
                         0 => signs(&link, &events).await,
-                        _ => results(&link, &events, &trouble, &mut storage).await,
+                        _ => results(&link, &events, &problem, &mut storage).await,
                     };
                     if let Err(error) = ended {
                         tracing::warn!(%error, "cannot receive messages from workers; retrying");
                         if task == 1 {
-                            trouble.send_replace(Some(error.to_string()));
+                            problem.send_replace(Some(error.to_string()));
                         }
                     }
                     tokio::time::sleep(AGAIN).await;
@@ -203,7 +203,7 @@ async fn signs(link: &BrokerConnection, events: &Sender<EngineMessage>) -> Resul
 async fn results(
     link: &BrokerConnection,
     events: &Sender<EngineMessage>,
-    trouble: &watch::Sender<Option<String>>,
+    problem: &watch::Sender<Option<String>>,
     storage: &mut Storage,
 ) -> Result<(), DispatchError> {
     let pool = Pool::default();
@@ -211,7 +211,7 @@ async fn results(
     let messages = recorder.stream().max_messages_per_batch(16).expires(EXPIRES).heartbeat(BROKER_HEARTBEAT);
     let mut messages = messages.messages().await.map_err(unreachable)?;
     storage.note(&link.jobs().await?);
-    trouble.send_replace(None);
+    problem.send_replace(None);
     while let Some(message) = messages.next().await {
         let message = message.map_err(unreachable)?;
         bring(message, events, &pool).await?;
