@@ -152,7 +152,7 @@ async fn nothing_is_lost_or_doubled(service: &Service, study: StudyId) {
             .filter(|row| matches!(row.content, FeedbackContent::Label { trial: of, .. } if of == trial.id));
         assert_eq!(labels.count(), 1, "labels of trial {}", trial.number);
         let brought = results::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
-        assert_eq!(brought.iter().filter(|result| result.taken).count(), 1, "{brought:?}");
+        assert_eq!(brought.iter().filter(|result| result.used).count(), 1, "{brought:?}");
     }
 }
 
@@ -204,7 +204,7 @@ async fn a_result_that_comes_late(mut rig: Rig) {
     nothing_is_lost_or_doubled(&service, study).await;
     let first = service.trials(study).await[0].id;
     let brought = service.fetch(&format!("/api/v1/trials/{first}/attempts")).await.items();
-    let brought: Vec<_> = brought.as_array().unwrap().iter().map(|r| (&r["attempt"], &r["taken"])).collect();
+    let brought: Vec<_> = brought.as_array().unwrap().iter().map(|r| (&r["attempt"], &r["used"])).collect();
     assert_eq!(brought.len(), 2, "{brought:?}");
     assert!(brought[0] == (&1.into(), &false.into()) && brought[1] == (&2.into(), &true.into()), "{brought:?}");
     service.stop().await;
@@ -230,7 +230,7 @@ async fn a_job_that_is_cancelled(mut rig: Rig) {
         !feedback.iter().any(|row| matches!(row.content, FeedbackContent::Label { trial, .. } if trial == running))
     );
     let brought = results::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
-    assert!(brought.iter().all(|result| !result.taken), "{brought:?}");
+    assert!(brought.iter().all(|result| !result.used), "{brought:?}");
     service.stop().await;
 }
 

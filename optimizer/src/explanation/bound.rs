@@ -79,7 +79,7 @@ pub(super) fn step(bound: usize, from: f64, to: f64) -> f64 {
 }
 
 /// Distance between two sets of bounds.
-pub(super) fn way(from: &TunedBounds, to: &TunedBounds) -> f64 {
+pub(super) fn distance(from: &TunedBounds, to: &TunedBounds) -> f64 {
     let (from, to) = (from.to_array(), to.to_array());
     (0..from.len()).map(|bound| step(bound, from[bound], to[bound])).sum()
 }
@@ -159,7 +159,7 @@ mod tests {
         assert!((step(1, 40.0, 80.0) - 2f64.ln()).abs() < 1e-15);
         assert!((step(4, 0.0, 0.03) - 0.1).abs() < 1e-15);
         let usual = TunedBounds::default();
-        assert!((way(&usual, &TunedBounds { a2: 45.0, a5: 0.03, ..usual }) - 2f64.ln() - 0.1).abs() < 1e-15);
+        assert!((distance(&usual, &TunedBounds { a2: 45.0, a5: 0.03, ..usual }) - 2f64.ln() - 0.1).abs() < 1e-15);
     }
 
     #[test]

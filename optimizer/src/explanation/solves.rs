@@ -1,6 +1,6 @@
 //! The solves of an explanation: tests whether bounds have a gait, with a memory of earlier results.
 
-use super::bound::{halfway, is_as_loose, way};
+use super::bound::{distance, halfway, is_as_loose};
 use crate::gait_problem::GaitProblem;
 use crate::solve::{
     CONVERGED_VIOLATION, CancelToken, InitialGuess, SolveError, SolveOptions, SolveOutcome, SolveStatus, Violation,
@@ -129,14 +129,14 @@ impl<'a> Solves<'a> {
     /// Searches a gait with these bounds: from the nearest known gait, in one or two steps, then from initial guesses.
     pub(super) fn solve(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<Option<WarmStart>, SearchEnd> {
         let mut unmet = FailedSearch::new(bounds);
-        let nearest = self.met.iter().min_by(|a, b| way(&a.0, bounds).total_cmp(&way(&b.0, bounds))).cloned();
+        let nearest = self.met.iter().min_by(|a, b| distance(&a.0, bounds).total_cmp(&distance(&b.0, bounds))).cloned();
         let cold = starts == Starts::All || nearest.is_none();
         if let Some((from, gait)) = nearest {
             if self.warm(bounds, &gait, &mut unmet)? {
                 return Ok(self.latest());
             }
             let middle = halfway(&from, bounds)?;
-            if way(&from, bounds) > FAR
+            if distance(&from, bounds) > FAR
                 && self.warm(&middle, &gait, &mut FailedSearch::new(&middle))?
                 && let Some(gait) = self.latest()
                 && self.warm(bounds, &gait, &mut unmet)?

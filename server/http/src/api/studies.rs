@@ -290,7 +290,7 @@ pub(super) async fn patch(
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
-/// Raise the trial budget of a study
+/// Raise the number of trials of a study
 ///
 /// If the study has ended, it resumes.
 #[utoipa::path(

@@ -191,10 +191,10 @@ mod tests {
     }
 
     #[test]
-    fn way_out_names_each_bound_with_its_unit() {
-        let relaxation = vec![("a5".to_owned(), 0.03), ("a7".to_owned(), 20.0)];
-        let way = FeasibleRelaxation::of(&relaxation, Err(NoRelaxedTrial::NotTuned("a7".to_owned())));
-        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20° (hip angle)");
-        assert_eq!(way.relax, "a5=0.03,a7=20");
+    fn relaxation_names_each_bound_with_its_unit() {
+        let bounds = vec![("a5".to_owned(), 0.03), ("a7".to_owned(), 20.0)];
+        let relaxation = FeasibleRelaxation::of(&bounds, Err(NoRelaxedTrial::NotTuned("a7".to_owned())));
+        assert_eq!(relaxation.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20° (hip angle)");
+        assert_eq!(relaxation.relax, "a5=0.03,a7=20");
     }
 }

@@ -46,7 +46,7 @@ pub async fn delete_expired(store: &Store) -> Result<DeletedCounts, Error> {
 ///
 /// # Errors
 /// None: failures are logged.
-pub async fn keep_dropping(store: Store, task: Task) -> Result<(), Error> {
+pub async fn delete_expired_hourly(store: Store, task: Task) -> Result<(), Error> {
     loop {
         task.works();
         match delete_expired(&store).await {

@@ -126,7 +126,7 @@ impl StudySnapshot {
         self.trials.iter().filter(|trial| trial.state.is_open()).count()
     }
 
-    /// The stopping rule that applies before the trial budget is used up: the time limit, or an unchanged best action.
+    /// The stopping rule that applies before the trials are used up: the time limit, or an unchanged best action.
     pub fn is_enough(&self) -> Option<String> {
         let plan = &self.study.plan;
         let spent: f64 = self.trials.iter().filter_map(|trial| trial.seconds_total).sum();

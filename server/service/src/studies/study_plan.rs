@@ -192,7 +192,7 @@ pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result
 /// As [`create`].
 pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> Result<Study, Error> {
     let study = create(writer, &caller.actor, new).await?;
-    membership::keep_in(writer, caller, study.id).await?;
+    membership::ensure_caller_is_member(writer, caller, study.id).await?;
     Ok(study)
 }
 

@@ -57,9 +57,9 @@ pub async fn ended(
         if !snapshot.is_current(&mut writer).await? {
             continue;
         }
-        let taken = jobs::finish(&mut writer, lease).await?;
-        results::insert(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, taken).await?;
-        if !taken {
+        let used = jobs::finish(&mut writer, lease).await?;
+        results::insert(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, used).await?;
+        if !used {
             commit(writer).await?;
             return Ok(false);
         }
@@ -152,14 +152,14 @@ pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
 async fn give_up_or_requeue(
     writer: &mut Writer,
     lease: &Lease,
-    happening: TrialEvent,
+    event: TrialEvent,
     after: FailureCounts,
     reason: &str,
 ) -> Result<bool, Error> {
     if !jobs::finish(writer, lease).await? {
         return Ok(false);
     }
-    let state = trial_state::after(TrialState::Running, happening).map_err(|e| Error::Internal(e.to_string()))?;
+    let state = trial_state::after(TrialState::Running, event).map_err(|e| Error::Internal(e.to_string()))?;
     if state == TrialState::Queued {
         jobs::requeue(writer, lease.job, after).await?;
         trials::requeue(writer, lease.trial, reason).await?;

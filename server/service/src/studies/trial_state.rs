@@ -29,17 +29,17 @@ pub enum TrialEvent {
 
 /// The event is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("The trial is {}, so it cannot be {}.", state.as_str().replace('_', " "), participle(*happening))]
+#[error("The trial is {}, so it cannot be {}.", state.as_str().replace('_', " "), participle(*event))]
 pub struct Impossible {
     /// The state of the trial.
     pub state: TrialState,
     /// The event.
-    pub happening: TrialEvent,
+    pub event: TrialEvent,
 }
 
 /// What happens to the trial, as a participle.
-fn participle(happening: TrialEvent) -> &'static str {
-    match happening {
+fn participle(event: TrialEvent) -> &'static str {
+    match event {
         TrialEvent::Leased => "started",
         TrialEvent::Solved(_) => "solved",
         TrialEvent::Broke(_) => "marked as failed",
@@ -66,16 +66,16 @@ pub fn result_of(status: SolveStatus) -> Option<TrialState> {
 ///
 /// # Errors
 /// [`Impossible`], for example for any event after a result.
-pub fn after(state: TrialState, happening: TrialEvent) -> Result<TrialState, Impossible> {
+pub fn after(state: TrialState, event: TrialEvent) -> Result<TrialState, Impossible> {
     use TrialState::{Cancelled, Failed, Lost, Queued, Running};
-    match (state, happening) {
+    match (state, event) {
         (Queued, TrialEvent::Leased) => Ok(Running),
-        (Running, TrialEvent::Solved(status)) => result_of(status).ok_or(Impossible { state, happening }),
+        (Running, TrialEvent::Solved(status)) => result_of(status).ok_or(Impossible { state, event }),
         (Running, TrialEvent::Broke(before)) => Ok(if before.failures < RETRIES { Queued } else { Failed }),
         (Running, TrialEvent::Silent(before)) => Ok(if before.losses < RETRIES { Queued } else { Lost }),
         (Running, TrialEvent::Interrupted) | (Failed | Lost | Cancelled, TrialEvent::Retried) => Ok(Queued),
         (Queued | Running, TrialEvent::Cancelled) => Ok(Cancelled),
-        _ => Err(Impossible { state, happening }),
+        _ => Err(Impossible { state, event }),
     }
 }
 
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn any_happening() -> impl Strategy<Value = TrialEvent> {
+    fn any_event() -> impl Strategy<Value = TrialEvent> {
         prop_oneof![
             Just(TrialEvent::Leased),
             Just(TrialEvent::Solved(SolveStatus::Converged)),
@@ -101,17 +101,17 @@ mod tests {
     proptest! {
         #[test]
         fn results_are_final_and_come_from_solves_only(
-            happenings in proptest::collection::vec(any_happening(), 0..60)
+            events in proptest::collection::vec(any_event(), 0..60)
         ) {
             let mut state = TrialState::Queued;
-            for happening in happenings {
-                let Ok(next) = after(state, happening) else { continue };
-                prop_assert!(!state.is_result(), "{:?} left {:?}", happening, state);
+            for event in events {
+                let Ok(next) = after(state, event) else { continue };
+                prop_assert!(!state.is_result(), "{:?} left {:?}", event, state);
                 if next.is_result() {
-                    prop_assert!(matches!(happening, TrialEvent::Solved(_)));
+                    prop_assert!(matches!(event, TrialEvent::Solved(_)));
                 }
                 if next == TrialState::Running {
-                    prop_assert_eq!(happening, TrialEvent::Leased);
+                    prop_assert_eq!(event, TrialEvent::Leased);
                 }
                 state = next;
             }
@@ -124,12 +124,12 @@ mod tests {
         let silent = |losses| TrialEvent::Silent(FailureCounts { failures: 0, losses });
         let cases: [(&dyn Fn(u32) -> TrialEvent, TrialState); 2] =
             [(&broke, TrialState::Failed), (&silent, TrialState::Lost)];
-        for (happening, end) in cases {
+        for (event, end) in cases {
             let mut runs = 0;
             let mut state = TrialState::Queued;
             while state == TrialState::Queued && runs < 10 {
                 state = after(state, TrialEvent::Leased).unwrap();
-                state = after(state, happening(runs)).unwrap();
+                state = after(state, event(runs)).unwrap();
                 runs += 1;
             }
             assert_eq!((state, runs), (end, 3));

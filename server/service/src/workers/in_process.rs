@@ -29,21 +29,21 @@ pub struct InProcess {
     lease: Duration,
     has_lower_priority: bool,
     running: Running,
-    message: UnboundedSender<EngineMessage>,
+    sender: UnboundedSender<EngineMessage>,
     messages: tokio::sync::Mutex<UnboundedReceiver<EngineMessage>>,
 }
 
 impl InProcess {
     /// An engine for at most `size` parallel solves (at least one).
     pub fn new(size: usize, evaluate: Arc<dyn Evaluate>) -> Self {
-        let (message, messages) = mpsc::unbounded_channel();
+        let (sender, messages) = mpsc::unbounded_channel();
         Self {
             evaluate,
             size: size.max(1),
             lease: LEASE,
             has_lower_priority: false,
             running: Running::default(),
-            message,
+            sender,
             messages: tokio::sync::Mutex::new(messages),
         }
     }
@@ -75,23 +75,23 @@ impl InProcess {
                 superseded.cancel();
             }
         }
-        let (evaluate, message, has_lower_priority) =
-            (Arc::clone(&self.evaluate), self.message.clone(), self.has_lower_priority);
+        let (evaluate, sender, has_lower_priority) =
+            (Arc::clone(&self.evaluate), self.sender.clone(), self.has_lower_priority);
         let running = Arc::clone(&self.running);
         let work = move || {
             if has_lower_priority {
                 lower_priority(SOLVER);
             }
             // Fails only while the process is shutting down.
-            let _ = message.send(EngineMessage::Started { attempt, worker: IN_PROCESS.to_owned() });
-            let result = solve(evaluate.as_ref(), &assignment, &message, &cancel);
+            let _ = sender.send(EngineMessage::Started { attempt, worker: IN_PROCESS.to_owned() });
+            let result = solve(evaluate.as_ref(), &assignment, &sender, &cancel);
             let mut running = lock(&running);
             if running.get(&attempt.trial).is_some_and(|(number, _)| *number == attempt.number) {
                 running.remove(&attempt.trial);
             }
             drop(running);
             let (worker, receipt) = (IN_PROCESS.to_owned(), Receipt::not_needed());
-            let _ = message.send(EngineMessage::Ended { attempt, worker, result, receipt });
+            let _ = sender.send(EngineMessage::Ended { attempt, worker, result, receipt });
         };
         let thread = std::thread::Builder::new().name("solver".to_owned()).stack_size(STACK_BYTES).spawn(work);
         thread.map(drop).map_err(|error| {
@@ -163,7 +163,7 @@ impl fmt::Debug for InProcess {
 fn solve(
     evaluate: &dyn Evaluate,
     assignment: &Assignment,
-    message: &UnboundedSender<EngineMessage>,
+    sender: &UnboundedSender<EngineMessage>,
     cancel: &CancelToken,
 ) -> AssignmentResult {
     let attempt = assignment.attempt;
@@ -171,7 +171,7 @@ fn solve(
     let found = catch_unwind(AssertUnwindSafe(|| {
         let mut observer = |record: &gait_optimizer::IterationRecord| {
             iterations.push(*record);
-            let _ = message.send(EngineMessage::Iterated { attempt, record: *record });
+            let _ = sender.send(EngineMessage::Iterated { attempt, record: *record });
         };
         evaluate.evaluate(assignment, &mut observer, cancel)
     }));

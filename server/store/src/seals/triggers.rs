@@ -38,12 +38,12 @@ impl Sealed {
     fn trigger(&self, event: RowEvent, keep: Option<&[String]>) -> String {
         let (table, name) = (self.table, event.name());
         let key = self.key_of(if event == RowEvent::Delete { "old." } else { "new." });
-        let (event, known) = match keep {
+        let (written, known) = match keep {
             Some(_) => (name, self.known_hash(&key)),
             None => (RowEvent::MIGRATED, "null".to_owned()),
         };
         let note = "insert into unsealed (evidence, key, event, known)";
-        let mut statements = vec![format!("{note} values ('{table}', {key}, '{event}', {known});")];
+        let mut statements = vec![format!("{note} values ('{table}', {key}, '{written}', {known});")];
         if let Some(columns) = keep.filter(|_| event != RowEvent::Insert) {
             let old: Vec<String> = columns.iter().map(|column| format!("old.\"{column}\"")).collect();
             let place = "(select max(place) from unsealed)";

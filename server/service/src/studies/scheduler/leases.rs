@@ -24,12 +24,12 @@ impl Scheduler {
     pub(super) async fn handle_expired_leases(&self) -> Result<(), Error> {
         let mut reader = self.0.store.read().await?;
         let expired = jobs::expired(&mut reader, now()).await?;
-        let unstarted_of_inactive_studies = jobs::unstarted_of_inactive_studies(&mut reader).await?;
+        let unstarted = jobs::unstarted_of_inactive_studies(&mut reader).await?;
         drop(reader);
         for lease in expired {
-            self.look_after(&lease).await?;
+            self.handle_expired(&lease).await?;
         }
-        for lease in unstarted_of_inactive_studies {
+        for lease in unstarted {
             self.give_back(&lease).await?;
         }
         Ok(())
@@ -59,7 +59,7 @@ impl Scheduler {
 
     /// Handles an expired lease. A job that no worker has started is dispatched again, in case the engine lost it. A
     /// job of a silent worker is taken from it.
-    pub(super) async fn look_after(&self, lease: &Lease) -> Result<(), Error> {
+    pub(super) async fn handle_expired(&self, lease: &Lease) -> Result<(), Error> {
         if !self.replace_unstarted(lease).await? {
             self.cancel_solve(lease.trial).await;
             trial_result::record_expired_lease(&self.0.store, lease).await?;

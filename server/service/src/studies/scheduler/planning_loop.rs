@@ -84,7 +84,7 @@ impl Scheduler {
                 match scheduler.plan(study.clone()).await {
                     Err(error) if error.is_of_machine() => Err(error),
                     // Planning would fail again, so a person has to see it.
-                    Err(error) => scheduler.hold(&study, &error).await.map(|()| None),
+                    Err(error) => scheduler.pause_unplannable(&study, &error).await.map(|()| None),
                     snapshot => snapshot,
                 }
             });
@@ -134,7 +134,7 @@ impl Scheduler {
     }
 
     /// Pauses a study that cannot be planned, and records the reason.
-    pub(super) async fn hold(&self, study: &Study, error: &Error) -> Result<(), Error> {
+    pub(super) async fn pause_unplannable(&self, study: &Study, error: &Error) -> Result<(), Error> {
         tracing::error!(study = %study.id, %error, "cannot plan a study; pausing it");
         self.transition(study, StudyTransition::Pause, &format!("Planning failed: {error}")).await.map(drop)
     }

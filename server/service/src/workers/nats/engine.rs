@@ -46,18 +46,18 @@ impl JetStream {
     /// [`DispatchError::Unreachable`] for a malformed address.
     pub async fn connect(url: &str, queue: &str, size: usize, lease: Duration) -> Result<Self, DispatchError> {
         let link = BrokerConnection::open(url, queue, lease).await?;
-        let (events, messages) = mpsc::channel(WAITING);
+        let (sender, messages) = mpsc::channel(WAITING);
         let ends = CancellationToken::new();
         let (problem, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
         let storages = Arc::<AtomicU64>::default();
         for task in [0, 1] {
-            let (link, events, ends, problem) = (link.clone(), events.clone(), ends.clone(), problem.clone());
+            let (link, sender, ends, problem) = (link.clone(), sender.clone(), ends.clone(), problem.clone());
             let mut storage = Storage { created: None, count: Arc::clone(&storages) };
             tokio::spawn(ends.run_until_cancelled_owned(async move {
                 loop {
                     let ended = match task {
-                        0 => signs(&link, &events).await,
-                        _ => results(&link, &events, &problem, &mut storage).await,
+                        0 => signs(&link, &sender).await,
+                        _ => results(&link, &sender, &problem, &mut storage).await,
                     };
                     if let Err(error) = ended {
                         tracing::warn!(%error, "cannot receive messages from workers; retrying");
@@ -144,7 +144,7 @@ impl Dispatch for JetStream {
     fn next(&self) -> BoxFuture<'_, EngineMessage> {
         Box::pin(async move {
             match self.messages.lock().await.recv().await {
-                Some(events) => events,
+                Some(message) => message,
                 // Unreachable: the receiving tasks live as long as this engine.
                 None => std::future::pending().await,
             }
@@ -181,16 +181,16 @@ fn gone<T>(_: T) -> DispatchError {
 }
 
 /// Forwards heartbeats until the subscription ends.
-async fn signs(link: &BrokerConnection, events: &Sender<EngineMessage>) -> Result<(), DispatchError> {
+async fn signs(link: &BrokerConnection, sender: &Sender<EngineMessage>) -> Result<(), DispatchError> {
     let mut signs = link.context.client().subscribe(link.sign_subject()).await.map_err(unreachable)?;
     while let Some(message) = signs.next().await {
         match unpack::<Sign>(&message.payload) {
             Ok(Sign { attempt, worker, records }) if records.is_empty() => {
-                events.send(EngineMessage::Started { attempt, worker }).await.map_err(gone)?;
+                sender.send(EngineMessage::Started { attempt, worker }).await.map_err(gone)?;
             }
             Ok(Sign { attempt, records, .. }) => {
                 for record in records {
-                    events.send(EngineMessage::Iterated { attempt, record }).await.map_err(gone)?;
+                    sender.send(EngineMessage::Iterated { attempt, record }).await.map_err(gone)?;
                 }
             }
             Err(error) => tracing::warn!(%error, "ignoring a malformed heartbeat"),
@@ -202,7 +202,7 @@ async fn signs(link: &BrokerConnection, events: &Sender<EngineMessage>) -> Resul
 /// Forwards results until the broker reports an error.
 async fn results(
     link: &BrokerConnection,
-    events: &Sender<EngineMessage>,
+    sender: &Sender<EngineMessage>,
     problem: &watch::Sender<Option<String>>,
     storage: &mut Storage,
 ) -> Result<(), DispatchError> {
@@ -214,12 +214,16 @@ async fn results(
     problem.send_replace(None);
     while let Some(message) = messages.next().await {
         let message = message.map_err(unreachable)?;
-        bring(message, events, &pool).await?;
+        deliver(message, sender, &pool).await?;
     }
     Ok(())
 }
 
-async fn bring(message: jetstream::Message, events: &Sender<EngineMessage>, pool: &Pool) -> Result<(), DispatchError> {
+async fn deliver(
+    message: jetstream::Message,
+    sender: &Sender<EngineMessage>,
+    pool: &Pool,
+) -> Result<(), DispatchError> {
     let delivered = message.info().map_or(1, |info| info.delivered);
     let (message, acker) = message.split();
     if delivered > MOST_DELIVERIES {
@@ -241,5 +245,5 @@ async fn bring(message: jetstream::Message, events: &Sender<EngineMessage>, pool
         }
     });
     let ResultMessage { attempt, worker, result } = brought;
-    events.send(EngineMessage::Ended { attempt, worker, result, receipt }).await.map_err(gone)
+    sender.send(EngineMessage::Ended { attempt, worker, result, receipt }).await.map_err(gone)
 }

@@ -194,7 +194,7 @@ impl Worker {
                 if held.get(&attempt.trial).is_some_and(|job| job.number == attempt.number)
                     && let Some(job) = held.remove(&attempt.trial)
                 {
-                    self.results.spawn(bring(
+                    self.results.spawn(deliver(
                         self.link.clone(),
                         self.pool.clone(),
                         self.name.clone(),
@@ -241,7 +241,7 @@ impl Worker {
 
 /// Publishes a result, with retries, then acknowledges the job. A result that cannot be published is dropped: its slot
 /// is freed and its job left to other workers.
-async fn bring(
+async fn deliver(
     link: BrokerConnection,
     pool: Pool,
     worker: String,

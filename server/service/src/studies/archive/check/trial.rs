@@ -142,9 +142,9 @@ fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result
 /// Checks the results that workers delivered for a trial.
 pub(super) async fn check_results(db: &mut Connection, trial: &Trial) -> Result<(), String> {
     let results = results::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
-    let mut taken = results.iter().filter(|result| result.taken);
-    let Some(result) = taken.next() else { return Ok(()) };
-    if taken.next().is_some() {
+    let mut used = results.iter().filter(|result| result.used);
+    let Some(result) = used.next() else { return Ok(()) };
+    if used.next().is_some() {
         return Err("two results were accepted".to_owned());
     }
     if Some(result.status) != trial.status || result.report != trial.report {
