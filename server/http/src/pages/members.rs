@@ -49,6 +49,11 @@ impl MembersPage {
         member.role.as_ref().map_or("token", format::role)
     }
 
+    /// Whether the caller may unblind raters, and one of them is blind.
+    fn may_unblind(&self) -> bool {
+        self.may_administer && self.raters.iter().any(|rater| rater.first_preferred.is_none())
+    }
+
     /// `6 of 8 (41 % to 93 %)`, the interval with a confidence of 95 %.
     fn share(share: &Share) -> String {
         match (share.low, share.high) {
