@@ -113,7 +113,7 @@ pub async fn count(db: &mut Connection, network: &str, at: Instant, new_name: bo
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn uncount(db: &mut Connection, network: &str) -> StoreResult<()> {
+pub async fn remove(db: &mut Connection, network: &str) -> StoreResult<()> {
     let sql = "update sign_in_sources set attempts = max(attempts - 1, 0), names = max(names - 1, 0) where network = ?";
     sqlx::query(sql).bind(network).execute(db).await?;
     Ok(())
