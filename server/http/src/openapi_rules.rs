@@ -12,7 +12,7 @@ use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
 use gait_optimizer::settings::Naturalness;
-use gait_optimizer::{BasinChoice, Device, GaitSettings, SolveOptions, Subject, TunedBounds};
+use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
@@ -81,7 +81,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         ] {
             schemas.add(component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
-        for component in ["Tell", "StudyActionReason"] {
+        for component in ["Tell", "TransitionReason"] {
             schemas.add(component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["NewSubject", "NewLabSession"] {
@@ -245,22 +245,22 @@ fn widest_durations() -> GaitSettings {
 fn solve_options(missed: &mut Vec<String>) -> Value {
     let of = |options: SolveOptions| settings(options, |s: &SolveOptions| s.validate().err().map(Error::from));
     let mut schema = of(SolveOptions::default());
-    let nearest = BasinChoice::NearestToReference { within_percent: 0.0 };
+    let nearest = LocalOptimumChoice::NearestToReference { within_percent: 0.0 };
     let mut object =
-        of(SolveOptions { basin_choice: nearest, ..SolveOptions::default() })["properties"]["basin_choice"].take();
+        of(SolveOptions { local_optimum_choice: nearest, ..SolveOptions::default() })["properties"]["local_optimum_choice"].take();
     for (place, text) in [
         ("/properties/nearest_to_reference", "Takes the local optimum with the lowest Gait RMSE."),
         ("/properties/nearest_to_reference/properties/within_percent", "Largest excess over the lowest objective, %."),
     ] {
         match object.pointer_mut(place) {
             Some(part) => part["description"] = json!(text),
-            None => missed.push(format!("SolveOptions.basin_choice{place}")),
+            None => missed.push(format!("SolveOptions.local_optimum_choice{place}")),
         }
     }
-    let word = json!({ "type": "string", "enum": [BasinChoice::LowestObjective] });
-    match schema.pointer_mut("/properties/basin_choice") {
+    let word = json!({ "type": "string", "enum": [LocalOptimumChoice::LowestObjective] });
+    match schema.pointer_mut("/properties/local_optimum_choice") {
         Some(choice) => *choice = json!({ "oneOf": [word, object] }),
-        None => missed.push("SolveOptions.basin_choice".to_owned()),
+        None => missed.push("SolveOptions.local_optimum_choice".to_owned()),
     }
     schema
 }
