@@ -28,7 +28,7 @@ fn refused(arguments: &[&str], expected: &str) {
 fn impossible_height_is_refused_with_the_allowed_range() {
     for command in ["tune", "solve"] {
         refused(&[command, "--height-m", "17.27", "--mass-kg", "65.7"], "--height-m is 17.27; it must be 1.4 to 2.2.");
-        refused(&[command, "--height-m", "1.727", "--mass-kg", "6570"], "body_mass_kg is 6570;");
+        refused(&[command, "--height-m", "1.727", "--mass-kg", "6570"], "--mass-kg is 6570; it must be 35 to 160.");
         refused(&[command, "--height-m", "NaN", "--mass-kg", "65"], "--height-m is NaN;");
         refused(&[command, "--height-m", "1.727"], "--mass-kg");
     }
@@ -69,11 +69,15 @@ fn other_invalid_arguments_are_refused() {
         }
     }
     refused(&["solve", "--max-iterations", "-1"], "--max-iterations");
-    refused(&["solve", "--time-limit-s", "-1"], "time_limit_s is -1; it must be");
+    refused(&["solve", "--time-limit-s", "-1"], "--time-limit-s is -1; it must be");
     refused(&["tune", "--muscles", "maybe"], "possible values: on, off");
     refused(&["solve", "--mesh", "4,4"], "four whole numbers");
     refused(&["solve", "--mesh", "0,4,6,6"], "mesh.ds2 is 0;");
     refused(&["solve", "--tolerance", "5"], "--tolerance is 5; it must be 1e-10 to 0.01.");
+    refused(
+        &["solve", "--reference", "foo"],
+        "There is no reference gait foo: give falisse-2019, fukuchi-2018 or a file. (No such file or directory)",
+    );
     refused(&["solve", "--warm", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
     refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
