@@ -366,7 +366,7 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
         recording.reference("x", &HeelStrikes::Given(strikes), MeasuredPerson::default()).unwrap_err().to_string()
     };
     assert!(refused(vec![0.5]).contains("right heel strikes found: 1; a stride needs two"));
-    assert!(refused(vec![0.5, 0.9]).contains("lasts 0.8 to 1.6 s"));
+    assert!(refused(vec![0.5, 0.9]).contains("no stride of 0.8 to 1.6 s is free of gaps longer than 0.1 s"));
     assert!(refused(vec![1.5, 0.5]).contains("must increase"));
     assert!(refused(vec![0.5, 9.0]).contains("heel_strikes_s is 9; it must be"));
     // Forces that end before the first stride.
