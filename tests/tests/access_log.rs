@@ -10,7 +10,7 @@ use axum::routing::{any, get};
 use gaitwright_http::access_log::NO_SUBJECT_DATA;
 use gaitwright_http::{openapi, with_layers};
 use gaitwright_service::access::{Right, Role};
-use gaitwright_store::access_log::{self, Access, AccessRow, Kind, Tally};
+use gaitwright_store::access_log::{self, Access, AccessKind, AccessRow, Tally};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::seals::{self, SealCheck};
 use gaitwright_store::studies::StudyState;
@@ -140,7 +140,7 @@ async fn token_without_read_right_is_logged_when_a_change_returns_a_study() {
     let body = r#"{"pseudonym": "P2", "height_m": 1.8, "body_mass_kg": 70}"#;
     let added = send(&service, &runs, &Method::POST, "/api/v1/subjects", json, body).await;
     let added = Some(added.json()["id"].as_str().unwrap().parse().unwrap());
-    let views = rows(&service).await.into_iter().filter(|row| row.kind == Kind::View);
+    let views = rows(&service).await.into_iter().filter(|row| row.kind == AccessKind::View);
     let views: Vec<_> = views.map(|row| (row.method, row.actor, row.study_id, row.subject_id)).collect();
     let seen = |method: &str, study, subject| (method.to_owned(), "token [Run]".to_owned(), study, subject);
     for view in
@@ -175,7 +175,7 @@ async fn log_rows_name_caller_object_and_subject() {
     ] {
         let answer = send(&service, who, &method, &path, "application/json", "").await;
         assert!(answer_is_success(answer.status), "{path}: {}", answer.status);
-        let newest = stored(&service).await.into_iter().find(|row| row.kind == Kind::Export).unwrap();
+        let newest = stored(&service).await.into_iter().find(|row| row.kind == AccessKind::Export).unwrap();
         assert_eq!(newest.object, path);
     }
     assert_eq!(fetch(&As::Token("gait_nothing".to_owned()), &csv).await.status, StatusCode::UNAUTHORIZED);
@@ -190,27 +190,27 @@ async fn log_rows_name_caller_object_and_subject() {
     assert_eq!(fetch(&clinician, &hidden).await.status, StatusCode::NOT_FOUND);
 
     let rows = rows(&service).await;
-    let of = |kind: Kind, start: &str| {
+    let of = |kind: AccessKind, start: &str| {
         rows.iter().filter(|row| row.kind == kind && row.object.starts_with(start)).collect::<Vec<_>>()
     };
-    let subject_views = of(Kind::View, "/subjects/");
+    let subject_views = of(AccessKind::View, "/subjects/");
     assert!(subject_views.len() == 1 && subject_views[0].times == 3, "{subject_views:?}");
     assert_eq!(
         (subject_views[0].subject_id, subject_views[0].actor.as_str()),
         (Some(subject), "clinician a clinician")
     );
     for start in ["/trials/", "/studies/", "/api/v1/trials/"] {
-        let views = of(Kind::View, start);
+        let views = of(AccessKind::View, start);
         assert!(
             views.len() == 1 && views[0].subject_id == Some(subject) && views[0].study_id == Some(study),
             "{start}"
         );
     }
-    let refused = of(Kind::Refused, &csv);
+    let refused = of(AccessKind::Refused, &csv);
     let who: BTreeSet<(&str, u16)> = refused.iter().map(|row| (row.actor.as_str(), row.status)).collect();
     assert_eq!(who, BTreeSet::from([("not signed in", 401), ("token [Rate]", 403)]), "{refused:?}");
-    assert_eq!(of(Kind::Refused, "/sign-in").len(), 1);
-    let hidden = of(Kind::Refused, &hidden);
+    assert_eq!(of(AccessKind::Refused, "/sign-in").len(), 1);
+    let hidden = of(AccessKind::Refused, &hidden);
     assert!(hidden.len() == 1 && hidden[0].status == 404 && hidden[0].subject_id == Some(subject), "{hidden:?}");
     assert!(rows.iter().all(|row| row.route != "/health"));
 
@@ -262,7 +262,7 @@ async fn every_spelling_of_an_identifier_every_refused_form_and_every_second_sub
     assert_eq!(all.len(), before + 1);
     assert_eq!(
         (all[0].kind, all[0].subject_id.map(|id| id.to_string()), all[0].status),
-        (Kind::View, Some(other), 422)
+        (AccessKind::View, Some(other), 422)
     );
     service.stop().await;
 }
@@ -313,7 +313,7 @@ async fn access_log_is_append_only_and_pruned_by_age_only() {
 
 fn view(study: StudyId, object: &str) -> Access {
     Access {
-        kind: Kind::View,
+        kind: AccessKind::View,
         actor: "clinician K".to_owned(),
         address: "192.0.2.7".to_owned(),
         method: "GET".to_owned(),
@@ -337,7 +337,10 @@ async fn command_line_export_and_backup_are_logged_while_the_service_runs() {
     let rows = rows(&service).await;
     let of = |command: &str| rows.iter().find(|row| row.route == command).unwrap();
     let export = of("gaitwright export");
-    assert_eq!((export.kind, export.study_id, export.actor.as_str()), (Kind::Export, Some(study), "command line"));
+    assert_eq!(
+        (export.kind, export.study_id, export.actor.as_str()),
+        (AccessKind::Export, Some(study), "command line")
+    );
     assert_eq!(of("gaitwright backup").object, "the whole record");
     let again = stored(&service).await.len();
     service.access.log.write(&service.store, true).await.unwrap();

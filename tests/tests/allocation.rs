@@ -7,7 +7,7 @@ use gaitwright_service::access::{Right, Role};
 use gaitwright_service::studies::lab::{self, NewLabSession};
 use gaitwright_store::allocations::{self, Lot};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::presentations::{self, Kind, NewPresentation};
+use gaitwright_store::presentations::{self, NewPresentation, PresentationKind};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
@@ -233,7 +233,7 @@ async fn sides_of_10_000_pairs_are_balanced_and_independent_of_earlier_pairs() {
             study_id: study,
             rater: "R".to_owned(),
             number,
-            kind: Kind::New,
+            kind: PresentationKind::New,
             pair: (trials[1].id, trials[0].id),
             repeats: None,
             could_have_known: false,

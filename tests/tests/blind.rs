@@ -7,7 +7,7 @@ use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright_service::access::{Right, Role};
 use gaitwright_service::workers::{Assignment, Evaluate};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::presentations::{self, Kind, Presentation};
+use gaitwright_store::presentations::{self, Presentation, PresentationKind};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
@@ -132,7 +132,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, "first").await;
         let shown = shown(&service, study).await;
-        if shown.iter().any(|pair| pair.kind == Kind::Repeat) {
+        if shown.iter().any(|pair| pair.kind == PresentationKind::Repeat) {
             with_repeats = Some((study, shown));
             break;
         }
@@ -142,8 +142,12 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let heard: Vec<_> = feedback.iter().filter(|row| row.by_rater).collect();
     assert_eq!(heard.len(), shown.len());
     assert!(heard.iter().all(|row| !row.could_have_known), "a rater who may not read answers blindly");
-    let repeats = shown.iter().filter(|p| p.kind == Kind::Repeat).count();
-    assert!(repeats > 0 && shown.iter().all(|p| p.kind != Kind::Null), "{repeats} repeats of {}", shown.len());
+    let repeats = shown.iter().filter(|p| p.kind == PresentationKind::Repeat).count();
+    assert!(
+        repeats > 0 && shown.iter().all(|p| p.kind != PresentationKind::Null),
+        "{repeats} repeats of {}",
+        shown.len()
+    );
 
     let figures = format!("/api/v1/studies/{study}/raters");
     let before = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
@@ -339,7 +343,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
         }
         let word = if turn == 0 {
             "cannot_tell"
-        } else if unsafe_trial.is_none() && last.kind == Kind::New {
+        } else if unsafe_trial.is_none() && last.kind == PresentationKind::New {
             unsafe_trial = sides(&service.store, study).await.last().map(|(_, second)| *second);
             "unsafe_second"
         } else {
@@ -354,7 +358,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
     let skipped = shown[0].pair();
     let again = shown[1..].iter().filter(|p| {
         let pair = p.pair();
-        p.kind == Kind::New && (pair == skipped || pair == (skipped.1, skipped.0))
+        p.kind == PresentationKind::New && (pair == skipped || pair == (skipped.1, skipped.0))
     });
     assert_eq!(again.count(), 0);
     service.stop().await;
@@ -428,5 +432,37 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
         let refused = service.post_text(&at(pair, "/retract"), FORM, "").await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
     }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let rater = rater_of(&service, &[study]).await;
+    let (admin, clinician) = (signed_in(&service, Role::Admin).await, signed_in(&service, Role::Clinician).await);
+    let (page, form) = (format!("/studies/{study}/members"), "application/x-www-form-urlencoded");
+    let read = async |who: &As| send(&service, who, &Method::GET, &page, "", "").await.text;
+    assert!(!read(&admin).await.contains("id=\"raters\""), "nobody has compared gaits yet");
+
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
+    let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    send(&service, &rater, &Method::POST, &answer, "application/json", r#"{"answer": "first"}"#).await;
+    let (seen, by_clinician) = (read(&admin).await, read(&clinician).await);
+    assert!(seen.contains("<th scope=\"row\">a rater</th>") && seen.contains("<td>concealed</td>"), "{seen}");
+    assert!(seen.contains("value=\"unblind\"") && !by_clinician.contains("value=\"unblind\""), "{by_clinician}");
+
+    let unblind = "act=unblind&rater=a+rater&reason=adverse+event";
+    let refused = send(&service, &clinician, &Method::POST, &page, form, unblind).await;
+    assert_eq!(refused.status, StatusCode::FORBIDDEN);
+    let without_reason = send(&service, &admin, &Method::POST, &page, form, "act=unblind&rater=a+rater").await;
+    assert_eq!(without_reason.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(read(&admin).await.contains("<td>concealed</td>"), "refused requests reveal nothing");
+    let done = send(&service, &admin, &Method::POST, &page, form, unblind).await;
+    assert_eq!(done.status, StatusCode::SEE_OTHER, "{}", done.text);
+    let seen = read(&admin).await;
+    assert!(seen.contains("<td>1 of 1 (21 % to 100 %)</td>") && !seen.contains("value=\"unblind\""), "{seen}");
     service.stop().await;
 }

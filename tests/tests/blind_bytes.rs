@@ -7,7 +7,7 @@ use axum::http::{HeaderMap, Method, StatusCode};
 use gaitwright_http::openapi;
 use gaitwright_service::access::{Right, Role};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::presentations::{self, Kind, Presentation};
+use gaitwright_store::presentations::{self, Presentation, PresentationKind};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, studies};
@@ -189,7 +189,7 @@ fn named(headers: &HeaderMap) -> Vec<(String, String)> {
 }
 
 /// Answers every pair of a study and says of what kind each was, provided that all of them looked the same.
-async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<Kind> {
+async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<PresentationKind> {
     let study = waiting(service, 40).await;
     let (rater, clinician) = (rater_of(service, &[study]).await, signed_in(service, Role::Clinician).await);
     let mut looks = BTreeSet::new();
@@ -208,7 +208,7 @@ async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<Kind> {
         }
         let shown = presentations::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
         let shown = shown.last().unwrap().clone();
-        if shown.kind == Kind::New {
+        if shown.kind == PresentationKind::New {
             answer_too(service, &clinician, study, &shown).await;
         }
         kinds.push(shown.kind);
@@ -249,7 +249,7 @@ async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
     for _ in 0..8 {
         let kinds = kinds_of_pairs_that_look_the_same(&service).await;
         assert!(kinds.len() > 30, "{kinds:?}");
-        if kinds.contains(&Kind::Repeat) {
+        if kinds.contains(&PresentationKind::Repeat) {
             service.stop().await;
             return;
         }

@@ -12,7 +12,7 @@ use super::foot_contact::FootContact;
 use super::gains::Gains;
 use super::planned_stride::PlannedStride;
 use super::plant::PlantMotion;
-use super::stride_clock::{PhaseVariable, StrideClock};
+use super::stride_clock::{StrideClock, StridePhase};
 use crate::body::{Side, WalkerModel};
 use crate::walking::phase_gradient;
 
@@ -110,7 +110,7 @@ impl<'a> Human<'a> {
         let gradient = &self.gradients[usize::from(!in_left_stance)];
         let along = |q: &[f64; 9]| gradient.iter().zip(&q[2..]).map(|(g, angle)| g * angle).sum::<f64>();
         let planned = self.plan.at(self.clock.time_s);
-        let phase = PhaseVariable {
+        let phase = StridePhase {
             measured: along(&motion.q),
             planned: along(&planned.q),
             planned_rate: along(&planned.qd),

@@ -11,7 +11,7 @@ use super::foot_contact::FootContact;
 use super::gains::Gains;
 use super::planned_stride::PlannedStride;
 use super::sensors::SensorReadings;
-use super::stride_clock::{PhaseVariable, StrideClock};
+use super::stride_clock::{StrideClock, StridePhase};
 use crate::body::{LegGeometry, WalkerModel};
 use crate::device::Device;
 
@@ -73,14 +73,14 @@ impl<'a> Prosthesis<'a> {
         let planned = self.plan.at(self.clock.time_s);
         let (q, qd) = (&planned.q, &planned.qd);
         let phase = if self.clock.time_s < swing_s {
-            PhaseVariable {
+            StridePhase {
                 measured: self.hip_position(measured.thigh_rad, measured.joints_rad),
                 planned: self.hip_position(q[6] - q[2], [q[7], q[8]]),
                 planned_rate: self.hip_position(qd[6] - qd[2], [qd[7], qd[8]]),
                 slowest: SLOWEST_HIP_M_S,
             }
         } else {
-            PhaseVariable {
+            StridePhase {
                 measured: measured.thigh_rad,
                 planned: q[6] - q[2],
                 planned_rate: qd[6] - qd[2],

@@ -11,7 +11,7 @@ const LARGEST_CORRECTION: f64 = 1.0;
 
 /// A phase variable: as measured, and as planned at the time of the clock.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PhaseVariable {
+pub(super) struct StridePhase {
     pub(super) measured: f64,
     pub(super) planned: f64,
     pub(super) planned_rate: f64,
@@ -27,7 +27,7 @@ pub(super) struct StrideClock {
 
 impl StrideClock {
     /// Advances by `period_s`, at most to `end_s`.
-    pub(super) fn advance(&mut self, period_s: f64, end_s: f64, phase: Option<PhaseVariable>) {
+    pub(super) fn advance(&mut self, period_s: f64, end_s: f64, phase: Option<StridePhase>) {
         let correction = phase.filter(|phase| phase.planned_rate.abs() >= phase.slowest).map_or(0.0, |phase| {
             let late_s = (phase.measured - phase.planned) / phase.planned_rate;
             (CORRECTION_RATE_1_S * late_s).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION)
@@ -45,7 +45,7 @@ mod tests {
         for k in 0..1000 {
             let planned = clock.time_s;
             let measured = rate * f64::from(k + 1) * 1e-3;
-            let phase = PhaseVariable { measured, planned, planned_rate: 1.0, slowest };
+            let phase = StridePhase { measured, planned, planned_rate: 1.0, slowest };
             clock.advance(1e-3, 2.0, Some(phase));
         }
         clock.time_s
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn clock_stops_at_the_end_of_its_section_and_never_runs_backwards() {
         let mut clock = StrideClock { time_s: 0.5 };
-        let back = PhaseVariable { measured: -9.0, planned: 0.0, planned_rate: 1.0, slowest: 0.1 };
+        let back = StridePhase { measured: -9.0, planned: 0.0, planned_rate: 1.0, slowest: 0.1 };
         clock.advance(1e-3, 0.6, Some(back));
         assert_eq!(clock.time_s, 0.5);
         for _ in 0..1000 {

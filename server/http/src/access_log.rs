@@ -15,7 +15,7 @@ use gaitwright_service::access::Caller;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::walkable;
 use gaitwright_service::supervise::Task;
-use gaitwright_store::access_log::{self, Access, Kind, Tally};
+use gaitwright_store::access_log::{self, Access, AccessKind, Tally};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, StoreResult, TrialId, commit, now};
 use std::time::Duration;
@@ -183,7 +183,7 @@ pub(super) async fn note(
         caller.map_or_else(|| Actor::anonymous().as_str().to_owned(), |caller| caller.actor.as_str().to_owned());
     let (method, status) = (method.to_string(), response.status().as_u16());
     let access = Access { kind, actor, address, method, route, object, status, named };
-    if kind == Kind::Export {
+    if kind == AccessKind::Export {
         append_export(app.store(), &access, response.extensions().get()).await?;
     } else if app.access.log.count(access) {
         tokio::spawn(keep_writing(app.clone()));
@@ -194,14 +194,14 @@ pub(super) async fn note(
 /// The kind of access. `None` if the response shows no subject data, or refuses a request without a known caller.
 ///
 /// An object that the caller may not see is not found, so 404 is a refusal where the request names an object.
-fn kind_of(route: &str, method: &Method, response: &Response, known: bool, names_object: bool) -> Option<Kind> {
+fn kind_of(route: &str, method: &Method, response: &Response, known: bool, names_object: bool) -> Option<AccessKind> {
     let status = response.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;
     if matches!(status, StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN) && (known || signing_in) {
-        return Some(Kind::Refused);
+        return Some(AccessKind::Refused);
     }
     if status == StatusCode::NOT_FOUND && known && names_object && !NO_SUBJECT_DATA.contains(&route) {
-        return Some(Kind::Refused);
+        return Some(AccessKind::Refused);
     }
     let starts = |name, start: &[u8]| {
         response.headers().get(name).map(HeaderValue::as_bytes).is_some_and(|v| v.starts_with(start))
@@ -213,13 +213,13 @@ fn kind_of(route: &str, method: &Method, response: &Response, known: bool, names
         return None;
     }
     if EXPORTS_BY_POST.contains(&route) && *method == Method::POST {
-        return Some(Kind::Export).filter(|_| !again);
+        return Some(AccessKind::Export).filter(|_| !again);
     }
     if status == StatusCode::NO_CONTENT || NO_SUBJECT_DATA.contains(&route) {
         return None;
     }
     let file = starts(header::CONTENT_DISPOSITION, b"attachment") || starts(header::CONTENT_TYPE, b"text/csv");
-    Some(if file { Kind::Export } else { Kind::View })
+    Some(if file { AccessKind::Export } else { AccessKind::View })
 }
 
 /// The requested address, truncated; the route instead if the address contains a secret.

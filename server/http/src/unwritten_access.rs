@@ -1,7 +1,7 @@
 //! The rows of the access log that are not written yet.
 
 use gaitwright_service::error::Error;
-use gaitwright_store::access_log::{self, Access, Kind, Tally};
+use gaitwright_store::access_log::{self, Access, AccessKind, Tally};
 use gaitwright_store::{Store, StoreResult, access_spool, commit, now};
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -36,7 +36,10 @@ impl AccessLog {
     /// Counts an access. Returns whether the writing task must be started.
     pub(crate) fn count(&self, mut access: Access) -> bool {
         let mut waiting = self.waiting();
-        if waiting.rows.len() >= MOST_WAITING && access.kind == Kind::Refused && !waiting.rows.contains_key(&access) {
+        if waiting.rows.len() >= MOST_WAITING
+            && access.kind == AccessKind::Refused
+            && !waiting.rows.contains_key(&access)
+        {
             "several".clone_into(&mut access.address);
             "several".clone_into(&mut access.object);
             access.named.clear();

@@ -2,7 +2,7 @@
 
 use super::output::tell;
 use gaitwright_service::error::Error;
-use gaitwright_store::access_log::{Access, Kind};
+use gaitwright_store::access_log::{Access, AccessKind};
 use gaitwright_store::access_spool;
 use gaitwright_store::audit::Actor;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// the record, as on a read-only medium.
 pub(super) fn note_export(database: &Path, command: &str, object: &str, named: Vec<String>) {
     let access = Access {
-        kind: Kind::Export,
+        kind: AccessKind::Export,
         actor: Actor::terminal().as_str().to_owned(),
         address: String::new(),
         method: String::new(),

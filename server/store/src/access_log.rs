@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = AccessKind)]
-pub enum Kind {
+pub enum AccessKind {
     /// The data was shown.
     View,
     /// The data was exported as a file.
@@ -25,7 +25,7 @@ pub enum Kind {
     Refused,
 }
 
-impl Kind {
+impl AccessKind {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -36,7 +36,7 @@ impl Kind {
     }
 }
 
-impl FromStr for Kind {
+impl FromStr for AccessKind {
     type Err = super::StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
         [Self::View, Self::Export, Self::Refused]
@@ -50,7 +50,7 @@ impl FromStr for Kind {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Access {
     /// Kind of the access.
-    pub kind: Kind,
+    pub kind: AccessKind,
     /// Who made the request.
     pub actor: String,
     /// Client address; empty for the command line.
@@ -90,7 +90,7 @@ pub struct AccessRow {
     /// Number of identical accesses within a minute.
     pub times: u32,
     /// Kind of the access.
-    pub kind: Kind,
+    pub kind: AccessKind,
     /// Who made the request.
     pub actor: String,
     /// Client address; empty for the command line.

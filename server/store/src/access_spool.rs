@@ -103,13 +103,13 @@ impl Spool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::access_log::Kind;
+    use super::super::access_log::AccessKind;
     use super::*;
 
     fn access(object: String) -> Access {
         let text = |text: &str| text.to_owned();
         Access {
-            kind: Kind::Export,
+            kind: AccessKind::Export,
             actor: text("command line"),
             address: String::new(),
             method: String::new(),

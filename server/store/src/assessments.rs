@@ -94,7 +94,7 @@ impl Assessment {
 
 /// An assessment to write.
 #[derive(Debug, Clone, Copy)]
-pub struct NewAssessment<'a> {
+pub struct UnsavedAssessment<'a> {
     /// The study.
     pub study: StudyId,
     /// The two gaits.
@@ -111,7 +111,7 @@ pub struct NewAssessment<'a> {
 ///
 /// # Errors
 /// A violated constraint or trigger, or errors of the database.
-pub async fn insert(db: &mut Connection, new: &NewAssessment<'_>) -> StoreResult<AssessmentId> {
+pub async fn insert(db: &mut Connection, new: &UnsavedAssessment<'_>) -> StoreResult<AssessmentId> {
     let id = AssessmentId::fresh();
     sqlx::query(
         "insert into assessments (id, study_id, first, second, answer, source, author, note, feedback_id, created_at) \

@@ -103,7 +103,7 @@ impl LabSession {
 
 /// A session to add.
 #[derive(Debug, Clone)]
-pub struct NewLabSession<'a> {
+pub struct UnsavedLabSession<'a> {
     /// Identifier of the study.
     pub study_id: StudyId,
     /// Number in the study, from 1.
@@ -120,7 +120,7 @@ pub struct NewLabSession<'a> {
 ///
 /// # Errors
 /// A violated constraint; errors of the database.
-pub async fn insert(db: &mut Connection, actor: &Actor, new: &NewLabSession<'_>) -> StoreResult<LabSessionId> {
+pub async fn insert(db: &mut Connection, actor: &Actor, new: &UnsavedLabSession<'_>) -> StoreResult<LabSessionId> {
     let id = LabSessionId::fresh();
     sqlx::query(
         "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, notes, actor, created_at) \

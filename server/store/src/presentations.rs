@@ -17,7 +17,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = PresentationKind)]
-pub enum Kind {
+pub enum PresentationKind {
     /// The pending comparison of the study.
     New,
     /// Repetition of an earlier pair, to measure the agreement of the rater.
@@ -26,7 +26,7 @@ pub enum Kind {
     Null,
 }
 
-impl Kind {
+impl PresentationKind {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -37,7 +37,7 @@ impl Kind {
     }
 }
 
-impl FromStr for Kind {
+impl FromStr for PresentationKind {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
         [Self::New, Self::Repeat, Self::Null]
@@ -168,7 +168,7 @@ pub struct Presentation {
     /// Number for this rater in this study, from 1.
     pub number: u32,
     /// Why it was shown.
-    pub kind: Kind,
+    pub kind: PresentationKind,
     /// The newer gait, independent of its side.
     pub one: TrialId,
     /// The other gait.
@@ -211,7 +211,7 @@ pub struct NewPresentation {
     /// Number for this rater in this study, from 1.
     pub number: u32,
     /// Why it is shown.
-    pub kind: Kind,
+    pub kind: PresentationKind,
     /// The two gaits, the newer one first.
     pub pair: (TrialId, TrialId),
     /// The presentation that it repeats.

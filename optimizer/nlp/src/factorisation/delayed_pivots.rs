@@ -23,7 +23,7 @@ const SCALING_SWEEPS: usize = 3;
 
 /// Structure of a front.
 #[derive(Debug, Default)]
-struct Front {
+struct PlainFront {
     /// The indices assigned to this front.
     own: Vec<usize>,
     /// Later indices that it couples with.
@@ -50,7 +50,7 @@ struct DelayedFactor {
 pub(super) struct DelayedPivots {
     column_starts: Vec<usize>,
     row_indices: Vec<usize>,
-    fronts: Vec<Front>,
+    fronts: Vec<PlainFront>,
     factors: Vec<DelayedFactor>,
     scale: Vec<f64>,
     largest: Vec<f64>,
@@ -69,7 +69,8 @@ impl DelayedPivots {
         for (next, (f, i)) in members.iter().enumerate().flat_map(|(f, m)| m.iter().map(move |&i| (f, i))).enumerate() {
             (front_of[i], rank[i]) = (f, next);
         }
-        let mut fronts: Vec<Front> = members.into_iter().map(|own| Front { own, ..Front::default() }).collect();
+        let mut fronts: Vec<PlainFront> =
+            members.into_iter().map(|own| PlainFront { own, ..PlainFront::default() }).collect();
         for j in 0..order {
             for q in column_starts[j]..column_starts[j + 1] {
                 let i = row_indices[q];

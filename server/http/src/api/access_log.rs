@@ -14,7 +14,7 @@ use serde::Deserialize;
 /// Filter of rows.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Filter {
+pub(super) struct AccessLogFilter {
     #[serde(default)]
     contains: SearchText,
     subject_id: Option<SubjectId>,
@@ -38,10 +38,10 @@ pub(super) struct Filter {
 pub(super) async fn list(
     _: Authorized<Administer>,
     State(app): State<AppState>,
-    paging: Paging<i64, Filter>,
+    paging: Paging<i64, AccessLogFilter>,
 ) -> Result<Json<Page<AccessRow>>, Refusal> {
     app.access.log.write(app.store(), true).await?;
-    let Filter { contains, subject_id } = &paging.filter;
+    let AccessLogFilter { contains, subject_id } = &paging.filter;
     let mut reader = app.read().await?;
     let rows = access_log::page(&mut reader, contains.as_str(), *subject_id, paging.after, paging.to_read()).await?;
     Ok(Json(paging.page(rows, |row| row.seq)?.map(AccessRow::from)))

@@ -14,7 +14,7 @@ use serde::Deserialize;
 /// Filter of rows.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Filter {
+pub(super) struct AuditFilter {
     #[serde(default)]
     contains: SearchText,
 }
@@ -34,7 +34,7 @@ pub(super) struct Filter {
 pub(super) async fn list(
     _: Authorized<Administer>,
     State(app): State<AppState>,
-    paging: Paging<i64, Filter>,
+    paging: Paging<i64, AuditFilter>,
 ) -> Result<Json<Page<AuditRow>>, Refusal> {
     let contains = paging.filter.contains.as_str();
     let rows = audit::page(&mut *app.read().await?, contains, paging.after, paging.to_read()).await?;

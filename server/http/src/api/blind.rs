@@ -14,7 +14,7 @@ use axum::response::Response;
 use gaitwright_service::access::{Administer, Rate, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, Answered, RaterAnswer, RaterReliability, UnblindedPair};
-use gaitwright_store::{StudyId, allocations, gaits, presentations, studies};
+use gaitwright_store::{StudyId, gaits, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -81,7 +81,7 @@ pub(super) struct BlindMotion {
 /// Motion of a pair.
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Side {
+pub(super) enum PairSide {
     First,
     Second,
 }
@@ -96,7 +96,7 @@ pub(super) enum Side {
     tag = "blind",
     params(
         ("token" = String, Path, description = "Token of the pair"),
-        ("side" = inline(Side), Path, description = "Which motion of the pair")
+        ("side" = inline(PairSide), Path, description = "Which motion of the pair")
     ),
     responses((status = 200, description = "Motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["rate"]), ("session" = ["rate"])),
@@ -104,14 +104,14 @@ pub(super) enum Side {
 pub(super) async fn motion(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
-    Path((token, side)): Path<(String, Side)>,
+    Path((token, side)): Path<(String, PairSide)>,
 ) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
     let shown = blind::own_to_show(&mut reader, &authorized.caller, &token).await?;
     let (first, second) = shown.shown();
     let trial = match side {
-        Side::First => first,
-        Side::Second => second,
+        PairSide::First => first,
+        PairSide::Second => second,
     };
     let gait = gaits::get(&mut reader, trial).await;
     drop(reader);
@@ -172,9 +172,7 @@ pub(super) async fn raters(
 ) -> Result<Json<Page<RaterReliability>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let shown = presentations::of_study(&mut reader, id).await?;
-    let sides = allocations::of_unblinded_raters(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(blind::figures(&shown, &sides))?))
+    Ok(Json(paging.cut_by_place(blind::reliability(&mut reader, id).await?)?))
 }
 
 /// Rater to unblind, with the reason.

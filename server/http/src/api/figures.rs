@@ -20,7 +20,7 @@ use serde::Deserialize;
 
 /// A second study or trial for comparison.
 #[derive(Debug, Deserialize)]
-pub(super) struct ComparedWith<T> {
+pub(super) struct OtherOverlaid<T> {
     other: Option<Named<T>>,
 }
 
@@ -43,7 +43,7 @@ pub(super) async fn of_study(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(ComparedWith { other }): Params<ComparedWith<StudyId>>,
+    Params(OtherOverlaid { other }): Params<OtherOverlaid<StudyId>>,
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = study::of_study(&mut app, id, other).await?.into_figures();
@@ -71,7 +71,7 @@ pub(super) async fn of_trial(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(ComparedWith { other }): Params<ComparedWith<TrialId>>,
+    Params(OtherOverlaid { other }): Params<OtherOverlaid<TrialId>>,
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = match other {

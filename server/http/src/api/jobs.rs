@@ -91,7 +91,7 @@ impl Job {
 /// Filter of jobs.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Filter {
+pub(super) struct JobFilter {
     kind: Option<JobKind>,
     study_id: Option<StudyId>,
 }
@@ -114,9 +114,9 @@ pub(super) struct Filter {
 pub(super) async fn list(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
-    paging: Paging<JobId, Filter>,
+    paging: Paging<JobId, JobFilter>,
 ) -> Result<Json<Page<Job>>, Refusal> {
-    let Filter { kind, study_id } = paging.filter;
+    let JobFilter { kind, study_id } = paging.filter;
     let mut all = job_status::open(&mut *app.read().await?, app.runners(), authorized.caller.reach()).await?;
     all.retain(|job| {
         kind.is_none_or(|kind| kind == job.id.kind()) && study_id.is_none_or(|study| Some(study) == job.study)

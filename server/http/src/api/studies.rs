@@ -43,7 +43,7 @@ impl StudyView {
 /// Filter of studies.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Filter {
+pub(super) struct StudyQuery {
     subject_id: Option<SubjectId>,
     #[serde(default)]
     text: String,
@@ -75,11 +75,11 @@ pub(super) struct Filter {
 pub(super) async fn list(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
-    paging: Paging<StudyId, Filter>,
+    paging: Paging<StudyId, StudyQuery>,
 ) -> Result<Json<Page<StudyView>>, Refusal> {
     let mut reader = app.read().await?;
     let (before, limit) = (paging.after, paging.to_read());
-    let Filter { subject_id: subject, text, tag, state, archived } = paging.filter.clone();
+    let StudyQuery { subject_id: subject, text, tag, state, archived } = paging.filter.clone();
     let filter = StudyFilter { subject, text, tag, state, archived: Some(archived), before, limit };
     let found = studies::page(&mut reader, authorized.caller.reach(), &filter).await?;
     let (found, next) = paging.page(found, |study| study.id)?.into_parts();

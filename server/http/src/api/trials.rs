@@ -27,7 +27,7 @@ use std::collections::HashMap;
 /// Filter and order of trials.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Filter {
+pub(super) struct TrialQuery {
     state: Option<TrialState>,
     sort: Option<String>,
 }
@@ -62,7 +62,7 @@ pub(super) async fn of_study(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    paging: Paging<u32, Filter>,
+    paging: Paging<u32, TrialQuery>,
 ) -> Result<Json<Page<Trial>>, Refusal> {
     let (sort, descending) = order(paging.filter.sort.as_deref().unwrap_or("number"))?;
     let mut reader = app.read().await?;

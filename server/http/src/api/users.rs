@@ -109,7 +109,7 @@ pub(super) async fn create(
 
 /// One-time sign-in link.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Link {
+pub(super) struct SignInLink {
     /// Path of the link, which is shown once and valid for a day.
     path: String,
 }
@@ -123,7 +123,7 @@ pub(super) struct Link {
     operation_id = "create_sign_in_link",
     tag = "access",
     params(("id" = UserId, Path, description = "Identifier of the user")),
-    responses((status = 200, description = "Link, shown once", body = Link)),
+    responses((status = 200, description = "Link, shown once", body = SignInLink)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -134,7 +134,7 @@ pub(super) async fn link(
 ) -> Result<Response, Refusal> {
     let mut writer = request.begin_secret(&app).await?;
     let secret = user_administration::link(&mut writer, &request.actor, id).await?;
-    request.done(&app, writer, &Link { path: format!("/sign-in/{secret}") }).await
+    request.done(&app, writer, &SignInLink { path: format!("/sign-in/{secret}") }).await
 }
 
 /// Disable a user

@@ -201,7 +201,7 @@ async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerFo
 
 /// The form to retract an answer.
 #[derive(Debug, Deserialize)]
-pub(super) struct Retract {
+pub(super) struct RetractForm {
     saved: Recorded,
     author: String,
     reason: String,
@@ -212,7 +212,7 @@ pub(super) async fn retract(
     authorized: Authorized<access::Answer>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, access::Answer>,
-    Form(form): Form<Retract>,
+    Form(form): Form<RetractForm>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
     let author = Some(form.author.as_str());

@@ -1,7 +1,7 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
 use super::lab;
-use super::measurement_forms::{EmgFields, FilterFields, Forms, MotionFields, Preview};
+use super::measurement_forms::{EmgFields, FilterFields, Forms, MeasurementPreview, MotionFields};
 use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
@@ -61,14 +61,14 @@ pub(super) async fn motion(
 }
 
 /// Reads and draws the file of the form on the thread pool. Nothing is stored.
-async fn previewed(app: &mut AppState, fields: &EmgFields) -> Result<Preview, Error> {
+async fn previewed(app: &mut AppState, fields: &EmgFields) -> Result<MeasurementPreview, Error> {
     let new = fields.read()?;
     let draw = move |_: &OnPool| {
         let preview = new.preview()?;
         let charts = lab_charts::preview(&preview).iter().map(PageChart::new).collect();
         let EmgPreview { columns, strides, refused, .. } = preview;
         let refused = refused.as_ref().map(form_errors::in_words);
-        Ok::<_, Error>(Preview { columns, channels: lab_charts::muscles(), charts, strides, refused })
+        Ok::<_, Error>(MeasurementPreview { columns, channels: lab_charts::muscles(), charts, strides, refused })
     };
     app.compute(draw).await?
 }

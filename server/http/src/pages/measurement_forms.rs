@@ -226,12 +226,12 @@ pub(super) struct Forms {
     /// The refused form: `emg`, `motion` or `filters`.
     pub(super) open: &'static str,
     /// The preview of the EMG recording in the form.
-    pub(super) preview: Option<Preview>,
+    pub(super) preview: Option<MeasurementPreview>,
 }
 
 /// A preview of an EMG recording, as the page shows it.
 #[derive(Debug)]
-pub(super) struct Preview {
+pub(super) struct MeasurementPreview {
     pub(super) columns: Vec<String>,
     /// Each channel and its muscle.
     pub(super) channels: [(&'static str, &'static str); 6],

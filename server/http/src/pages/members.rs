@@ -1,4 +1,4 @@
-//! The access page of a study: its members, and the forms that add and remove them.
+//! The access page of a study: its members, the forms that add and remove them, and the reliability of its raters.
 
 use super::users::origin;
 use crate::AppState;
@@ -17,6 +17,7 @@ use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::blind::{self, RaterReliability, Share};
 use gaitwright_service::studies::membership::{self, NewMember, StudyAccess};
 use gaitwright_store::members::{Member, MemberKind};
 use gaitwright_store::studies::Study;
@@ -30,6 +31,8 @@ struct MembersPage {
     access: StudyAccess,
     /// Users and tokens that can be added: value and label.
     candidates: Vec<(String, String)>,
+    /// Everyone who compared gaits blind. Empty if the subject withdrew consent.
+    raters: Vec<RaterReliability>,
     may_run: bool,
     may_administer: bool,
     /// Whether the subject withdrew consent, so that members can only be removed.
@@ -44,6 +47,16 @@ struct MembersPage {
 impl MembersPage {
     fn role(member: &Member) -> &'static str {
         member.role.as_ref().map_or("token", format::role)
+    }
+
+    /// `6 of 8 (41 % to 93 %)`, the interval with a confidence of 95 %.
+    fn share(share: &Share) -> String {
+        match (share.low, share.high) {
+            (Some(low), Some(high)) => {
+                format!("{} of {} ({} to {})", share.count, share.of, format::percent(low), format::percent(high))
+            }
+            _ => "–".to_owned(),
+        }
     }
 }
 
@@ -72,6 +85,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
     let withdrawn = consents::is_withdrawn(&mut reader, id).await?;
     let candidates =
         if may_run && !withdrawn { membership::candidates(&mut reader, &access.members).await? } else { Vec::new() };
+    let raters = if withdrawn { Vec::new() } else { blind::reliability(&mut reader, id).await? };
     let candidates = candidates.into_iter().map(|(kind, name, what)| {
         let kind = if kind == MemberKind::User { "user" } else { "token" };
         (format!("{kind} {name}"), format!("{name} ({what})"))
@@ -80,6 +94,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
         study,
         access,
         candidates: candidates.collect(),
+        raters,
         may_run,
         may_administer: caller.may(Administer::NEEDED),
         withdrawn,
@@ -102,6 +117,12 @@ pub(super) struct MembersForm {
     /// The name of a rater to invite.
     #[serde(default)]
     name: String,
+    /// The rater to unblind.
+    #[serde(default)]
+    rater: String,
+    /// Why the rater is unblinded.
+    #[serde(default)]
+    reason: String,
 }
 
 /// `POST /studies/{id}/members`. Answers with the page instead of a redirect, because a link is not stored and can be shown
@@ -175,6 +196,11 @@ async fn act(
             Ok(Some((user.name, secret)))
         }
         "invite" => Err(Error::Forbidden("Only administrators can create sign-in links.".to_owned())),
-        other => Err(Error::invalid("act", other, "add, remove, restrict, open or invite")),
+        "unblind" if caller.may(Administer::NEEDED) => {
+            blind::unblind(writer, caller, study, &asked.rater, &asked.reason).await?;
+            Ok(None)
+        }
+        "unblind" => Err(Error::Forbidden("Only administrators can unblind raters.".to_owned())),
+        other => Err(Error::invalid("act", other, "add, remove, restrict, open, invite or unblind")),
     }
 }

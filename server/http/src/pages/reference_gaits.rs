@@ -87,11 +87,11 @@ struct ReferenceGaitsPage {
     fields: ReferenceGaitFields,
     refused: Option<FieldError>,
     /// The preview of the recording in the form.
-    preview: Option<Preview>,
+    preview: Option<JointAnglePreview>,
 }
 
 /// A preview of a recording, as the page shows it.
-struct Preview {
+struct JointAnglePreview {
     charts: Vec<PageChart>,
     /// The legend of these charts.
     legend: Vec<(String, String)>,
@@ -102,7 +102,7 @@ struct Preview {
     refused: Option<String>,
 }
 
-impl Preview {
+impl JointAnglePreview {
     fn of(new: &NewReferenceGait) -> Result<Self, Error> {
         let preview = new.preview()?;
         let mut charts: Vec<PageChart> = reference::preview(&preview).iter().map(PageChart::new).collect();
@@ -175,7 +175,7 @@ pub(super) async fn import(
 ) -> Result<Response, PageError> {
     if fields.act == "preview" {
         let preview = match fields.read() {
-            Ok(new) => app.compute(move |_| Preview::of(&new)).await.map_err(Error::from)?,
+            Ok(new) => app.compute(move |_| JointAnglePreview::of(&new)).await.map_err(Error::from)?,
             Err(error) => Err(error),
         };
         let (status, preview, refused) = match preview {

@@ -1,6 +1,6 @@
 //! Rows of the access log.
 
-use gaitwright_store::access_log::{self, Kind};
+use gaitwright_store::access_log::{self, AccessKind};
 use gaitwright_store::{Instant, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -17,7 +17,7 @@ pub(crate) struct AccessRow {
     /// Number of identical accesses within a minute.
     times: u32,
     /// Kind of the access.
-    kind: Kind,
+    kind: AccessKind,
     /// Who made the request.
     actor: String,
     /// Client address; empty for the command line.

@@ -74,7 +74,7 @@ pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) ->
     let GivenJudgement { study, pair, judgement, attribution, .. } = statement;
     let id = assessments::insert(
         writer,
-        &assessments::NewAssessment { study, pair, answer: judgement.try_into()?, attribution, feedback: heard },
+        &assessments::UnsavedAssessment { study, pair, answer: judgement.try_into()?, attribution, feedback: heard },
     )
     .await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "assessment_id": id })).await?;

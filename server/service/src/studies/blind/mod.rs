@@ -14,5 +14,5 @@ pub use knowledge::{could_have_known, sees_or_saw_gaits};
 pub use next_pair::{Drawn, draw};
 pub use rater_answers::{Answered, RaterAnswer, answer, next, retract};
 pub use rater_answers::{can_be_retracted, own, own_to_show, sides_in_words};
-pub use rater_reliability::{RaterReliability, Share, figures};
+pub use rater_reliability::{RaterReliability, Share, of_study as reliability};
 pub use rater_unblinding::{UnblindedPair, unblind};

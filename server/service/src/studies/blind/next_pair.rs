@@ -1,7 +1,7 @@
 //! Chooses the pair that a rater is shown next, as a pure function of the pending comparison, earlier presentations and
 //! a random number of the operating system. `store::allocations` draws the sides.
 
-use gaitwright_store::presentations::{Judgement, Kind, Presentation};
+use gaitwright_store::presentations::{Judgement, Presentation, PresentationKind};
 use gaitwright_store::{PresentationId, TrialId};
 
 /// One in this many presentations repeats an earlier pair.
@@ -11,7 +11,7 @@ const REPEAT_ONE_IN: u64 = 10;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Drawn {
     /// Why it is shown.
-    pub kind: Kind,
+    pub kind: PresentationKind,
     /// The two gaits, the newer one first.
     pub pair: (TrialId, TrialId),
     /// The earlier presentation that it repeats.
@@ -23,21 +23,22 @@ pub struct Drawn {
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
 /// earlier presentations of this rater; `reported` lists trials with a safety report in force.
 pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], reported: &[TrialId]) -> Drawn {
-    let retracted = before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != Kind::Null);
+    let retracted =
+        before.last().filter(|last| last.answer == Some(Judgement::Retracted) && last.kind != PresentationKind::Null);
     if let Some(last) = retracted.filter(|last| !last.has_one_of(reported)) {
         // A rater who confused the sides must find them unchanged.
         let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
         let is_question = is_same_pair(last.pair(), question);
-        if last.kind == Kind::Repeat || is_question {
+        if last.kind == PresentationKind::Repeat || is_question {
             return again;
         }
     }
-    let new = Drawn { kind: Kind::New, pair: question, repeats: None, again: None };
+    let new = Drawn { kind: PresentationKind::New, pair: question, repeats: None, again: None };
     if !lot.is_multiple_of(REPEAT_ONE_IN) {
         return new;
     }
     let repeat = |earlier: &Presentation| Drawn {
-        kind: Kind::Repeat,
+        kind: PresentationKind::Repeat,
         pair: earlier.pair(),
         repeats: Some(earlier.id),
         again: None,
@@ -48,7 +49,7 @@ pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], rep
 /// An earlier pair with a plain answer that has not been repeated.
 fn repeatable<'a>(before: &'a [Presentation], reported: &[TrialId], lot: u64) -> Option<&'a Presentation> {
     let plain = |shown: &&Presentation| {
-        shown.kind == Kind::New
+        shown.kind == PresentationKind::New
             && shown.answer.is_some_and(is_plain)
             && !shown.has_one_of(reported)
             && !before.iter().any(|other| other.repeats == Some(shown.id))
@@ -103,14 +104,14 @@ mod tests {
             let drawn = draw(u64::from(number) * 7, question(), &before, &[]);
             if let Some(repeats) = drawn.repeats {
                 let earlier = before.iter().find(|shown| shown.id == repeats).unwrap();
-                assert_eq!((drawn.kind, drawn.pair), (Kind::Repeat, earlier.pair()));
+                assert_eq!((drawn.kind, drawn.pair), (PresentationKind::Repeat, earlier.pair()));
                 assert!(!before.iter().any(|shown| shown.repeats == Some(repeats)));
             }
             before.push(shown(number, drawn));
         }
-        let repeats = before.iter().filter(|shown| shown.kind == Kind::Repeat).count();
+        let repeats = before.iter().filter(|shown| shown.kind == PresentationKind::Repeat).count();
         assert_eq!(repeats, 40);
-        assert!(before.iter().all(|shown| shown.kind != Kind::Null));
+        assert!(before.iter().all(|shown| shown.kind != PresentationKind::Null));
     }
 
     #[test]
@@ -138,7 +139,7 @@ mod tests {
         let drawn = draw(1, question(), &[], &[]);
         let before: Vec<Presentation> = (1..=50).map(|number| shown(number, drawn)).collect();
         for lot in 0..50 {
-            assert_eq!(draw(10 * lot, question(), &before, &[drawn.pair.1]).kind, Kind::New);
+            assert_eq!(draw(10 * lot, question(), &before, &[drawn.pair.1]).kind, PresentationKind::New);
         }
     }
 }

@@ -15,7 +15,9 @@ use crate::studies::walkable;
 use gaitwright_store::allocations::{self, Lot, Sided};
 use gaitwright_store::audit;
 use gaitwright_store::feedback::{self, Attribution, Source};
-use gaitwright_store::presentations::{self, Judgement, Kind, NewPairAnswer, NewPresentation, Presentation};
+use gaitwright_store::presentations::{
+    self, Judgement, NewPairAnswer, NewPresentation, Presentation, PresentationKind,
+};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{
     Connection, LentWriter, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
@@ -87,7 +89,8 @@ pub async fn next<'a>(
     let reported = reported_among(&mut writer, &safety_reports, own.iter().map(Presentation::pair)).await?;
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
         // An imported study does not have the sides of pairs that were still blinded.
-        let settled = open.kind == Kind::New && is_answered(&mut writer, study, open.pair(), &caller.name).await?;
+        let settled =
+            open.kind == PresentationKind::New && is_answered(&mut writer, study, open.pair(), &caller.name).await?;
         if !settled
             && walkable::are_walkable(&mut writer, open.pair()).await?
             && allocations::is_included(&mut writer, open.id).await?
@@ -198,12 +201,12 @@ pub async fn answer(
         return Ok((shown.study_id, Answered { number: shown.number }));
     }
     // A presentation of the same gait twice, as in older records, states no preference.
-    let heard = if shown.kind == Kind::Null {
+    let heard = if shown.kind == PresentationKind::Null {
         None
     } else {
         let fields = ("first", "second");
         let (study, pair) = (shown.study_id, shown.pair());
-        let again = if shown.kind == Kind::Repeat { Again::Meant } else { Again::Refused };
+        let again = if shown.kind == PresentationKind::Repeat { Again::Meant } else { Again::Refused };
         let statement = GivenJudgement { study, pair, fields, judgement, attribution, again };
         preference::record(writer, statement).await.map_err(without_gaits)?
     };

@@ -1,8 +1,10 @@
 //! Reliability of raters: agreement with their own earlier answers, position bias, and unblinded answers.
 
 use super::next_pair::{is_plain, is_same_pair};
-use gaitwright_store::allocations::Sided;
-use gaitwright_store::presentations::{Judgement, Kind, Presentation};
+use crate::error::Error;
+use gaitwright_store::allocations::{self, Sided};
+use gaitwright_store::presentations::{self, Judgement, Presentation, PresentationKind};
+use gaitwright_store::{Connection, StudyId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -58,8 +60,18 @@ pub struct RaterReliability {
     pub could_have_known: u32,
 }
 
+/// The reliability of every rater of a study, by name.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> Result<Vec<RaterReliability>, Error> {
+    let shown = presentations::of_study(db, study).await?;
+    let sides = allocations::of_unblinded_raters(db, study).await?;
+    Ok(figures(&shown, &sides))
+}
+
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-pub fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterReliability> {
+fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterReliability> {
     let mut raters: Vec<&str> = presentations.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
@@ -87,7 +99,8 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterReliabil
 fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
     let mut own = sides.iter().filter(|sided| sided.presentation.rater == rater).peekable();
     own.peek()?;
-    let blind = own.filter(|sided| !sided.presentation.could_have_known && sided.presentation.kind != Kind::Null);
+    let blind =
+        own.filter(|sided| !sided.presentation.could_have_known && sided.presentation.kind != PresentationKind::Null);
     let answers: Vec<Judgement> = blind.filter_map(Sided::answer).collect();
     let count =
         |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
@@ -98,7 +111,7 @@ fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
 /// Compares each plain answer with the previous one to the same pair.
 fn repeats_agree(own: &[&Presentation]) -> Share {
     let plain = |shown: &&Presentation| {
-        !shown.could_have_known && shown.kind != Kind::Null && shown.answer.is_some_and(is_plain)
+        !shown.could_have_known && shown.kind != PresentationKind::Null && shown.answer.is_some_and(is_plain)
     };
     let answered: Vec<&Presentation> = own.iter().copied().filter(plain).collect();
     let (mut agree, mut of) = (0_u32, 0_u32);

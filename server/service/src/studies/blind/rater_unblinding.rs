@@ -4,7 +4,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::allocations::{self, Sided};
-use gaitwright_store::presentations::{self, Judgement, Kind};
+use gaitwright_store::presentations::{self, Judgement, PresentationKind};
 use gaitwright_store::{Instant, PresentationId, StudyId, TrialId, Writer, audit, consents, studies};
 use serde::Serialize;
 use serde_json::json;
@@ -23,7 +23,7 @@ pub struct UnblindedPair {
     /// Number of the pair for this rater in this study, from 1.
     pub number: u32,
     /// Why it was shown.
-    pub kind: Kind,
+    pub kind: PresentationKind,
     /// Trial shown first.
     pub shown_first: TrialId,
     /// Trial shown second.

@@ -157,7 +157,7 @@ pub async fn plan(
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
     walkable::admit_pair(writer, study, ("trial_a", "trial_b"), (new.trial_a, new.trial_b)).await?;
     let before = lab_sessions::of_study(writer, study).await?.len();
-    let row = lab_sessions::NewLabSession {
+    let row = lab_sessions::UnsavedLabSession {
         study_id: study,
         number: u32::try_from(before).unwrap_or(u32::MAX).saturating_add(1),
         trial_a: new.trial_a,

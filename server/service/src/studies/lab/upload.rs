@@ -324,11 +324,11 @@ pub struct UploadedFile {
 pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<UploadedFile, Error> {
     /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
-    struct Reading {
+    struct ReadingFormat {
         format: MeasurementFormat,
     }
     let recording = measurement_files::get(db, id).await?;
-    let (Reading { format }, file) = measurement_files::file(db, id).await?;
+    let (ReadingFormat { format }, file) = measurement_files::file(db, id).await?;
     Ok(UploadedFile { recording, format, file })
 }
 
