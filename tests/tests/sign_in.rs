@@ -273,6 +273,25 @@ async fn cookie_of_a_known_browser_allows_no_more_guesses_than_many_networks() {
 }
 
 #[tokio::test]
+async fn failures_of_a_network_begin_with_the_first_failure_after_a_success() {
+    let (_folder, service) = service().await;
+    let network = "192.0.2.7";
+    let mut writer = service.store.write().await.unwrap();
+    let success = now();
+    sign_in_failures::count(&mut writer, network, success, true).await.unwrap();
+    sign_in_failures::uncount(&mut writer, network).await.unwrap();
+    let failure = now();
+    for at in [failure, now()] {
+        sign_in_failures::count(&mut writer, network, at, false).await.unwrap();
+    }
+    let found = sign_in_failures::of_network(&mut writer, network).await.unwrap().unwrap();
+    assert!(success < failure);
+    assert_eq!((found.attempts, found.first_at), (2, failure));
+    drop(writer);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn ten_thousand_aborted_sign_ins_do_not_erase_the_failures_of_an_account() {
     let (folder, service) = service().await;
     with_password(&service, "Ada", Role::Admin, RIGHT).await;

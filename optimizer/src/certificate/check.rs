@@ -32,7 +32,7 @@ impl Check {
 
     /// The limit as text.
     pub fn limit_in_words(&self) -> String {
-        self.limit.map_or_else(|| "no limit (reported only)".to_owned(), |limit| self.in_unit(limit))
+        self.limit.map_or_else(|| "no limit; reported only".to_owned(), |limit| self.in_unit(limit))
     }
 
     /// A figure with the unit, if there is one.

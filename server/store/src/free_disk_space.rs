@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Default reserve.
-pub const DEFAULT_RESERVE_BYTES: u64 = 500 << 20;
+pub const DEFAULT_RESERVE_BYTES: u64 = 500_000_000;
 /// An ordinary change takes less.
-const ONE_CHANGE_BYTES: u64 = 1 << 20;
+const ONE_CHANGE_BYTES: u64 = 1_000_000;
 
 /// The disk of the record.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ impl Space {
         let reserve = self.reserve.load(Ordering::Relaxed).max(ONE_CHANGE_BYTES);
         match self.free_bytes() {
             Some(free) if free < reserve.saturating_add(bytes) => {
-                Err(StoreError::NearlyFull { free_mb: free >> 20, reserve_mb: reserve >> 20 })
+                Err(StoreError::NearlyFull { free_mb: free / 1_000_000, reserve_mb: reserve / 1_000_000 })
             }
             _ => Ok(()),
         }

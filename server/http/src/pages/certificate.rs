@@ -83,7 +83,7 @@ impl FormattedCheck {
         };
         Self {
             value: in_unit(check.value, "not determined"),
-            limit: in_unit(check.limit, "no limit (reported only)"),
+            limit: in_unit(check.limit, "no limit; reported only"),
             name: check.name,
             place: check.place,
         }
