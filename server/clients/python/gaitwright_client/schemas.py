@@ -1393,13 +1393,6 @@ class LinearAlgebra(TypedDict):
     substitutions: int
 
 
-class Link(TypedDict):
-    """One-time sign-in link."""
-
-    # Path of the link, which is shown once and valid for a day.
-    path: str
-
-
 class _MeRequired(TypedDict):
     # Name of the user or the token.
     name: str
@@ -2427,6 +2420,13 @@ class Session(_SessionRequired, total=False):
     address: Optional[str]
     # User agent of the browser.
     browser: Optional[str]
+
+
+class SignInLink(TypedDict):
+    """One-time sign-in link."""
+
+    # Path of the link, which is shown once and valid for a day.
+    path: str
 
 
 class _SolveAttemptRequired(TypedDict):
