@@ -220,7 +220,7 @@ class ActiveConstraint(TypedDict):
     place: str
 
 
-class Answered(TypedDict):
+class AnswerReceipt(TypedDict):
     """Confirmation of a rater's answer. The response is stored, and sent again if the request is repeated. It omits
     the gaits and the answer, because others who can read the study must not learn which gait was shown on which
     side.
@@ -275,7 +275,7 @@ class _AttemptResultRequired(TypedDict):
     # How the solve ended.
     status: SolveStatus
     # Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
-    taken: bool
+    used: bool
     # Name of the worker.
     worker: str
 
@@ -366,6 +366,17 @@ class BoundAtLimit(TypedDict):
     bound: str
     # Domains in which the bound is active; `stride` for a constraint on the whole stride.
     domains: list[str]
+    # What it limits, with its unit.
+    meaning: str
+    # Value of the bound in the problem.
+    value: float
+
+
+class BoundValue(TypedDict):
+    """A tuned bound with its given value."""
+
+    # Name of the bound.
+    bound: str
     # What it limits, with its unit.
     meaning: str
     # Value of the bound in the problem.
@@ -504,7 +515,7 @@ class Closing(TypedDict, total=False):
 
 class _ConflictRequired(TypedDict):
     # The bounds. Empty if the fixed constraints conflict with each other.
-    bounds: list[GivenBound]
+    bounds: list[BoundValue]
     # Number of starting points of the search.
     starts: int
     # Whether a solve gave up. If so, infeasibility is not certain.
@@ -832,7 +843,7 @@ class ExecutionReport(_ExecutionReportRequired, total=False):
 
 
 class Extend(TypedDict):
-    """A larger trial budget."""
+    """A larger number of trials."""
 
     # Total number of trials. Must exceed the current budget.
     trial_budget: int
@@ -1062,17 +1073,6 @@ class GaitSettings(TypedDict, total=False):
     naturalness: GaitSettingsNaturalness
     # Regularisation of the objective. Each weight multiplies the time integral of a square.
     regularisation: GaitSettingsRegularisation
-
-
-class GivenBound(TypedDict):
-    """A tuned bound with its given value."""
-
-    # Name of the bound.
-    bound: str
-    # What it limits, with its unit.
-    meaning: str
-    # Value of the bound in the problem.
-    value: float
 
 
 class GridStep(TypedDict):
@@ -1378,13 +1378,6 @@ class LinearAlgebra(TypedDict):
     seconds_solves: float
     # Number of forward and backward substitutions.
     substitutions: int
-
-
-class Link(TypedDict):
-    """One-time sign-in link."""
-
-    # Path of the link, which is shown once and valid for a day.
-    path: str
 
 
 class _MeRequired(TypedDict):
@@ -2416,6 +2409,13 @@ class Session(_SessionRequired, total=False):
     browser: Optional[str]
 
 
+class SignInLink(TypedDict):
+    """One-time sign-in link."""
+
+    # Path of the link, which is shown once and valid for a day.
+    path: str
+
+
 class _SolveAttemptRequired(TypedDict):
     # Whether its gait is the result of the solve.
     chosen: bool
@@ -2439,25 +2439,25 @@ class SolveAttempt(_SolveAttemptRequired, total=False):
     """One attempt within a solve, from one starting point."""
 
     # Number of the local optimum in which it ended, counted from 1; null if it did not converge.
-    basin: Optional[int]
+    local_optimum: Optional[int]
 
 
-class SolveOptionsBasinChoiceNearestToReference(TypedDict):
+class SolveOptionsLocalOptimumChoiceNearestToReference(TypedDict):
     within_percent: float
 
 
-class SolveOptionsBasinChoice(TypedDict):
-    nearest_to_reference: SolveOptionsBasinChoiceNearestToReference
+class SolveOptionsLocalOptimumChoice(TypedDict):
+    nearest_to_reference: SolveOptionsLocalOptimumChoiceNearestToReference
 
 
 class SolveOptions(TypedDict, total=False):
     """Options of the solver: limits, tolerance, initial guesses and retries."""
 
-    # Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the
-    # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.
-    basin_choice: Union[Literal["lowest_objective"], SolveOptionsBasinChoice]
     # Minimum number of initial guesses of a cold start.
     initial_guesses: int
+    # Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the
+    # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.
+    local_optimum_choice: Union[Literal["lowest_objective"], SolveOptionsLocalOptimumChoice]
     # Maximum number of iterations in each phase of a solve. Phases that track the reference gait are limited to 200.
     max_iterations: int
     # Whether a cold start tries further initial guesses until one converges.
@@ -2624,13 +2624,6 @@ class StudyAccess(TypedDict):
     restricted: bool
 
 
-class StudyActionReason(TypedDict, total=False):
-    """Reason for a command."""
-
-    # Reason, at most 2000 characters.
-    reason: str
-
-
 class _StudyComparisonRequired(TypedDict):
     id: StudyId
     # Whether gaits are computed with muscles.
@@ -2729,6 +2722,13 @@ class Tell(_TellRequired, total=False):
     # Gait RMSE, rad. Required for `converged` if Gait RMSE answers the comparisons of the study.
     gait_rmse_rad: Optional[float]
     # Reason why no gait was found, 1 to 2000 characters. Required for `not_converged`.
+    reason: str
+
+
+class TransitionReason(TypedDict, total=False):
+    """Reason for a command."""
+
+    # Reason, at most 2000 characters.
     reason: str
 
 
@@ -2951,10 +2951,10 @@ class WalkModel(TypedDict):
 
 
 class _WalkViewRequired(TypedDict):
-    # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
-    after_unblinding: bool
     # Number of the walk, 1 to 3.
     number: int
+    # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
+    recorded_after_unblinding: bool
 
 
 class WalkView(_WalkViewRequired, total=False):

@@ -12,7 +12,6 @@ from ..schemas import (
     CreatedInvitation,
     CreatedToken,
     Invitation,
-    Link,
     Me,
     Member,
     MemberId,
@@ -22,6 +21,7 @@ from ..schemas import (
     NewUser,
     Session,
     SessionId,
+    SignInLink,
     StudyAccess,
     StudyId,
     Token,
@@ -227,12 +227,12 @@ class AccessMethods(Transport):
         """Enable a user."""
         return cast(User, self.request_json("POST", "/api/v1/users/{id}/enable", {"id": user_id}, key=idempotency_key))
 
-    def create_sign_in_link(self, user_id: UserId) -> Link:
+    def create_sign_in_link(self, user_id: UserId) -> SignInLink:
         """Create a sign-in link for a user.
 
         The link works once, within a day. The request does not accept an Idempotency-Key.
         """
-        return cast(Link, self.request_json("POST", "/api/v1/users/{id}/link", {"id": user_id}, repeatable=False))
+        return cast(SignInLink, self.request_json("POST", "/api/v1/users/{id}/link", {"id": user_id}, repeatable=False))
 
     def set_user_role(self, user_id: UserId, *, idempotency_key: Optional[str] = None, **body: Unpack[NewRole]) -> User:
         """Change the role of a user.

@@ -18,12 +18,12 @@ from ..schemas import (
     Milestone,
     NewStudy,
     Recommendation,
-    StudyActionReason,
     StudyComparison,
     StudyId,
     StudyState,
     StudyView,
     SubjectId,
+    TransitionReason,
 )
 from ..transport import Transport
 
@@ -112,7 +112,7 @@ class StudiesMethods(Transport):
     def get_study_archive(self, study_id: StudyId) -> bytes:
         """Export a study as an archive.
 
-        The archive has every row of the study, without blinded allocations, as `gaitwright export` writes it.
+        The archive has every row of the study, without concealed allocations, as `gaitwright export` writes it.
         """
         return self.request_bytes("GET", "/api/v1/studies/{id}/archive", {"id": study_id})
 
@@ -135,7 +135,7 @@ class StudiesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[Extend],
     ) -> StudyView:
-        """Raise the trial budget of a study.
+        """Raise the number of trials of a study.
 
         If the study has ended, it resumes.
 
@@ -204,7 +204,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Pause a study.
 
@@ -244,7 +244,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Resume a study.
 
@@ -268,7 +268,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Start a study.
 
@@ -292,7 +292,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Stop a study.
 
