@@ -36,6 +36,8 @@ class BlindMethods(Transport):
     ) -> AnswerReceipt:
         """Answer a blind pair.
 
+        The first answer to a pair counts. A safety report takes effect at once.
+
         Fields: answer; optionally note, response_ms.
         """
         return cast(

@@ -248,6 +248,8 @@ class StudiesMethods(Transport):
     ) -> StudyView:
         """Resume a study.
 
+        Possible while the study is `paused`.
+
         Fields: optionally reason.
         """
         return cast(
@@ -271,6 +273,8 @@ class StudiesMethods(Transport):
         **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Start a study.
+
+        Possible while the study is `draft`.
 
         Fields: optionally reason.
         """
@@ -317,6 +321,6 @@ class StudiesMethods(Transport):
 
         Results keep the order of `ids`.
 
-        ids: 2 to 20 comma-separated identifiers of studies.
+        ids: 2 to 20 comma-separated identifiers of different studies.
         """
         return Pages(self, "/api/v1/study-comparison", query={"ids": ids, "limit": page_size})
