@@ -454,10 +454,10 @@ async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
     assert!(seen.contains("<th scope=\"row\">a rater</th>") && seen.contains("<td>concealed</td>"), "{seen}");
     assert!(seen.contains("value=\"unblind\"") && !by_clinician.contains("value=\"unblind\""), "{by_clinician}");
 
-    let unblind = "act=unblind&rater=a+rater&reason=adverse+event";
+    let unblind = "button=unblind&rater=a+rater&reason=adverse+event";
     let refused = send(&service, &clinician, &Method::POST, &page, form, unblind).await;
     assert_eq!(refused.status, StatusCode::FORBIDDEN);
-    let without_reason = send(&service, &admin, &Method::POST, &page, form, "act=unblind&rater=a+rater").await;
+    let without_reason = send(&service, &admin, &Method::POST, &page, form, "button=unblind&rater=a+rater").await;
     assert_eq!(without_reason.status, StatusCode::UNPROCESSABLE_ENTITY);
     assert!(read(&admin).await.contains("<td>concealed</td>"), "refused requests reveal nothing");
     let done = send(&service, &admin, &Method::POST, &page, form, unblind).await;

@@ -42,7 +42,7 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
         essence.push(format!("{} {} {:?} {rmse:?} {from:?} {}", t.number, t.action_index, t.state, t.reason));
         let brought = results::of_trial(&mut service.store.read().await.unwrap(), t.id).await.unwrap();
         assert_eq!(brought.len(), 1, "{brought:?}");
-        assert!(brought[0].taken);
+        assert!(brought[0].used);
         workers.push(brought[0].worker.clone());
     }
     service.stop().await;

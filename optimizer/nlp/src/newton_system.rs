@@ -91,9 +91,9 @@ impl NewtonSystem {
         self.solver.fallbacks()
     }
 
-    /// See [`KktSolver::distrust`].
-    pub(crate) fn distrust(&mut self) -> bool {
-        self.solver.distrust()
+    /// See [`KktSolver::reject_factorisation`].
+    pub(crate) fn reject_factorisation(&mut self) -> bool {
+        self.solver.reject_factorisation()
     }
 
     /// Resizes the work vectors for a formulation; that of the restoration phase is longer.
@@ -173,7 +173,7 @@ impl NewtonSystem {
                     return (largest(&y) <= settings.constants.multiplier_limit).then_some(y);
                 }
             }
-            if !self.solver.distrust() {
+            if !self.solver.reject_factorisation() {
                 return None;
             }
         }

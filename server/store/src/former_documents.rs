@@ -3,7 +3,7 @@
 use super::{StoreError, StoreResult, json_columns};
 use gait_learner::LearnerSettings;
 use gait_optimizer::explanation::Explanation;
-use gait_optimizer::{GaitSettings, IterationRecord, SolveOptions};
+use gait_optimizer::{GaitSettings, IterationRecord, SolveOptions, SolveReport};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -67,8 +67,21 @@ pub(super) fn learner_settings(study: &str, text: &str) -> StoreResult<LearnerSe
 pub(super) fn solve_options(text: &str) -> StoreResult<SolveOptions> {
     read("solve_options", text, |options| {
         rename(options, "cold_guesses", "initial_guesses");
+        rename(options, "basin_choice", "local_optimum_choice");
         if let Some(solver) = options.get_mut("solver").and_then(Value::as_object_mut) {
             solver.retain(|name, _| !FORMER_SOLVER_SETTINGS.contains(&name.as_str()));
+        }
+    })
+}
+
+/// The report of a solve. Only former ones are read as values first, because a study has one for each trial.
+pub(super) fn solve_report(text: &str) -> StoreResult<SolveReport> {
+    if !text.contains("\"basin\":") {
+        return json_columns::from_text("report", text);
+    }
+    read("report", text, |report| {
+        for attempt in each(report.get_mut("attempts")) {
+            rename(attempt, "basin", "local_optimum");
         }
     })
 }
@@ -148,6 +161,7 @@ fn rename(document: &mut Value, former: &str, today: &str) {
 mod tests {
     use super::*;
     use gait_learner::Method;
+    use gait_optimizer::LocalOptimumChoice;
     use gait_optimizer::solve::SolvePhase;
     use serde_json::json;
 
@@ -186,6 +200,24 @@ mod tests {
     }
 
     #[test]
+    fn report_with_numbers_of_basins_has_those_of_local_optima() {
+        let report = |name: &str| {
+            let text = format!(
+                r#"{{"status": "converged", "started_from": "cold", "iterations": 3, "objective": 0.06,
+                "cost_of_transport": 0.05, "gait_rmse_rad": 0.5, "gait_rmse_parts_rad": [0.1, 0.1, 0.1, 0.1, 0.1],
+                "max_violation": 1e-9, "seconds_total": 1.0, "seconds_evaluation": 0.1, "seconds_linear_algebra": 0.8,
+                "variables": 8, "equalities": 4, "inequalities": 2, "speed_m_s": 1.0, "stride_length_m": 1.1,
+                "durations_s": [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1], "vhip_m_s": [1.0, 1.0, 1.0, 1.0],
+                "attempts": [{{"strategy": "natural", "status": "converged", "iterations": 3, "seconds": 1.0,
+                    "objective": 0.06, "gait_rmse_rad": 0.5, "{name}":2, "chosen": true}}]}}"#
+            );
+            solve_report(&text).unwrap()
+        };
+        assert_eq!(report("basin").attempts[0].local_optimum, Some(2));
+        assert_eq!(report("basin"), report("local_optimum"));
+    }
+
+    #[test]
     fn older_settings_without_curvature_weight_mean_zero() {
         let old = r#"{"mesh": {"ds2": 4, "ds3": 4, "ss2": 6, "ss1": 6}, "regularisation": {"power_smoothing_w": 1,
             "torque": 0.003, "acceleration": 0.0001, "contact_force": 0.0001, "activation": 0.003, "fibre_velocity": 0.01}}"#;
@@ -199,6 +231,9 @@ mod tests {
         let options = solve_options(r#"{"cold_guesses": 3}"#).unwrap();
         assert_eq!(options, SolveOptions { initial_guesses: 3, ..SolveOptions::default() });
         assert!(solve_options(r#"{"cold_guesses": 3, "initial_guesses": 3}"#).is_err(), "not both");
+        let nearest = LocalOptimumChoice::NearestToReference { within_percent: 3.0 };
+        let options = solve_options(r#"{"basin_choice": {"nearest_to_reference": {"within_percent": 3}}}"#).unwrap();
+        assert_eq!(options, SolveOptions { local_optimum_choice: nearest, ..SolveOptions::default() });
         let phase = |name: &str| {
             let record = format!(
                 r#"[{{"guess": 0, "phase": "{name}", "iteration": 1, "objective": 0.5, "constraint_violation": 0.1,

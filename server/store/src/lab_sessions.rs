@@ -1,9 +1,9 @@
 //! Stored lab sessions and their progress. The order of the gaits is an allocation (`super::allocations`).
 
-use super::allocations::{self, OfSession};
+use super::allocations::{self, SessionAllocation};
 use super::audit::Actor;
 use super::lab_answers::{self, LabAnswer};
-use super::members::{binds, reached};
+use super::members::{reach_values, reached};
 use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
 use sqlx::Row;
@@ -40,8 +40,8 @@ impl FromStr for SessionStep {
     fn from_str(text: &str) -> StoreResult<Self> {
         Self::ALL
             .into_iter()
-            .find(|act| act.as_str() == text)
-            .ok_or_else(|| StoreError::unknown_value("act of a lab session", text))
+            .find(|step| step.as_str() == text)
+            .ok_or_else(|| StoreError::unknown_value("step of a lab session", text))
     }
 }
 
@@ -70,7 +70,7 @@ pub struct LabSession {
     /// The trial with gait B.
     pub trial_b: TrialId,
     /// What may be known of its allocation.
-    pub allocation: OfSession,
+    pub allocation: SessionAllocation,
     /// Free text.
     pub notes: String,
     /// Who planned it.
@@ -78,15 +78,15 @@ pub struct LabSession {
     /// Time of planning.
     pub created_at: Instant,
     /// Completed steps, in order.
-    pub acts: Vec<(SessionStep, LabSessionStep)>,
+    pub steps: Vec<(SessionStep, LabSessionStep)>,
     /// Answers of the subject, in order.
     pub answers: Vec<LabAnswer>,
 }
 
 impl LabSession {
     /// A step, if it is completed.
-    pub fn done(&self, act: SessionStep) -> Option<&LabSessionStep> {
-        self.acts.iter().find(|(known, _)| *known == act).map(|(_, done)| done)
+    pub fn done(&self, step: SessionStep) -> Option<&LabSessionStep> {
+        self.steps.iter().find(|(known, _)| *known == step).map(|(_, done)| done)
     }
 
     /// The current answer, which was not retracted.
@@ -143,11 +143,11 @@ pub async fn insert(db: &mut Connection, actor: &Actor, new: &UnsavedLabSession<
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn act(
+pub async fn add_step(
     db: &mut Connection,
     actor: &Actor,
     id: LabSessionId,
-    act: SessionStep,
+    step: SessionStep,
     note: &str,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
@@ -155,7 +155,7 @@ pub async fn act(
          on conflict (session_id, act) do nothing",
     )
     .bind(id)
-    .bind(act.as_str())
+    .bind(step.as_str())
     .bind(note)
     .bind(actor.as_str())
     .bind(now())
@@ -190,7 +190,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<La
 /// # Errors
 /// Errors of the database.
 pub async fn open_since(db: &mut Connection, reach: Reach, limit: u32, since: Instant) -> StoreResult<Vec<LabSession>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let rows = sqlx::query(concat!(
         "select l.* from lab_sessions l join studies s on s.id = l.study_id \
          where s.subject_id not in (select subject_id from withdrawn_subjects) \
@@ -219,9 +219,9 @@ async fn all(db: &mut Connection, rows: &[SqliteRow]) -> StoreResult<Vec<LabSess
 
 async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> {
     let id: LabSessionId = row.try_get("id")?;
-    let acts = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id);
-    let acts = acts.fetch_all(&mut *db).await?;
-    let act = |row: &SqliteRow| -> StoreResult<(SessionStep, LabSessionStep)> {
+    let steps = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id);
+    let steps = steps.fetch_all(&mut *db).await?;
+    let step = |row: &SqliteRow| -> StoreResult<(SessionStep, LabSessionStep)> {
         let done =
             LabSessionStep { note: row.try_get("note")?, actor: row.try_get("actor")?, at: row.try_get("created_at")? };
         Ok((row.try_get::<&str, _>("act")?.parse()?, done))
@@ -236,7 +236,7 @@ async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> 
         notes: row.try_get("notes")?,
         actor: row.try_get("actor")?,
         created_at: row.try_get("created_at")?,
-        acts: acts.iter().map(act).collect::<StoreResult<_>>()?,
+        steps: steps.iter().map(step).collect::<StoreResult<_>>()?,
         answers: lab_answers::of_session(db, id).await?,
     })
 }

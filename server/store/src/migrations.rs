@@ -1,6 +1,6 @@
 //! Migrates a record at start, in one transaction, after a backup.
 
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::schema_versions::{SCHEMA_VERSION, check_version, up_to};
 use super::{StoreError, StoreResult, backup, seals, verify};
 use sqlx::SqlitePool;
@@ -33,7 +33,7 @@ async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResu
     if found == 0 || found == SCHEMA_VERSION {
         return Ok(());
     }
-    let name = companion(path, &format!(".v{found}"));
+    let name = path_with_suffix(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
     let copy = backup::whole_copy(pool, path, &name, path).await?;
     match free_name(&name, copy.part()).map_err(cannot_write)? {
@@ -54,7 +54,7 @@ fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
             return Ok(None);
         }
         number += 1;
-        candidate = companion(name, &format!("-{number}"));
+        candidate = path_with_suffix(name, &format!("-{number}"));
     }
     Ok(Some(candidate))
 }

@@ -1,6 +1,6 @@
 //! Stored results of attempts, including results that arrived too late.
 
-use super::{Connection, Instant, StoreResult, TrialId, json_columns, now};
+use super::{Connection, Instant, StoreResult, TrialId, former_documents, json_columns, now};
 use gait_optimizer::{SolveReport, SolveStatus};
 use sqlx::Row;
 
@@ -12,7 +12,7 @@ pub struct AttemptResult {
     /// Name of the worker.
     pub worker: String,
     /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
-    pub taken: bool,
+    pub used: bool,
     /// How the solve ended.
     pub status: SolveStatus,
     /// Numerical results of the solve, without those that are not finite.
@@ -25,12 +25,12 @@ pub struct AttemptResult {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn keep(
+pub async fn insert(
     db: &mut Connection,
     (trial, attempt): (TrialId, u32),
     worker: &str,
     report: &SolveReport,
-    taken: bool,
+    used: bool,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into results (trial_id, attempt, worker, taken, status, report, received_at) \
@@ -39,7 +39,7 @@ pub async fn keep(
     .bind(trial)
     .bind(attempt)
     .bind(worker)
-    .bind(taken)
+    .bind(used)
     .bind(json_columns::to_text("status", &report.status)?)
     .bind(json_columns::readable("report", report)?)
     .bind(now())
@@ -60,9 +60,9 @@ pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<At
             Ok(AttemptResult {
                 attempt: row.try_get("attempt")?,
                 worker: row.try_get("worker")?,
-                taken: row.try_get("taken")?,
+                used: row.try_get("taken")?,
                 status: json_columns::column(row, "status")?,
-                report: json_columns::optional_column(row, "report")?,
+                report: row.try_get::<Option<&str>, _>("report")?.map(former_documents::solve_report).transpose()?,
                 received_at: row.try_get("received_at")?,
             })
         })

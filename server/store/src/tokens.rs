@@ -87,7 +87,7 @@ pub async fn by_hash(db: &mut Connection, hash: &str) -> StoreResult<Option<Toke
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn made_by(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
+pub async fn created_by_user(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
     let rows = sqlx::query(
         "select t.* from tokens t join users u on u.id = ? where t.revoked_at is null and (t.maker = u.id or \
          t.maker is null and t.created_by in ('admin ' || u.name, 'clinician ' || u.name, 'rater ' || u.name)) \

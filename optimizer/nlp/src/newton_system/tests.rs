@@ -70,7 +70,7 @@ impl KktSolver for Faulty {
     fn factor_entries(&self) -> usize {
         self.exact.factor_entries()
     }
-    fn distrust(&mut self) -> bool {
+    fn reject_factorisation(&mut self) -> bool {
         (self.factor, self.miscounted) = (1.0, 0);
         std::mem::take(&mut self.has_another_method)
     }

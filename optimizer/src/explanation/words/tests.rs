@@ -24,7 +24,7 @@ fn missed(row: &str) -> Vec<Violation> {
 fn conflict(bounds: &[(usize, f64)]) -> Conflict {
     let given = |(bound, value): &(usize, f64)| {
         let (bound, meaning) = named(*bound);
-        GivenBound { bound, meaning, value: *value }
+        BoundValue { bound, meaning, value: *value }
     };
     Conflict {
         bounds: bounds.iter().map(given).collect(),

@@ -49,6 +49,11 @@ impl MembersPage {
         member.role.as_ref().map_or("token", format::role)
     }
 
+    /// Whether the caller may unblind raters, and one of them is blind.
+    fn may_unblind(&self) -> bool {
+        self.may_administer && self.raters.iter().any(|rater| rater.first_preferred.is_none())
+    }
+
     /// `6 of 8 (41 % to 93 %)`, the interval with a confidence of 95 %.
     fn share(share: &Share) -> String {
         match (share.low, share.high) {
@@ -107,7 +112,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
 /// The fields of every form of the page.
 #[derive(Debug, Deserialize)]
 pub(super) struct MembersForm {
-    act: String,
+    button: String,
     /// `user R1` or `token rig`.
     #[serde(default)]
     who: String,
@@ -133,10 +138,10 @@ pub(super) async fn post(
     DespiteWithdrawal(id, _): DespiteWithdrawal<StudyId, Run>,
     secure: Secure,
     headers: HeaderMap,
-    Form(asked): Form<MembersForm>,
+    Form(form): Form<MembersForm>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
-    match act(&mut writer, &authorized.caller, id, &asked).await {
+    match apply(&mut writer, &authorized.caller, id, &form).await {
         Ok(invited) => {
             commit(writer).await?;
             app.scheduler.changed();
@@ -151,7 +156,7 @@ pub(super) async fn post(
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
             drop(writer);
-            let shown = AfterAction { refused: Some(form_errors::in_words(&error)), typed: asked.name, link: None };
+            let shown = AfterAction { refused: Some(form_errors::in_words(&error)), typed: form.name, link: None };
             Ok((Problem::from(&error).status(), show(&app, &authorized.caller, id, shown).await?).into_response())
         }
         Err(error) => Err(error.into()),
@@ -159,19 +164,19 @@ pub(super) async fn post(
 }
 
 /// Performs the action; returns name and secret of a sign-in link, if it created one.
-async fn act(
+async fn apply(
     writer: &mut Writer,
     caller: &Caller,
     study: StudyId,
-    asked: &MembersForm,
+    form: &MembersForm,
 ) -> Result<Option<(String, String)>, Error> {
-    if asked.act != "remove" {
+    if form.button != "remove" {
         consents::may_be_shown(writer, study).await?;
     }
-    match asked.act.as_str() {
+    match form.button.as_str() {
         "add" => {
-            let unknown = || Error::invalid("who", asked.who.as_str(), "a user or token from the list");
-            let (kind, name) = asked.who.split_once(' ').ok_or_else(unknown)?;
+            let unknown = || Error::invalid("who", form.who.as_str(), "a user or token from the list");
+            let (kind, name) = form.who.split_once(' ').ok_or_else(unknown)?;
             let kind = match kind {
                 "user" => MemberKind::User,
                 "token" => MemberKind::Token,
@@ -181,26 +186,26 @@ async fn act(
             Ok(None)
         }
         "remove" => {
-            let unknown = |_| Error::invalid("member", asked.member.as_str(), "a member listed on this page");
-            let member: Named<MemberId> = asked.member.parse().map_err(unknown)?;
+            let unknown = |_| Error::invalid("member", form.member.as_str(), "a member listed on this page");
+            let member: Named<MemberId> = form.member.parse().map_err(unknown)?;
             let member = member.accessible(writer, caller.reach()).await?;
             membership::end(writer, &caller.actor, member).await?;
             Ok(None)
         }
         "restrict" | "open" => {
-            membership::restrict(writer, caller, study, asked.act == "restrict").await?;
+            membership::restrict(writer, caller, study, form.button == "restrict").await?;
             Ok(None)
         }
         "invite" if caller.may(Administer::NEEDED) => {
-            let (user, _, secret) = membership::invite(writer, &caller.actor, study, &asked.name).await?;
+            let (user, _, secret) = membership::invite(writer, &caller.actor, study, &form.name).await?;
             Ok(Some((user.name, secret)))
         }
         "invite" => Err(Error::Forbidden("Only administrators can create sign-in links.".to_owned())),
         "unblind" if caller.may(Administer::NEEDED) => {
-            blind::unblind(writer, caller, study, &asked.rater, &asked.reason).await?;
+            blind::unblind(writer, caller, study, &form.rater, &form.reason).await?;
             Ok(None)
         }
         "unblind" => Err(Error::Forbidden("Only administrators can unblind raters.".to_owned())),
-        other => Err(Error::invalid("act", other, "add, remove, restrict, open, invite or unblind")),
+        other => Err(Error::invalid("button", other, "add, remove, restrict, open, invite or unblind")),
     }
 }

@@ -148,7 +148,7 @@ pub(crate) struct AttemptResult {
     /// Name of the worker.
     worker: String,
     /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
-    taken: bool,
+    used: bool,
     /// How the solve ended.
     status: SolveStatus,
     /// Numerical results of the solve, without those that are not finite.
@@ -159,7 +159,7 @@ pub(crate) struct AttemptResult {
 
 impl From<results::AttemptResult> for AttemptResult {
     fn from(row: results::AttemptResult) -> Self {
-        let results::AttemptResult { attempt, worker, taken, status, report, received_at } = row;
-        Self { attempt, worker, taken, status: status.into(), report: report.map(Into::into), received_at }
+        let results::AttemptResult { attempt, worker, used, status, report, received_at } = row;
+        Self { attempt, worker, used, status: status.into(), report: report.map(Into::into), received_at }
     }
 }

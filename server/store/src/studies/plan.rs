@@ -121,13 +121,13 @@ pub struct StudyPlan {
 
 impl StudyPlan {
     /// Whether no trial may have an action whose gait is known. Scripts measure, so equal actions can give other results.
-    pub fn tries_new_gaits_only(&self) -> bool {
+    pub fn excludes_known_gaits(&self) -> bool {
         self.evaluation == Evaluation::Optimizer && !self.repeat_results
     }
 
     /// Whether a study with the other plan would try the same trials: same subject, problem, learner and seed. Name,
     /// priority and parallel trials do not matter.
-    pub fn tries_the_same_as(&self, other: &Self) -> bool {
+    pub fn has_same_trials_as(&self, other: &Self) -> bool {
         // Older studies without a body use the values entered first.
         let bodies_differ = self.body.is_some() && other.body.is_some() && self.body != other.body;
         if bodies_differ {

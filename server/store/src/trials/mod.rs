@@ -7,7 +7,7 @@ pub use progress::{SolveTimes, TrialCounts, counts, improvements, measured};
 pub use state::TrialState;
 
 use super::many_rows::read_many;
-use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now};
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, former_documents, json_columns, now};
 use gait_learner::ActionIndex;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
 use sqlx::Row;
@@ -269,7 +269,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn give_to(db: &mut Connection, id: TrialId, worker: &str) -> StoreResult<()> {
+pub async fn assign(db: &mut Connection, id: TrialId, worker: &str) -> StoreResult<()> {
     sqlx::query("update trials set state = 'running', started_at = ?, asked_by = ? where id = ?")
         .bind(now())
         .bind(worker)
@@ -338,7 +338,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
         max_violation: row.try_get("max_violation")?,
         iterations: row.try_get("iterations")?,
         seconds_total: row.try_get("seconds_total")?,
-        report: json_columns::optional_column(row, "report")?,
+        report: row.try_get::<Option<&str>, _>("report")?.map(former_documents::solve_report).transpose()?,
         violations: json_columns::optional_column(row, "violations")?.unwrap_or_default(),
         message: row.try_get("message")?,
         created_at: row.try_get("created_at")?,

@@ -2,7 +2,7 @@
 
 use super::next_pair::{is_plain, is_same_pair};
 use crate::error::Error;
-use gaitwright_store::allocations::{self, Sided};
+use gaitwright_store::allocations::{self, PairWithSides};
 use gaitwright_store::presentations::{self, Judgement, Presentation, PresentationKind};
 use gaitwright_store::{Connection, StudyId};
 use serde::Serialize;
@@ -71,14 +71,14 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> Result<Vec<RaterRe
 }
 
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterReliability> {
+fn figures(presentations: &[Presentation], sides: &[PairWithSides]) -> Vec<RaterReliability> {
     let mut raters: Vec<&str> = presentations.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
     raters.into_iter().map(|rater| of_rater(rater, presentations, sides)).collect()
 }
 
-fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterReliability {
+fn of_rater(rater: &str, all: &[Presentation], sides: &[PairWithSides]) -> RaterReliability {
     let own: Vec<&Presentation> = all.iter().filter(|shown| shown.rater == rater).collect();
     let count = |wanted: &dyn Fn(&Presentation) -> bool| {
         u32::try_from(own.iter().filter(|shown| wanted(shown)).count()).unwrap_or(u32::MAX)
@@ -96,12 +96,12 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterReliabil
     }
 }
 
-fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
+fn first_preferred(rater: &str, sides: &[PairWithSides]) -> Option<Share> {
     let mut own = sides.iter().filter(|sided| sided.presentation.rater == rater).peekable();
     own.peek()?;
     let blind =
         own.filter(|sided| !sided.presentation.could_have_known && sided.presentation.kind != PresentationKind::Null);
-    let answers: Vec<Judgement> = blind.filter_map(Sided::answer).collect();
+    let answers: Vec<Judgement> = blind.filter_map(PairWithSides::answer).collect();
     let count =
         |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
     let (first, second) = (count(Judgement::First), count(Judgement::Second));

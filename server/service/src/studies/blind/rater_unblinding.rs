@@ -3,7 +3,7 @@
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use gaitwright_store::allocations::{self, Sided};
+use gaitwright_store::allocations::{self, PairWithSides};
 use gaitwright_store::presentations::{self, Judgement, PresentationKind};
 use gaitwright_store::{Instant, PresentationId, StudyId, TrialId, Writer, audit, consents, studies};
 use serde::Serialize;
@@ -40,8 +40,8 @@ pub struct UnblindedPair {
     pub answered_at: Option<Instant>,
 }
 
-impl From<&Sided> for UnblindedPair {
-    fn from(sided: &Sided) -> Self {
+impl From<&PairWithSides> for UnblindedPair {
+    fn from(sided: &PairWithSides) -> Self {
         let row = &sided.presentation;
         let (shown_first, shown_second) = sided.shown();
         Self {

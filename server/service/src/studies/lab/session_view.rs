@@ -63,7 +63,7 @@ pub struct WalkView {
     /// Who recorded the walk, and when.
     pub recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
-    pub after_unblinding: bool,
+    pub recorded_after_unblinding: bool,
 }
 
 /// Lab session, without blinded data.
@@ -105,7 +105,7 @@ pub struct LabSessionView {
 impl From<&LabSession> for LabSessionView {
     fn from(session: &LabSession) -> Self {
         let walk = |number| {
-            let place = |act| session.acts.iter().position(|(known, _)| *known == act);
+            let place = |step| session.steps.iter().position(|(known, _)| *known == step);
             let recorded = session.done(SessionStep::Walk(number));
             let unblinded_before = place(SessionStep::Unblinded)
                 .zip(place(SessionStep::Walk(number)))
@@ -114,7 +114,7 @@ impl From<&LabSession> for LabSessionView {
                 number,
                 condition: condition(session, number),
                 recorded: recorded.cloned(),
-                after_unblinding: unblinded_before
+                recorded_after_unblinding: unblinded_before
                     || recorded.is_some_and(|done| has_file(session, &done.actor, done.at)),
             }
         };
