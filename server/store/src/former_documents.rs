@@ -175,6 +175,24 @@ mod tests {
     }
 
     #[test]
+    fn report_with_numbers_of_basins_has_those_of_local_optima() {
+        let report = |name: &str| {
+            let text = format!(
+                r#"{{"status": "converged", "started_from": "cold", "iterations": 3, "objective": 0.06,
+                "cost_of_transport": 0.05, "gait_rmse_rad": 0.5, "gait_rmse_parts_rad": [0.1, 0.1, 0.1, 0.1, 0.1],
+                "max_violation": 1e-9, "seconds_total": 1.0, "seconds_evaluation": 0.1, "seconds_linear_algebra": 0.8,
+                "variables": 8, "equalities": 4, "inequalities": 2, "speed_m_s": 1.0, "stride_length_m": 1.1,
+                "durations_s": [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1], "vhip_m_s": [1.0, 1.0, 1.0, 1.0],
+                "attempts": [{{"strategy": "natural", "status": "converged", "iterations": 3, "seconds": 1.0,
+                    "objective": 0.06, "gait_rmse_rad": 0.5, "{name}":2, "chosen": true}}]}}"#
+            );
+            solve_report(&text).unwrap()
+        };
+        assert_eq!(report("basin").attempts[0].local_optimum, Some(2));
+        assert_eq!(report("basin"), report("local_optimum"));
+    }
+
+    #[test]
     fn former_learner_settings_without_effect_are_skipped_and_others_are_refused() {
         let neutral = json!({"method": "eubo", "lengthscale_factor": 2.0, "additive_share": 0.0, "pairwise_share": 0,
             "broad_lengthscale": 2.5, "feasibility_lengthscale_factor": 1.0, "feasibility_additive_share": 0.0, "learn_every": null});
@@ -197,24 +215,6 @@ mod tests {
             assert!(text.contains("Knee study") && text.contains(&format!("{name} = {value}")), "{text}");
         }
         assert!(matches!(learner_settings("a", r#"{"nose": 1}"#), Err(StoreError::Damaged { .. })));
-    }
-
-    #[test]
-    fn report_with_numbers_of_basins_has_those_of_local_optima() {
-        let report = |name: &str| {
-            let text = format!(
-                r#"{{"status": "converged", "started_from": "cold", "iterations": 3, "objective": 0.06,
-                "cost_of_transport": 0.05, "gait_rmse_rad": 0.5, "gait_rmse_parts_rad": [0.1, 0.1, 0.1, 0.1, 0.1],
-                "max_violation": 1e-9, "seconds_total": 1.0, "seconds_evaluation": 0.1, "seconds_linear_algebra": 0.8,
-                "variables": 8, "equalities": 4, "inequalities": 2, "speed_m_s": 1.0, "stride_length_m": 1.1,
-                "durations_s": [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1], "vhip_m_s": [1.0, 1.0, 1.0, 1.0],
-                "attempts": [{{"strategy": "natural", "status": "converged", "iterations": 3, "seconds": 1.0,
-                    "objective": 0.06, "gait_rmse_rad": 0.5, "{name}":2, "chosen": true}}]}}"#
-            );
-            solve_report(&text).unwrap()
-        };
-        assert_eq!(report("basin").attempts[0].local_optimum, Some(2));
-        assert_eq!(report("basin"), report("local_optimum"));
     }
 
     #[test]
