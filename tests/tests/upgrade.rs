@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_store::{SCHEMA_VERSION, Store, read_only, verify};
+use gaitwright_store::{SCHEMA_VERSION, Store, StoreError, read_only, verify};
 use gaitwright_tests::archives::exported;
 use gaitwright_tests::cli;
 use serde_json::{Value, json};
@@ -251,6 +251,23 @@ async fn upgrade_does_not_seal_a_forged_row() {
     let refused = Store::open(&database).await.unwrap_err().to_string();
     assert!(refused.contains("of consents"), "{refused}");
     assert_eq!(versions(&database).await, [1], "the record is as it was");
+}
+
+#[tokio::test]
+async fn record_with_a_study_whose_setting_this_version_lacks_is_refused() {
+    for (form, record) in RECORDS {
+        let (_folder, database) = unpacked(record);
+        let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(&database)).await.unwrap();
+        let sql = "update studies set learner = json_set(learner, '$.additive_share', 0.3) where id = (select max(id) from studies)";
+        assert_eq!(sqlx::query(sql).execute(&pool).await.unwrap().rows_affected(), 1);
+        pool.close().await;
+        let before = std::fs::read(&database).unwrap();
+        let refused = Store::open(&database).await.unwrap_err();
+        let StoreError::FormerSetting { setting, value, .. } = &refused else { panic!("{refused:?}") };
+        assert_eq!((*setting, value.as_str()), ("additive_share", "0.3"));
+        assert_eq!(versions(&database).await.last(), Some(&form));
+        assert_eq!(std::fs::read(&database).unwrap(), before, "{form}: nothing was changed");
+    }
 }
 
 #[tokio::test]

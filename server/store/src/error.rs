@@ -59,6 +59,19 @@ pub enum StoreError {
         /// The newest version that this program supports.
         known: i64,
     },
+    /// A study has a setting that this version lacks, with a value that changes its trials.
+    #[error(
+        "The study {study:?} was made with the learner setting {setting} = {value}, which this version does not have. Nothing was \
+         changed. Use the version of gaitwright that made the study."
+    )]
+    FormerSetting {
+        /// The name of the study.
+        study: String,
+        /// The setting.
+        setting: &'static str,
+        /// Its value, as JSON.
+        value: String,
+    },
     /// The database file is missing, but its anchor or log is there.
     #[error(
         "There is no record at {}, but {} shows that there was one. Restore a backup with `gaitwright restore`. To start an empty \

@@ -1,6 +1,7 @@
 //! Reads stored documents of earlier versions: brings former names, which records and archives keep, to those of today.
 
 use super::{StoreError, StoreResult, json_columns};
+use gait_learner::LearnerSettings;
 use gait_optimizer::explanation::Explanation;
 use gait_optimizer::{GaitSettings, IterationRecord, SolveOptions, SolveReport};
 use serde::de::DeserializeOwned;
@@ -32,6 +33,35 @@ const FORMER_SOLVER_SETTINGS: [&str; 23] = [
     "elastic_weight",
     "max_restoration_phases",
 ];
+
+/// Learner settings of earlier versions, each with the test for a value without effect.
+const FORMER_LEARNER_SETTINGS: [(&str, fn(&Value) -> bool); 6] = [
+    ("additive_share", |value| value.as_f64() == Some(0.0)),
+    ("pairwise_share", |value| value.as_f64() == Some(0.0)),
+    ("feasibility_additive_share", |value| value.as_f64() == Some(0.0)),
+    // The lengthscale of the parts with these shares.
+    ("broad_lengthscale", Value::is_number),
+    ("feasibility_lengthscale_factor", |value| value.as_f64() == Some(1.0)),
+    ("learn_every", Value::is_null),
+];
+
+/// Settings of the learner of a study. Settings that the learner no longer has are skipped if they had no effect.
+///
+/// # Errors
+/// [`StoreError::FormerSetting`] if they had one; [`StoreError::Damaged`].
+pub(super) fn learner_settings(study: &str, text: &str) -> StoreResult<LearnerSettings> {
+    let mut document: Value = json_columns::from_text("learner", text)?;
+    if let Some(settings) = document.as_object_mut() {
+        for (setting, has_no_effect) in FORMER_LEARNER_SETTINGS {
+            let Some(value) = settings.remove(setting) else { continue };
+            if !has_no_effect(&value) {
+                let (study, value) = (study.to_owned(), value.to_string());
+                return Err(StoreError::FormerSetting { study, setting, value });
+            }
+        }
+    }
+    parsed("learner", document)
+}
 
 /// Options of solves, without settings that the solver no longer has.
 pub(super) fn solve_options(text: &str) -> StoreResult<SolveOptions> {
@@ -105,6 +135,10 @@ pub(super) fn explanation(text: &str) -> StoreResult<Explanation> {
 fn read<T: DeserializeOwned>(what: &'static str, text: &str, bring: impl FnOnce(&mut Value)) -> StoreResult<T> {
     let mut document: Value = json_columns::from_text(what, text)?;
     bring(&mut document);
+    parsed(what, document)
+}
+
+fn parsed<T: DeserializeOwned>(what: &'static str, document: Value) -> StoreResult<T> {
     serde_json::from_value(document).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
 }
 
@@ -126,6 +160,7 @@ fn rename(document: &mut Value, former: &str, today: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gait_learner::Method;
     use gait_optimizer::LocalOptimumChoice;
     use gait_optimizer::solve::SolvePhase;
     use serde_json::json;
@@ -155,6 +190,31 @@ mod tests {
         };
         assert_eq!(report("basin").attempts[0].local_optimum, Some(2));
         assert_eq!(report("basin"), report("local_optimum"));
+    }
+
+    #[test]
+    fn former_learner_settings_without_effect_are_skipped_and_others_are_refused() {
+        let neutral = json!({"method": "eubo", "lengthscale_factor": 2.0, "additive_share": 0.0, "pairwise_share": 0,
+            "broad_lengthscale": 2.5, "feasibility_lengthscale_factor": 1.0, "feasibility_additive_share": 0.0, "learn_every": null});
+        let today = LearnerSettings { lengthscale_factor: 2.0, ..LearnerSettings::of(Method::Eubo) };
+        assert_eq!(learner_settings("a", &neutral.to_string()).unwrap(), today);
+        for (name, value) in [
+            ("additive_share", json!(0.3)),
+            ("pairwise_share", json!(1)),
+            ("broad_lengthscale", json!(null)),
+            ("feasibility_lengthscale_factor", json!(2.0)),
+            ("feasibility_additive_share", json!("0")),
+            ("learn_every", json!(10)),
+        ] {
+            let mut changed = neutral.clone();
+            changed[name] = value.clone();
+            let refused = learner_settings("Knee study", &changed.to_string()).unwrap_err();
+            let StoreError::FormerSetting { study, setting, value: found } = &refused else { panic!("{refused:?}") };
+            assert_eq!((study.as_str(), *setting, found), ("Knee study", name, &value.to_string()));
+            let text = refused.to_string();
+            assert!(text.contains("Knee study") && text.contains(&format!("{name} = {value}")), "{text}");
+        }
+        assert!(matches!(learner_settings("a", r#"{"nose": 1}"#), Err(StoreError::Damaged { .. })));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! place of a record.
 
 use super::record_files::path_with_suffix;
-use super::{StoreError, StoreResult, anchor, schema_versions};
+use super::{StoreError, StoreResult, anchor, schema_versions, studies};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ pub(super) fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) 
 }
 
 /// Refuses a file that is not the record which its companions know: another program's, an earlier state, or an empty file
-/// in its place.
+/// in its place; and a record with a study that this version cannot continue.
 pub(super) async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
     if schema_versions::check_version(pool, path).await? == 0 {
         return refuse_to_begin_anew(path, anchors);
@@ -46,7 +46,7 @@ pub(super) async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[Pat
     for anchor in anchors {
         anchor::check(&mut *pool.acquire().await?, path, anchor).await?;
     }
-    Ok(())
+    studies::refuse_former_settings(&mut *pool.acquire().await?).await
 }
 
 /// Refuses a file without a schema if an anchor shows that its log was lost.

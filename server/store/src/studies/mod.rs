@@ -12,6 +12,7 @@ pub use plan::{Evaluation, FeedbackMode, StudyPlan};
 pub use state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, former_documents, json_columns, now};
+use gait_learner::LearnerSettings;
 use gait_optimizer::Subject as Body;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -193,6 +194,24 @@ fn body_of(row: &SqliteRow) -> StoreResult<Option<Body>> {
     Ok(height.zip(mass).map(|(height_m, body_mass_kg)| Body { height_m, body_mass_kg }))
 }
 
+fn learner_of(row: &SqliteRow) -> StoreResult<LearnerSettings> {
+    former_documents::learner_settings(row.try_get("name")?, row.try_get("learner")?)
+}
+
+/// Refuses a record with a study that this version cannot continue, because every list that contains the study would
+/// fail.
+///
+/// # Errors
+/// [`StoreError::FormerSetting`]; errors of the database.
+pub(super) async fn refuse_former_settings(db: &mut Connection) -> StoreResult<()> {
+    for row in &sqlx::query("select name, learner from studies order by id").fetch_all(db).await? {
+        if let Err(refusal @ StoreError::FormerSetting { .. }) = learner_of(row) {
+            return Err(refusal);
+        }
+    }
+    Ok(())
+}
+
 fn from_row(row: &SqliteRow) -> StoreResult<Study> {
     Ok(Study {
         id: row.try_get("id")?,
@@ -207,7 +226,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             solve_options: former_documents::solve_options(row.try_get("solve_options")?)?,
             base_bounds: json_columns::column(row, "base_bounds")?,
             search_space: json_columns::column(row, "search_space")?,
-            learner: json_columns::column(row, "learner")?,
+            learner: learner_of(row)?,
             feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
             evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
             trial_budget: row.try_get("trial_budget")?,
