@@ -380,7 +380,9 @@ fn every_command_is_classified() {
     let help = std::process::Command::new(env!("CARGO_BIN_EXE_gaitwright-cli")).arg("--help").output().unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
     let listed = help.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
-    let commands: Vec<&str> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    // A longer description continues on a line that is indented further.
+    let first_lines = listed.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| !line.starts_with(' '));
+    let commands: Vec<&str> = first_lines.filter_map(|line| line.split_whitespace().next()).collect();
     assert!(commands.len() > 15, "{help}");
     for command in commands {
         assert!(COMMANDS.iter().any(|(known, _)| *known == command), "classify the command {command:?} in this file");
