@@ -11,7 +11,7 @@ use gaitwright_service::workers::{Assignment, Dispatch, InProcess, News, Receipt
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
-use gaitwright_store::{StudyId, TrialId, jobs, results};
+use gaitwright_store::{StudyId, TrialId, attempts, jobs};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::broker::Broker;
 use gaitwright_tests::service::Service;
@@ -151,8 +151,8 @@ async fn nothing_is_lost_or_doubled(service: &Service, study: StudyId) {
             .iter()
             .filter(|row| matches!(row.content, FeedbackContent::Label { trial: of, .. } if of == trial.id));
         assert_eq!(labels.count(), 1, "labels of trial {}", trial.number);
-        let brought = results::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
-        assert_eq!(brought.iter().filter(|result| result.taken).count(), 1, "{brought:?}");
+        let brought = attempts::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
+        assert_eq!(brought.iter().filter(|result| result.used).count(), 1, "{brought:?}");
     }
 }
 
@@ -204,7 +204,7 @@ async fn a_result_that_comes_late(mut rig: Rig) {
     nothing_is_lost_or_doubled(&service, study).await;
     let first = service.trials(study).await[0].id;
     let brought = service.fetch(&format!("/api/v1/trials/{first}/attempts")).await.items();
-    let brought: Vec<_> = brought.as_array().unwrap().iter().map(|r| (&r["attempt"], &r["taken"])).collect();
+    let brought: Vec<_> = brought.as_array().unwrap().iter().map(|r| (&r["attempt"], &r["used"])).collect();
     assert_eq!(brought.len(), 2, "{brought:?}");
     assert!(brought[0] == (&1.into(), &false.into()) && brought[1] == (&2.into(), &true.into()), "{brought:?}");
     service.stop().await;
@@ -229,8 +229,8 @@ async fn a_job_that_is_cancelled(mut rig: Rig) {
     assert!(
         !feedback.iter().any(|row| matches!(row.content, FeedbackContent::Label { trial, .. } if trial == running))
     );
-    let brought = results::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
-    assert!(brought.iter().all(|result| !result.taken), "{brought:?}");
+    let brought = attempts::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
+    assert!(brought.iter().all(|result| !result.used), "{brought:?}");
     service.stop().await;
 }
 

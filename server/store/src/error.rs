@@ -59,6 +59,19 @@ pub enum StoreError {
         /// The newest version that this program supports.
         known: i64,
     },
+    /// A development version, with another migration of this number, wrote the file.
+    #[error(
+        "The database {} is from a development version of gaitwright: its migration {version} differs from the one of this version, \
+         so its tables cannot be read. Nothing was changed. Open it with the version that wrote it, or start an empty record \
+         in another file.",
+        path.display()
+    )]
+    DevelopmentSchema {
+        /// The file.
+        path: PathBuf,
+        /// The first migration that differs.
+        version: i64,
+    },
     /// The database file is missing, but its anchor or log is there.
     #[error(
         "There is no record at {}, but {} shows that there was one. Restore a backup with `gaitwright restore`. To start an empty \
@@ -288,7 +301,11 @@ impl StoreError {
     pub fn is_wrong_file(&self) -> bool {
         matches!(
             self,
-            Self::Open { .. } | Self::NotADatabase { .. } | Self::NewerSchema { .. } | Self::NoAnchorFolder { .. }
+            Self::Open { .. }
+                | Self::NotADatabase { .. }
+                | Self::NewerSchema { .. }
+                | Self::DevelopmentSchema { .. }
+                | Self::NoAnchorFolder { .. }
         )
     }
 }

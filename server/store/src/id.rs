@@ -78,13 +78,13 @@ identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(MemberId, "membership in a study");
 identifier!(SessionId, "session of a user");
-identifier!(PresentationId, "presentation");
+identifier!(BlindPairId, "blind pair");
 identifier!(AssessmentId, "assessment");
 identifier!(SafetyReportId, "safety report");
 identifier!(SafetyReviewId, "safety review");
 identifier!(LabSessionId, "lab session");
 identifier!(MeasurementFileId, "measurement file of a lab session");
-identifier!(LabControllerFileId, "controller file of a lab session");
+identifier!(ControllerFileDownloadId, "download of a controller file");
 identifier!(EmgResultId, "result of EMG processing");
 
 macro_rules! holds_safety_reports {
@@ -97,4 +97,4 @@ macro_rules! holds_safety_reports {
         })*
     };
 }
-holds_safety_reports!(PresentationId, AssessmentId, LabSessionId);
+holds_safety_reports!(BlindPairId, AssessmentId, LabSessionId);

@@ -7,7 +7,7 @@ use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use std::path::{Path, PathBuf};
 
-/// Refuses a file of another program or a newer version, before a writing connection opens it.
+/// Refuses a file of another program, of a development version or of a newer one, before a writing connection opens it.
 pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     if !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
         return Ok(());
@@ -17,7 +17,11 @@ pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     let checked = schema_versions::check_version(&pool, path).await;
     pool.close().await;
     match checked {
-        Err(refusal @ (StoreError::NotADatabase { .. } | StoreError::NewerSchema { .. })) => Err(refusal),
+        Err(
+            refusal @ (StoreError::NotADatabase { .. }
+            | StoreError::NewerSchema { .. }
+            | StoreError::DevelopmentSchema { .. }),
+        ) => Err(refusal),
         // A file that cannot be read without writing, such as one with a hot journal, is checked by the next
         // connection.
         _ => Ok(()),

@@ -9,7 +9,7 @@ fn in_reports(rows: &mut Rows, change: impl Fn(&mut Value)) {
     let trial = rows.table("trials").into_iter().find(|row| row["state"] == "converged").unwrap();
     within(trial, "report", &change);
     let id = trial["id"].clone();
-    for result in rows.table("results").into_iter().filter(|row| row["trial_id"] == id) {
+    for result in rows.table("attempts").into_iter().filter(|row| row["trial_id"] == id) {
         within(result, "report", &change);
     }
 }
@@ -242,7 +242,7 @@ pub(super) const FORGERIES: [Forgery; 68] = [
     ),
     (
         "another result",
-        |r| within(r.first("results"), "report", |p| p["iterations"] = 1.into()),
+        |r| within(r.first("attempts"), "report", |p| p["iterations"] = 1.into()),
         "its result differs from the accepted one",
     ),
     (
@@ -349,11 +349,11 @@ pub(super) const MORE: [Forgery; 9] = [
         "a review of a report that nobody made yet",
         |r| {
             let session = "01900000-0000-7000-8000-000000000003";
-            let (review, trial) = ("01900000-0000-7000-8000-000000000004", r.first("assessments")["first"].clone());
+            let (review, trial) = ("01900000-0000-7000-8000-000000000004", r.first("assessments")["trial_a"].clone());
             r.0.push((
                 "safety_reviews".to_owned(),
                 json!({
-                    "id": review, "trial_id": trial, "said_until": "2026-01-01T00:00:00.000Z", "decision": "walkable",
+                    "id": review, "trial_id": trial, "decision": "walkable",
                     "author": "K", "reason": "r", "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));
@@ -386,7 +386,7 @@ pub(super) const MORE: [Forgery; 9] = [
                 "safety_reviews".to_owned(),
                 json!({
                     "id": "01900000-0000-7000-8000-000000000001", "trial_id": "01900000-0000-7000-8000-000000000002",
-                    "said_until": "2026-01-01T00:00:00.000Z", "decision": "walkable", "author": "K", "reason": "r",
+                    "decision": "walkable", "author": "K", "reason": "r",
                     "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));

@@ -14,7 +14,7 @@ use axum::response::Response;
 use gaitwright_service::access::{Administer, Rate, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, Answered, RaterAnswer, RaterReliability, UnblindedPair};
-use gaitwright_store::{StudyId, allocations, gaits, presentations, studies};
+use gaitwright_store::{StudyId, allocations, blind_pairs, gaits, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -61,10 +61,10 @@ pub(super) async fn next(
     let answering = app.clone();
     let (writer, shown) = blind::next(app.store_mut(), &request.caller, id).await?;
     let pair = shown.map(|shown| Pair {
-        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.presentation.token),
-        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.presentation.token),
-        token: shown.presentation.token,
-        number: shown.presentation.number,
+        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.pair.token),
+        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.pair.token),
+        token: shown.pair.token,
+        number: shown.pair.number,
     });
     request.done(&answering, writer, &NextPair { pair }).await
 }
@@ -172,7 +172,7 @@ pub(super) async fn raters(
 ) -> Result<Json<Page<RaterReliability>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let shown = presentations::of_study(&mut reader, id).await?;
+    let shown = blind_pairs::of_study(&mut reader, id).await?;
     let sides = allocations::of_unblinded_raters(&mut reader, id).await?;
     Ok(Json(paging.cut_by_place(blind::figures(&shown, &sides))?))
 }

@@ -300,7 +300,7 @@ fn view(
         cost: format::figure(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
         has_gait,
-        by_script: trial.asked_by.is_some(),
+        by_script: trial.script.is_some(),
         passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,

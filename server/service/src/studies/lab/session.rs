@@ -256,7 +256,7 @@ pub async fn record_walk(
     if walk > 1 {
         both_walkable(writer, &session).await?;
     }
-    lab_sessions::act(writer, actor, id, SessionStep::Walk(walk), &walked.note).await?;
+    lab_sessions::record_step(writer, actor, id, SessionStep::Walk(walk), &walked.note).await?;
     let detail = json!({ "walk": walk, "note": walked.note });
     audit::append(writer, actor, "lab_session.walk", &format!("lab session {id}"), &detail).await?;
     session_progress(writer, id).await
@@ -300,7 +300,7 @@ pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSess
 pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &str) -> Result<LabSession, Error> {
     printable::note("note", note, LONGEST_NOTE)?;
     still_open(writer, id).await?;
-    lab_sessions::act(writer, actor, id, SessionStep::Closed, note).await?;
+    lab_sessions::record_step(writer, actor, id, SessionStep::Closed, note).await?;
     let detail = json!({ "note": note });
     audit::append(writer, actor, "lab_session.close", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)

@@ -105,7 +105,7 @@ pub struct LabSessionView {
 impl From<&LabSession> for LabSessionView {
     fn from(session: &LabSession) -> Self {
         let walk = |number| {
-            let place = |act| session.acts.iter().position(|(known, _)| *known == act);
+            let place = |step| session.steps.iter().position(|(known, _)| *known == step);
             let recorded = session.done(SessionStep::Walk(number));
             let unblinded_before = place(SessionStep::Unblinded)
                 .zip(place(SessionStep::Walk(number)))

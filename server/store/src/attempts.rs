@@ -1,4 +1,4 @@
-//! Stored results of attempts, including results that arrived too late.
+//! Stored attempts at trials, with their results, including results that arrived too late.
 
 use super::{Connection, Instant, StoreResult, TrialId, json_columns, now};
 use gait_optimizer::{SolveReport, SolveStatus};
@@ -12,7 +12,7 @@ pub struct AttemptResult {
     /// Name of the worker.
     pub worker: String,
     /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
-    pub taken: bool,
+    pub used: bool,
     /// How the solve ended.
     pub status: SolveStatus,
     /// Numerical results of the solve, without those that are not finite.
@@ -30,16 +30,16 @@ pub async fn keep(
     (trial, attempt): (TrialId, u32),
     worker: &str,
     report: &SolveReport,
-    taken: bool,
+    used: bool,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into results (trial_id, attempt, worker, taken, status, report, received_at) \
+        "insert into attempts (trial_id, attempt, worker, used, status, report, received_at) \
          values (?, ?, ?, ?, ?, ?, ?) on conflict do nothing",
     )
     .bind(trial)
     .bind(attempt)
     .bind(worker)
-    .bind(taken)
+    .bind(used)
     .bind(json_columns::to_text("status", &report.status)?)
     .bind(json_columns::readable("report", report)?)
     .bind(now())
@@ -54,13 +54,13 @@ pub async fn keep(
 /// Errors of the database.
 pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<AttemptResult>> {
     let rows =
-        sqlx::query("select * from results where trial_id = ? order by attempt").bind(trial).fetch_all(db).await?;
+        sqlx::query("select * from attempts where trial_id = ? order by attempt").bind(trial).fetch_all(db).await?;
     rows.iter()
         .map(|row| {
             Ok(AttemptResult {
                 attempt: row.try_get("attempt")?,
                 worker: row.try_get("worker")?,
-                taken: row.try_get("taken")?,
+                used: row.try_get("used")?,
                 status: json_columns::column(row, "status")?,
                 report: json_columns::optional_column(row, "report")?,
                 received_at: row.try_get("received_at")?,
