@@ -64,14 +64,14 @@ impl ExcludedActions {
 
 /// The actions that a proposal must avoid: listed ones, and the boxes of excluded ones if the space is too large to list
 /// them.
-pub(crate) struct Taken<'a> {
+pub(crate) struct ForbiddenActions<'a> {
     space: &'a SearchSpace,
     listed: HashSet<ActionIndex>,
     ascending: Vec<u64>,
     boxes: Option<&'a ExcludedActions>,
 }
 
-impl<'a> Taken<'a> {
+impl<'a> ForbiddenActions<'a> {
     pub(crate) fn new(
         space: &'a SearchSpace,
         actions: impl IntoIterator<Item = ActionIndex>,
@@ -154,17 +154,17 @@ mod tests {
             let full = |ranges: [Range<usize>; 3]| ranges.into_iter().chain(rest.clone()).collect::<Vec<_>>();
             let excluded =
                 ExcludedActions::new(&space, vec![full([0..3, 1..4, 0..2]), full([0..2, 0..1, 0..2])]).unwrap();
-            let taken = Taken::new(&space, [ActionIndex(0)], &excluded);
+            let forbidden = ForbiddenActions::new(&space, [ActionIndex(0)], &excluded);
             let mut random = Random::new(1, 0);
             let mut seen = HashSet::new();
             for _ in 0..50 {
-                let action = taken.random_other(&mut random).unwrap();
-                assert!(!taken.contains(action));
+                let action = forbidden.random_other(&mut random).unwrap();
+                assert!(!forbidden.contains(action));
                 seen.insert(space.levels(action)[..3].to_vec());
             }
             assert_eq!(seen, HashSet::from([vec![2, 0, 0], vec![2, 0, 1]]));
             let all = ExcludedActions::new(&space, vec![full([0..3, 0..4, 0..2])]).unwrap();
-            assert_eq!(Taken::new(&space, [], &all).random_other(&mut random), None);
+            assert_eq!(ForbiddenActions::new(&space, [], &all).random_other(&mut random), None);
         }
     }
 }

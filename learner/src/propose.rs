@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::acquisition::{eubo, information_gain, line_cospar, thompson};
 use crate::action::ActionIndex;
 use crate::error::{LearnerError, Result};
-use crate::excluded::{ExcludedActions, Taken};
+use crate::excluded::{ExcludedActions, ForbiddenActions};
 use crate::feedback::FeedbackLog;
 use crate::learner::Learner;
 use crate::posterior::Posterior;
@@ -150,13 +150,14 @@ fn propose_from(
     let settings = posterior.settings();
     let repeats = settings.repeats && settings.method == Method::LineCoSpar && excluded.is_none();
     let none = ExcludedActions::default();
-    let taken = Taken::new(space, posterior.visited().iter().chain(pending).copied(), excluded.unwrap_or(&none));
+    let forbidden =
+        ForbiddenActions::new(space, posterior.visited().iter().chain(pending).copied(), excluded.unwrap_or(&none));
     let exhausted = LearnerError::Exhausted { actions: space.len() };
     let random = &mut Random::new(seed, (posterior.visited().len() + pending.len()) as u64);
     let Some(best) = posterior.best() else {
         let centre = centre(space)?;
-        let at_centre = settings.start == Start::Centre && !taken.contains(centre);
-        let action = if at_centre { Some(centre) } else { taken.random_other(random) };
+        let at_centre = settings.start == Start::Centre && !forbidden.contains(centre);
+        let action = if at_centre { Some(centre) } else { forbidden.random_other(random) };
         return Ok(Proposal { action: action.ok_or(exhausted)?, reason: ProposalReason::FirstAction, best: None });
     };
     let small = space.enumerable().is_ok();
@@ -165,25 +166,29 @@ fn propose_from(
             let found = if repeats {
                 line_cospar::visited_or_on_line(posterior, best, pending, random)?
             } else {
-                line_cospar::unvisited_on_line(posterior, best, &taken, random)?
+                line_cospar::unvisited_on_line(posterior, best, &forbidden, random)?
             };
             if found.is_some() {
                 (found, ProposalReason::ThompsonOnLine)
             } else {
-                let found = line_cospar::random_fallback(posterior, pending, &taken, repeats, random);
+                let found = line_cospar::random_fallback(posterior, pending, &forbidden, repeats, random);
                 (found, ProposalReason::LinesExhausted)
             }
         }
-        Method::Eubo => (eubo::proposal(posterior, best, pending, &taken, random), ProposalReason::ExpectedBestUtility),
-        Method::Thompson if small => (thompson::over_grid(posterior, &taken, random)?, ProposalReason::JointThompson),
+        Method::Eubo => {
+            (eubo::proposal(posterior, best, pending, &forbidden, random), ProposalReason::ExpectedBestUtility)
+        }
+        Method::Thompson if small => {
+            (thompson::over_grid(posterior, &forbidden, random)?, ProposalReason::JointThompson)
+        }
         Method::Thompson => {
-            (thompson::over_candidates(posterior, best, &taken, random)?, ProposalReason::JointThompson)
+            (thompson::over_candidates(posterior, best, &forbidden, random)?, ProposalReason::JointThompson)
         }
         Method::InformationGain => {
-            let found = information_gain::over_candidates(posterior, best, &taken, random);
+            let found = information_gain::over_candidates(posterior, best, &forbidden, random);
             (found, ProposalReason::InformationGain)
         }
-        Method::Random => (taken.random_other(random), ProposalReason::RandomAction),
+        Method::Random => (forbidden.random_other(random), ProposalReason::RandomAction),
     };
     Ok(Proposal { action: found.ok_or(exhausted)?, reason, best: Some(best) })
 }

@@ -17,7 +17,8 @@ mod tuned_actions;
 use arguments::argument;
 use gait_optimizer::execution::{ExecutionOptions, WalksOnGround, simulate};
 use gait_optimizer::{
-    BasinChoice, CancelToken, Gait, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, solve,
+    CancelToken, Gait, GaitProblem, LocalOptimumChoice, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
+    solve,
 };
 use golden_gaits::golden_gait;
 use splitmix::SplitMix;
@@ -36,7 +37,7 @@ const TRAINING_SEED: u64 = 2026;
 fn nearest_of_four() -> SolveOptions {
     SolveOptions {
         initial_guesses: 4,
-        basin_choice: BasinChoice::NearestToReference { within_percent: 100.0 },
+        local_optimum_choice: LocalOptimumChoice::NearestToReference { within_percent: 100.0 },
         ..SolveOptions::default()
     }
 }

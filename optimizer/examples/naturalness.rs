@@ -9,7 +9,9 @@ mod arguments;
 use arguments::argument;
 use gait_optimizer::body::{Axis, Side};
 use gait_optimizer::gait::DomainTrajectory;
-use gait_optimizer::{BasinChoice, CancelToken, Gait, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve};
+use gait_optimizer::{
+    CancelToken, Gait, GaitProblem, GaitSettings, LocalOptimumChoice, Mesh, SolveOptions, Subject, solve,
+};
 use std::error::Error;
 use std::path::Path;
 
@@ -17,7 +19,7 @@ use std::path::Path;
 struct Variant {
     name: &'static str,
     settings: GaitSettings,
-    basin_choice: BasinChoice,
+    local_optimum_choice: LocalOptimumChoice,
     initial_guesses: usize,
     /// Then solved on a mesh twice as fine.
     finer: bool,
@@ -27,13 +29,17 @@ impl Variant {
     fn new(name: &'static str, change: impl Fn(&mut GaitSettings)) -> Self {
         let mut settings = GaitSettings::default();
         change(&mut settings);
-        let SolveOptions { basin_choice, initial_guesses, .. } = SolveOptions::default();
-        Self { name, settings, basin_choice, initial_guesses, finer: false }
+        let SolveOptions { local_optimum_choice, initial_guesses, .. } = SolveOptions::default();
+        Self { name, settings, local_optimum_choice, initial_guesses, finer: false }
     }
 
     /// Of four initial guesses the gait nearest to the reference among those that cost at most 3 % more than the cheapest.
-    fn of_the_natural_basin(self) -> Self {
-        Self { initial_guesses: 4, basin_choice: BasinChoice::NearestToReference { within_percent: 3.0 }, ..self }
+    fn nearest_to_reference(self) -> Self {
+        Self {
+            initial_guesses: 4,
+            local_optimum_choice: LocalOptimumChoice::NearestToReference { within_percent: 3.0 },
+            ..self
+        }
     }
 }
 
@@ -47,7 +53,7 @@ fn variants() -> Vec<Variant> {
     let plain = || Variant::new("none", |_| {});
     vec![
         plain(),
-        Variant { name: "nearest of four guesses within 3 %", ..plain().of_the_natural_basin() },
+        Variant { name: "nearest of four guesses within 3 %", ..plain().nearest_to_reference() },
         Variant { name: "mesh twice as fine", finer: true, ..plain() },
         Variant::new("speed 1.2 to 1.3 m/s", fast),
         Variant::new("double support of 0.12 s", long_double_support),
@@ -98,9 +104,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         "variant,status,gait_rmse_rad,cost_of_transport,iterations,seconds,speed_m_s,double_support_percent,\
          trailing_share_percent,left_knee_peak_deg,right_knee_peak_deg"
     );
-    for Variant { name, settings, basin_choice, initial_guesses, finer } in variants() {
+    for Variant { name, settings, local_optimum_choice, initial_guesses, finer } in variants() {
         let mut problem = GaitProblem { settings, ..GaitProblem::new(subject, muscles)? };
-        let options = SolveOptions { threads: 2, basin_choice, initial_guesses, ..SolveOptions::default() };
+        let options = SolveOptions { threads: 2, local_optimum_choice, initial_guesses, ..SolveOptions::default() };
         let solve_from = |problem: &GaitProblem, warm| solve(problem, warm, &options, &mut |_| {}, &CancelToken::new());
         let mut outcome = solve_from(&problem, None)?;
         let (mut iterations, mut seconds) = (outcome.report.iterations, outcome.report.seconds_total);

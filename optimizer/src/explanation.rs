@@ -20,11 +20,11 @@ mod words;
 use at_limit::domains_at_limit;
 use bound::{Level, loosened, loosest, step};
 use conflict::{BoundSet, conflict, remedies};
-pub use given_bound::GivenBound;
-use relaxation::alone;
+pub use given_bound::BoundValue;
+use relaxation::of_one_bound;
 pub use relaxation::{JointRelaxation, Relaxation, RelaxedBound};
 use search::Search;
-use solves::{SearchEnd, Solves, Unmet};
+use solves::{FailedSearch, SearchEnd, Solves};
 pub use words::{quantity, status_in_words, unit_after_number};
 
 /// Largest number of bounds in a joint relaxation.
@@ -34,7 +34,7 @@ const VIOLATIONS: usize = 5;
 
 /// The end of a solve without a gait.
 #[derive(Debug, Clone, Copy)]
-pub struct Unsolved<'a> {
+pub struct SolveWithoutGait<'a> {
     /// Status of the solve.
     pub status: SolveStatus,
     /// Violations of its last iterate, worst first.
@@ -43,7 +43,7 @@ pub struct Unsolved<'a> {
     pub last: &'a WarmStart,
 }
 
-impl<'a> From<&'a SolveOutcome> for Unsolved<'a> {
+impl<'a> From<&'a SolveOutcome> for SolveWithoutGait<'a> {
     fn from(outcome: &'a SolveOutcome) -> Self {
         Self { status: outcome.report.status, violations: &outcome.violations, last: &outcome.warm_start }
     }
@@ -68,7 +68,7 @@ pub struct BoundAtLimit {
 pub struct Conflict {
     /// The conflicting bounds. Empty if no gait was found with every tuned bound at its loosest value: then fixed
     /// constraints conflict.
-    pub bounds: Vec<GivenBound>,
+    pub bounds: Vec<BoundValue>,
     /// Bounds of other conflicts that were relaxed when this conflict remained.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
@@ -111,9 +111,9 @@ pub struct Explanation {
 }
 
 impl Search<'_> {
-    fn given(&self, set: BoundSet) -> Vec<GivenBound> {
+    fn given(&self, set: BoundSet) -> Vec<BoundValue> {
         let values = self.problem.bounds.to_array();
-        let given = |bound: usize| GivenBound {
+        let given = |bound: usize| BoundValue {
             bound: TunedBounds::NAMES[bound].to_owned(),
             meaning: TunedBounds::MEANINGS[bound].to_owned(),
             value: values[bound],
@@ -149,8 +149,8 @@ impl Search<'_> {
     }
 
     /// The failed searches with a relaxed set at each level, the loosest last.
-    fn searched(&self, set: BoundSet) -> Result<Vec<&Unmet>, SearchEnd> {
-        let mut known: Vec<&Unmet> = Vec::new();
+    fn searched(&self, set: BoundSet) -> Result<Vec<&FailedSearch>, SearchEnd> {
+        let mut known: Vec<&FailedSearch> = Vec::new();
         for level in [Level::Usual, Level::Loosest] {
             let unmet = self.solves.unmet(&loosened(&self.problem.bounds, set, level)?);
             known.extend(unmet.filter(|unmet| known.iter().all(|other| !std::ptr::eq(*other, *unmet))));
@@ -179,7 +179,7 @@ fn suspects(bounds: &TunedBounds, at_limit: BoundSet) -> Vec<usize> {
 /// [`SolveError`] if the problem is invalid or the last iterate belongs to another problem.
 pub fn explain(
     problem: &GaitProblem,
-    unsolved: Unsolved<'_>,
+    unsolved: SolveWithoutGait<'_>,
     options: &SolveOptions,
     progress: &mut dyn FnMut(&str),
     cancel: &CancelToken,
@@ -196,12 +196,12 @@ pub fn explain(
 
 fn found_out(
     problem: &GaitProblem,
-    unsolved: Unsolved<'_>,
+    unsolved: SolveWithoutGait<'_>,
     options: &SolveOptions,
     progress: &mut dyn FnMut(&str),
     cancel: &CancelToken,
 ) -> Result<Explanation, SearchEnd> {
-    let Unsolved { status, violations, last } = unsolved;
+    let SolveWithoutGait { status, violations, last } = unsolved;
     let program = problem.program(problem.muscles)?;
     let x = &last.point.x;
     if x.len() != program.variables() {
@@ -251,7 +251,7 @@ fn found_out(
         if relaxed.bounds.len() > 1 {
             explanation.together.push(relaxed);
         } else {
-            explanation.relaxations.extend(alone(relaxed));
+            explanation.relaxations.extend(of_one_bound(relaxed));
         }
     }
     explanation.relaxations.sort_by(|a, b| a.size().total_cmp(&b.size()));

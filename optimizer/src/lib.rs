@@ -46,9 +46,9 @@ pub use model_error::ModelError;
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
-    BasinChoice, CancelToken, GaitResults, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, MuscleRoute,
-    OtherBasin, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus,
-    StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
+    CancelToken, GaitResults, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, LocalOptimumChoice,
+    MuscleRoute, OtherLocalOptimum, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport,
+    SolveStatus, StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
 };
 pub use subject::Subject;
 pub use tuned_bounds::TunedBounds;

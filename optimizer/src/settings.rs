@@ -69,7 +69,7 @@ pub struct GaitLimits {
     pub friction: f64,
     /// Friction coefficient of the impulse at heel strike.
     pub impact_friction: f64,
-    /// Smallest walking speed D / sum T, m/s. Without it, the minimum of the cost is a shuffling gait at 0.26 m/s.
+    /// Smallest walking speed D / sum T, m/s. Without it, the cheapest gait is a slow shuffle.
     pub speed_min_m_s: f64,
     /// Largest walking speed, m/s.
     pub speed_max_m_s: f64,

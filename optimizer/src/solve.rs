@@ -17,18 +17,20 @@ mod solver_settings;
 mod warm_start;
 
 pub use crate::cancel_token::CancelToken;
-use attempts::{Tried, choose, enforce_between_nodes, number_basins, try_guesses, try_multi_start, try_warm};
+use attempts::{
+    FinishedAttempt, choose, enforce_between_nodes, number_local_optima, try_guesses, try_multi_start, try_warm,
+};
 pub use error::SolveError;
 pub use gait_results::GaitResults;
 pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
-pub use options::{BasinChoice, SolveOptions};
-use outcome::{SolveTally, other_basin, outcome};
+pub use options::{LocalOptimumChoice, SolveOptions};
+use outcome::{SolveTally, other_local_optimum, outcome};
 use phases::SolveContext;
 pub(crate) use phases::final_settings;
 pub use progress::{IterationRecord, SolvePhase};
 pub use report::{
-    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus,
-    StartedFrom, Violation,
+    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport,
+    SolveStatus, StartedFrom, Violation,
 };
 pub use warm_start::WarmStart;
 pub(crate) use warm_start::check_shape;
@@ -37,7 +39,7 @@ use warm_start::on_mesh_of;
 /// Solves a gait problem. Without a time limit ([`SolveOptions::time_limit_s`]), equal inputs give equal bits.
 ///
 /// A cold start solves from [`SolveOptions::initial_guesses`] initial guesses and chooses a gait by
-/// [`SolveOptions::basin_choice`]. If none converges, it tries further guesses until one does
+/// [`SolveOptions::local_optimum_choice`]. If none converges, it tries further guesses until one does
 /// ([`SolveOptions::retry`]). If a warm start does not converge, a cold start follows. Without a converged attempt,
 /// the outcome is the attempt with the smallest violation. If the gait violates bounds between its nodes, the solve
 /// continues with tightened bounds ([`SolveOptions::tightening_rounds`]). `observer` is called once per iteration, on
@@ -62,11 +64,11 @@ pub fn solve(
     if let Some(start) = start {
         tried.push(try_warm(&context, start, observer)?);
     }
-    if !tried.iter().any(Tried::is_final) {
+    if !tried.iter().any(FinishedAttempt::is_final) {
         tried.extend(try_multi_start(&context, observer)?);
     }
-    number_basins(&mut tried);
-    let chosen = choose(&tried, options.basin_choice);
+    number_local_optima(&mut tried);
+    let chosen = choose(&tried, options.local_optimum_choice);
     let started_from = match (warm_start, chosen) {
         (None, _) => StartedFrom::Cold,
         (Some(_), 0) => StartedFrom::Warm,
@@ -114,21 +116,21 @@ pub fn solve_from_guesses(
     let program = problem.program(problem.muscles)?;
     let context = SolveContext { problem, program: &program, options, cancel, started: Instant::now() };
     let mut tried = try_guesses(&context, guesses, 0, observer)?;
-    number_basins(&mut tried);
-    let chosen = choose(&tried, options.basin_choice);
+    number_local_optima(&mut tried);
+    let chosen = choose(&tried, options.local_optimum_choice);
     finish(&context, tried, chosen, StartedFrom::Cold)
 }
 
 /// The outcome of the attempts.
 fn finish(
     context: &SolveContext<'_>,
-    tried: Vec<Tried>,
+    tried: Vec<FinishedAttempt>,
     chosen: usize,
     started_from: StartedFrom,
 ) -> Result<SolveOutcome, SolveError> {
     let mut tally = SolveTally::default();
-    let (mut answer, mut others) = (None, Vec::<OtherBasin>::new());
-    let chosen_basin = tried.get(chosen).and_then(|one| one.attempt.basin);
+    let (mut answer, mut others) = (None, Vec::<OtherLocalOptimum>::new());
+    let chosen_local_optimum = tried.get(chosen).and_then(|one| one.attempt.local_optimum);
     for (index, mut one) in tried.into_iter().enumerate() {
         one.attempt.chosen = index == chosen;
         tally.iterations += one.attempt.iterations;
@@ -136,17 +138,18 @@ fn finish(
         tally.linear_algebra.add(&one.linear_algebra);
         if index == chosen {
             answer = Some((one.candidate, one.margins));
-        } else if let Some(basin) = one.attempt.basin.filter(|basin| Some(*basin) != chosen_basin)
-            && others.iter().all(|other| other.basin != basin)
+        } else if let Some(local_optimum) =
+            one.attempt.local_optimum.filter(|local_optimum| Some(*local_optimum) != chosen_local_optimum)
+            && others.iter().all(|other| other.local_optimum != local_optimum)
         {
-            others.push(other_basin(context, one.candidate, &one.attempt, basin));
+            others.push(other_local_optimum(context, one.candidate, &one.attempt, local_optimum));
         }
         tally.attempts.push(one.attempt);
     }
     match answer {
         Some((candidate, margins)) => {
             let outcome = outcome(context, candidate, &margins, tally, started_from);
-            Ok(SolveOutcome { other_basins: others, ..outcome })
+            Ok(SolveOutcome { other_local_optima: others, ..outcome })
         }
         None => {
             Err(ModelError::OutOfRange { field: "guesses".to_owned(), value: 0.0, minimum: 1.0, maximum: 1e3 }.into())

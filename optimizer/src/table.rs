@@ -1,6 +1,7 @@
 //! Strict parser of tables of numbers over time. Errors name line and column; a table with an error is rejected.
 
 use crate::model_error::ModelError;
+use std::borrow::Cow;
 
 /// The lines of a file, without the byte order mark that spreadsheets write first.
 pub(crate) fn lines_of(text: &str) -> Vec<&str> {
@@ -49,17 +50,26 @@ const UNEVENNESS: f64 = 0.5;
 pub(crate) enum Separator {
     /// Any number of tabs or spaces.
     Blank,
-    /// One comma.
+    /// One comma. Cells may be quoted, as some programs write names.
     Comma,
 }
 
 impl Separator {
-    fn split(self, line: &str) -> Vec<&str> {
+    fn split(self, line: &str) -> Vec<Cow<'_, str>> {
         match self {
-            Self::Blank => line.split_whitespace().collect(),
-            Self::Comma => line.split(',').map(str::trim).collect(),
+            Self::Blank => line.split_whitespace().map(Cow::Borrowed).collect(),
+            // A quote that is not closed stays in its cell, which is then no number.
+            Self::Comma if line.contains('"') && line.matches('"').count() % 2 == 0 => quoted_cells(line),
+            Self::Comma => line.split(',').map(|cell| Cow::Borrowed(cell.trim())).collect(),
         }
     }
+}
+
+/// The cells of a line with quotes (RFC 4180). Text is valid in every record, so that there is no error.
+fn quoted_cells(line: &str) -> Vec<Cow<'_, str>> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).trim(csv::Trim::All).from_reader(line.as_bytes());
+    let record = reader.records().next().and_then(Result::ok).unwrap_or_default();
+    record.iter().map(|cell| Cow::Owned(cell.to_owned())).collect()
 }
 
 impl Table {
@@ -74,7 +84,7 @@ impl Table {
     ) -> Result<Self, ModelError> {
         let malformed = |line: usize, reason: String| malformed(what, line, None, reason);
         let mut names: Vec<String> = match lines.first() {
-            Some(line) => separator.split(line).into_iter().map(str::to_owned).collect(),
+            Some(line) => separator.split(line).into_iter().map(Cow::into_owned).collect(),
             None => return Err(malformed(first_line, "the line of column names is missing".to_owned())),
         };
         if let TimeColumn::Column(time_name) = clock
@@ -109,12 +119,12 @@ impl Table {
             lines: Vec::new(),
             rate_hz,
         };
-        let mut before = "";
+        let mut before = String::new();
         for (index, line) in body[..filled].iter().enumerate() {
             let cells = separator.split(line);
-            let word = words.and_then(|column| cells.get(column).copied()).unwrap_or_default();
+            let word = words.and_then(|column| cells.get(column)).map_or("", |cell| cell.as_ref());
             table.add_row(first_line + 1 + index, &cells, word != before)?;
-            before = word;
+            word.clone_into(&mut before);
         }
         if table.rows.len() < FEWEST_ROWS {
             let reason = format!("the number of rows is {}; it must be at least {FEWEST_ROWS}", table.rows.len());
@@ -124,7 +134,7 @@ impl Table {
     }
 
     /// Parses a row; `opens` if it is the first row of a domain.
-    fn add_row(&mut self, line: usize, cells: &[&str], opens: bool) -> Result<(), ModelError> {
+    fn add_row(&mut self, line: usize, cells: &[Cow<'_, str>], opens: bool) -> Result<(), ModelError> {
         let columns = self.names.len() + usize::from(self.words.is_some());
         if cells.len() != columns {
             let reason = format!("the number of cells is {}; it must be {columns}", cells.len());
@@ -240,4 +250,38 @@ impl Table {
 pub(crate) fn malformed(what: &str, line: usize, column: Option<usize>, reason: String) -> ModelError {
     let column = column.map_or_else(String::new, |column| format!(", column {column}"));
     ModelError::Malformed { what: format!("{what}, line {line}{column}"), reason }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn read(lines: &[String]) -> Result<Table, ModelError> {
+        let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+        Table::read("a.csv", &lines, 1, Separator::Comma, TimeColumn::Column("time_s"))
+    }
+
+    fn lines(quote: &str) -> Vec<String> {
+        let names = format!("{quote}time_s{quote},{quote}knee{quote}");
+        std::iter::once(names).chain((0..20).map(|row| format!("{quote}0.{row:02}{quote}, {row}"))).collect()
+    }
+
+    #[test]
+    fn quoted_cells_are_read_like_plain_ones() {
+        assert_eq!(read(&lines("\"")).unwrap(), read(&lines("")).unwrap());
+        assert_eq!(read(&lines("\"")).unwrap().column("knee").unwrap().len(), 20);
+    }
+
+    #[test]
+    fn open_quote_is_refused_with_line_and_column() {
+        for (row, place) in
+            [("0.02,\"2", "line 4, column 2"), ("\"0.02,2", "line 4, column 1"), ("0.02,2\"", "column 2")]
+        {
+            let mut open = lines("");
+            open[3] = row.to_owned();
+            let refused = read(&open).unwrap_err().to_string();
+            assert!(refused.contains(place), "{refused}");
+        }
+    }
 }

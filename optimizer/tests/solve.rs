@@ -40,9 +40,13 @@ fn warm_start_converges_after_a_cold_solve() {
     assert!(report.gait_rmse_rad > 0.1 && report.gait_rmse_rad < 3.0, "{}", report.gait_rmse_rad);
     assert_eq!(COLD.gait.domains.len(), 8);
     // The two initial guesses end in one or two local optima.
-    let basins: Vec<_> = report.attempts.iter().map(|a| (a.basin, a.objective)).collect();
-    assert_eq!(basins[0].0, Some(1));
-    assert_eq!(basins[1].0 == Some(1), (basins[1].1 / basins[0].1 - 1.0).abs() < 1e-4, "{basins:?}");
+    let local_optima: Vec<_> = report.attempts.iter().map(|a| (a.local_optimum, a.objective)).collect();
+    assert_eq!(local_optima[0].0, Some(1));
+    assert_eq!(
+        local_optima[1].0 == Some(1),
+        (local_optima[1].1 / local_optima[0].1 - 1.0).abs() < 1e-4,
+        "{local_optima:?}"
+    );
 
     let warm = solved(&problem("a5=0.013"), Some(&COLD.warm_start), 400);
     assert_eq!((warm.report.status, warm.report.started_from), (SolveStatus::Converged, StartedFrom::Warm));
@@ -57,7 +61,7 @@ fn figures_of_a_gait_are_those_of_its_report_and_every_other_value_differs() {
     let reference = problem("").reference;
     for outcome in [&*COLD, &solved(&problem(""), None, 3)] {
         let figures = GaitResults::of(&outcome.gait, &reference).unwrap();
-        let stated = GaitResults::stated_in(&outcome.report);
+        let stated = GaitResults::of_report(&outcome.report);
         assert_eq!(figures, stated);
         let scaled = |figure: &mut f64| *figure *= 1.0 + 1e-6;
         let changes: [fn(&mut GaitResults) -> &mut f64; 7] = [

@@ -115,7 +115,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
         vec![Violation { row: "SS2_R node 3, C3 swing foot clearance".to_owned(), amount: 0.004, unit: "m".to_owned() }]
     };
     SolveOutcome {
-        other_basins: Vec::new(),
+        other_local_optima: Vec::new(),
         report: SolveReport {
             status,
             started_from: if assignment.warm_start.is_some() { StartedFrom::Warm } else { StartedFrom::Cold },
@@ -153,7 +153,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
                 objective: 0.1,
                 gait_rmse_rad: rmse,
                 reason: String::new(),
-                basin: Some(1),
+                local_optimum: Some(1),
                 chosen: true,
             }],
         },

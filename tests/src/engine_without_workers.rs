@@ -2,7 +2,7 @@
 
 use futures_util::future::BoxFuture;
 use gaitwright_service::dispatch_error::DispatchError;
-use gaitwright_service::workers::{Assignment, Attempt, Dispatch, News};
+use gaitwright_service::workers::{Assignment, Attempt, Dispatch, EngineMessage};
 use gaitwright_store::TrialId;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -44,7 +44,7 @@ impl Dispatch for Away {
         Box::pin(async move { self.jobs.lock().unwrap().retain(|attempt| attempt.trial != trial) })
     }
 
-    fn next(&self) -> BoxFuture<'_, News> {
+    fn next(&self) -> BoxFuture<'_, EngineMessage> {
         Box::pin(std::future::pending())
     }
 }

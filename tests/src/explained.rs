@@ -1,9 +1,9 @@
 //! Infeasibility explanations without solves, and trials to explain.
 
 use gait_learner::SearchSpace;
-use gait_optimizer::explanation::{BoundAtLimit, Conflict, Explanation, GivenBound, Relaxation};
+use gait_optimizer::explanation::{BoundAtLimit, BoundValue, Conflict, Explanation, Relaxation};
 use gait_optimizer::{CancelToken, SolveError, SolveStatus, TunedBounds, Violation};
-use gaitwright_service::workers::{Explain, Unexplained};
+use gaitwright_service::workers::{Explain, SolveToExplain};
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -42,7 +42,7 @@ impl Clearance {
 }
 
 impl Explain for Clearance {
-    fn explain(&self, solve: &Unexplained, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError> {
+    fn explain(&self, solve: &SolveToExplain, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError> {
         self.counts.begun.fetch_add(1, Ordering::SeqCst);
         assert!(!self.panics, "the explanation panics");
         let begun = Instant::now();
@@ -81,7 +81,7 @@ pub fn explanation(bounds: &TunedBounds, status: SolveStatus, violations: &[Viol
     };
     let (bound, meaning) = named(CLEARANCE);
     let conflict = Conflict {
-        bounds: vec![GivenBound { bound, meaning, value: bounds[CLEARANCE] }],
+        bounds: vec![BoundValue { bound, meaning, value: bounds[CLEARANCE] }],
         without: Vec::new(),
         naturalness_terms: Vec::new(),
         violations: violations.to_vec(),

@@ -83,12 +83,12 @@ impl Answer {
 impl Service {
     /// Starts a service with a solver and this number of workers.
     pub async fn start(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
-        Self::start_with(database, Arc::new(InProcess::new(workers, Arc::new(solver)).standing_back())).await
+        Self::start_with(database, Arc::new(InProcess::new(workers, Arc::new(solver)).with_lower_priority())).await
     }
 
     /// Starts a service that certifies gaits on request only.
     pub async fn start_without_certificates(database: &Path, solver: impl Evaluate) -> Self {
-        let engine = Arc::new(InProcess::new(1, Arc::new(solver)).standing_back());
+        let engine = Arc::new(InProcess::new(1, Arc::new(solver)).with_lower_priority());
         Self::over(with_catalogue(database).await, engine, None)
     }
 
@@ -115,7 +115,7 @@ impl Service {
         certify: impl Certify,
         explain: impl Explain,
     ) -> Self {
-        let engine = Arc::new(InProcess::new(1, Arc::new(solver)).standing_back());
+        let engine = Arc::new(InProcess::new(1, Arc::new(solver)).with_lower_priority());
         let after_solves = AfterSolves { certify: Arc::new(certify), explain: Arc::new(explain) };
         Self::over(with_catalogue(database).await, engine, Some(after_solves))
     }
@@ -345,7 +345,7 @@ async fn pass_every_gait(store: &Store) -> bool {
     }
     let Ok(mut writer) = store.write().await else { return false };
     for (trial, _) in &waiting {
-        certificates::keep(&mut writer, *trial, &certificate(true)).await.unwrap();
+        certificates::insert(&mut writer, *trial, &certificate(true)).await.unwrap();
     }
     commit(writer).await.is_ok()
 }

@@ -5,7 +5,7 @@
 use axum::http::{Method, StatusCode};
 use gaitwright_service::access::{Right, Role};
 use gaitwright_service::studies::lab::{self, NewLabSession};
-use gaitwright_store::allocations::{self, Lot};
+use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::blind_pairs::{self, BlindPairKind, NewBlindPair};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
@@ -239,7 +239,7 @@ async fn sides_of_10_000_pairs_are_balanced_and_independent_of_earlier_pairs() {
             could_have_known: false,
         };
         let id = blind_pairs::insert(&mut writer, &new).await.unwrap();
-        allocations::of_pair(&mut writer, id, None, Lot::draw().unwrap()).await.unwrap();
+        allocations::of_pair(&mut writer, id, None, RandomDraw::draw().unwrap()).await.unwrap();
     }
     let rows = "select swapped from blind_pair_allocations order by rowid";
     let rows = sqlx::query(rows).fetch_all(&mut **writer).await.unwrap();
@@ -700,7 +700,7 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_d
     assert!(seen.answer.unwrap().could_have_known);
     commit(writer).await.unwrap();
     let session = get(&service, &clinician, &format!("/api/v1/lab-sessions/{id}")).await.json();
-    assert_eq!(session["walks"][1]["after_unblinding"], true);
+    assert_eq!(session["walks"][1]["recorded_after_unblinding"], true);
 
     // All other callers are refused, such as a token with the scope run and a rater.
     let file = format!("/api/v1/lab-sessions/{id}/controller.json?walk=2");

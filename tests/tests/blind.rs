@@ -430,3 +430,35 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
     }
     service.stop().await;
 }
+
+#[tokio::test]
+async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let rater = rater_of(&service, &[study]).await;
+    let (admin, clinician) = (signed_in(&service, Role::Admin).await, signed_in(&service, Role::Clinician).await);
+    let (page, form) = (format!("/studies/{study}/members"), "application/x-www-form-urlencoded");
+    let read = async |who: &As| send(&service, who, &Method::GET, &page, "", "").await.text;
+    assert!(!read(&admin).await.contains("id=\"raters\""), "nobody has compared gaits yet");
+
+    let next = format!("/api/v1/studies/{study}/blind-pairs/next");
+    let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    send(&service, &rater, &Method::POST, &answer, "application/json", r#"{"answer": "first"}"#).await;
+    let (seen, by_clinician) = (read(&admin).await, read(&clinician).await);
+    assert!(seen.contains("<th scope=\"row\">a rater</th>") && seen.contains("<td>concealed</td>"), "{seen}");
+    assert!(seen.contains("value=\"unblind\"") && !by_clinician.contains("value=\"unblind\""), "{by_clinician}");
+
+    let unblind = "button=unblind&rater=a+rater&reason=adverse+event";
+    let refused = send(&service, &clinician, &Method::POST, &page, form, unblind).await;
+    assert_eq!(refused.status, StatusCode::FORBIDDEN);
+    let without_reason = send(&service, &admin, &Method::POST, &page, form, "button=unblind&rater=a+rater").await;
+    assert_eq!(without_reason.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(read(&admin).await.contains("<td>concealed</td>"), "refused requests reveal nothing");
+    let done = send(&service, &admin, &Method::POST, &page, form, unblind).await;
+    assert_eq!(done.status, StatusCode::SEE_OTHER, "{}", done.text);
+    let seen = read(&admin).await;
+    assert!(seen.contains("<td>1 of 1 (21 % to 100 %)</td>") && !seen.contains("value=\"unblind\""), "{seen}");
+    service.stop().await;
+}

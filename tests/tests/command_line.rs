@@ -81,7 +81,7 @@ fn other_invalid_arguments_are_refused() {
     refused(&["simulate", "nowhere.json", "--ground", "-5"], "'--ground <MILLIMETRES>': must be a number from 0 to 50");
     refused(&["solve", "--height-m", "tall", "--mass-kg", "65"], "'--height-m <METRES>': must be a number");
     refused(&["emg", "nowhere.csv", "--order", "high"], "must be 2, 4, 6 or 8");
-    refused(&["solve", "--warm", "nowhere.json", "--warm-basin", "first"], "must be a whole number");
+    refused(&["solve", "--warm", "nowhere.json", "--warm-local-optimum", "first"], "must be a whole number");
     refused(&["prune", "--older-than-days", "0"], "must be a whole number from 1 to 36500");
     refused(&["export", "first", "study.gait"], "must be the identifier of a study");
 }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::certified_best::Judged;
+use gaitwright_service::studies::certified_best::BestCertification;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::summary;
 use gaitwright_service::studies::trial_choice::ranking_to_show;
@@ -43,7 +43,7 @@ async fn documents_keep_their_shape() {
     let there = snapshot.clone();
     let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &there, &Beliefs::default())).await;
     let best = rank.unwrap().unwrap().first().copied();
-    let mut tune = serde_json::to_value(summary::of(&snapshot, best, Judged::default())).unwrap();
+    let mut tune = serde_json::to_value(summary::of(&snapshot, best, BestCertification::default())).unwrap();
     tune["trials"].as_array_mut().unwrap().reverse();
     insta::assert_json_snapshot!("tune", shape(&tune));
 

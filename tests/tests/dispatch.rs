@@ -7,7 +7,7 @@ use axum::http::StatusCode;
 use futures_util::future::BoxFuture;
 use gaitwright_service::dispatch_error::DispatchError;
 use gaitwright_service::workers::nats::JetStream;
-use gaitwright_service::workers::{Assignment, Dispatch, InProcess, News, Receipt};
+use gaitwright_service::workers::{Assignment, Dispatch, EngineMessage, InProcess, Receipt};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
@@ -350,7 +350,7 @@ impl Dispatch for Refuses {
         self.inner.cancel(trial)
     }
 
-    fn next(&self) -> BoxFuture<'_, News> {
+    fn next(&self) -> BoxFuture<'_, EngineMessage> {
         self.inner.next()
     }
 }
@@ -367,44 +367,46 @@ enum Change {
 struct Changed {
     engine: Arc<dyn Dispatch>,
     change: Change,
-    held: Mutex<VecDeque<News>>,
+    held: Mutex<VecDeque<EngineMessage>>,
     /// The held result waits until another attempt is running.
     holds_back: AtomicBool,
 }
 
 impl Changed {
-    async fn changed(&self) -> News {
+    async fn changed(&self) -> EngineMessage {
         loop {
             if !self.holds_back.load(Ordering::SeqCst)
-                && let Some(news) = self.held.lock().unwrap().pop_front()
+                && let Some(message) = self.held.lock().unwrap().pop_front()
             {
-                return news;
+                return message;
             }
-            let news = self.engine.next().await;
-            let attempt = match &news {
-                News::Started { attempt, .. } | News::Iterated { attempt, .. } | News::Ended { attempt, .. } => {
-                    *attempt
-                }
+            let message = self.engine.next().await;
+            let attempt = match &message {
+                EngineMessage::Started { attempt, .. }
+                | EngineMessage::Iterated { attempt, .. }
+                | EngineMessage::Ended { attempt, .. } => *attempt,
             };
             let mut held = self.held.lock().unwrap();
-            match (self.change, &news) {
-                (Change::Twice, News::Ended { worker, finding, .. }) => {
-                    let (worker, finding, receipt) = (worker.clone(), finding.clone(), Receipt::not_needed());
-                    held.push_back(News::Ended { attempt, worker, finding, receipt });
+            match (self.change, &message) {
+                (Change::Twice, EngineMessage::Ended { worker, result, .. }) => {
+                    let (worker, result, receipt) = (worker.clone(), result.clone(), Receipt::not_needed());
+                    held.push_back(EngineMessage::Ended { attempt, worker, result, receipt });
                 }
-                (Change::Late, News::Ended { .. }) if attempt.number == 1 && self.holds_back.load(Ordering::SeqCst) => {
+                (Change::Late, EngineMessage::Ended { .. })
+                    if attempt.number == 1 && self.holds_back.load(Ordering::SeqCst) =>
+                {
                     // A broker delivers unacknowledged messages again.
                     held.clear();
-                    held.push_back(news);
+                    held.push_back(message);
                     continue;
                 }
                 (Change::Late, _) if attempt.number == 2 && self.holds_back.swap(false, Ordering::SeqCst) => {
-                    held.push_back(news);
+                    held.push_back(message);
                     continue;
                 }
                 _ => {}
             }
-            return news;
+            return message;
         }
     }
 }
@@ -434,7 +436,7 @@ impl Dispatch for Changed {
         self.engine.cancel(trial)
     }
 
-    fn next(&self) -> BoxFuture<'_, News> {
+    fn next(&self) -> BoxFuture<'_, EngineMessage> {
         Box::pin(self.changed())
     }
 }

@@ -152,11 +152,11 @@ async fn study_form_checks_every_field() {
         ("parallel_trials", "1.5", "it must be 1 to 64"),
         ("seed", "-1", "it must be 0 to 9007199254740991"),
         (
-            "basin_within_percent",
+            "nearest_within_percent",
             "101",
             "\u{201c}Objective tolerance, %\u{201d} is \u{201c}101\u{201d}; it must be 0 to 100, or empty",
         ),
-        ("basin_within_percent", "all", "it must be 0 to 100, or empty"),
+        ("nearest_within_percent", "all", "it must be 0 to 100, or empty"),
         ("subject", "paper-1", "a subject from the list"),
         ("pseudonym", "S09", "A new subject"),
         ("height_m", "1.8", "A new subject"),
@@ -168,10 +168,10 @@ async fn study_form_checks_every_field() {
     assert_eq!(send(("muscles", "on")).await.status, StatusCode::SEE_OTHER);
     let lowest = json!("lowest_objective");
     let nearest = json!({"nearest_to_reference": {"within_percent": 5.0}});
-    assert_eq!(send(("basin_within_percent", "5")).await.status, StatusCode::SEE_OTHER);
+    assert_eq!(send(("nearest_within_percent", "5")).await.status, StatusCode::SEE_OTHER);
     let made = service.fetch("/api/v1/studies").await.items();
     for (study, expected) in made.as_array().unwrap().iter().zip([nearest, lowest]) {
-        assert_eq!(study["solve_options"]["basin_choice"], expected, "{study}");
+        assert_eq!(study["solve_options"]["local_optimum_choice"], expected, "{study}");
     }
     service.stop().await;
 }
@@ -564,14 +564,14 @@ async fn ended_study_is_extended_on_its_page() {
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(page.contains("min=\"6\"") && !page.contains("value=\"stop\""), "{page}");
     let path = format!("/studies/{study}/do");
-    let same = service.post_text(&path, FORM, "act=extend&trial_budget=5").await;
+    let same = service.post_text(&path, FORM, "transition=extend&trial_budget=5").await;
     is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "trial_budget");
     is_page(
-        &service.post_text(&path, FORM, "act=extend").await,
+        &service.post_text(&path, FORM, "transition=extend").await,
         StatusCode::UNPROCESSABLE_ENTITY,
         "total number of trials",
     );
-    assert_eq!(service.post_text(&path, FORM, "act=extend&trial_budget=7").await.status, StatusCode::SEE_OTHER);
+    assert_eq!(service.post_text(&path, FORM, "transition=extend&trial_budget=7").await.status, StatusCode::SEE_OTHER);
     service.wait_for_trials(study, 7).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
@@ -581,8 +581,8 @@ async fn ended_study_is_extended_on_its_page() {
 async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_field() {
     let (_folder, service) = service().await;
     let send = async |body: &str| service.post_text("/users", FORM, body).await;
-    assert!(send("act=add_user&name=K1&role=clinician").await.status.is_success());
-    let taken = send("act=add_user&name=K1&role=admin").await;
+    assert!(send("button=add_user&name=K1&role=clinician").await.status.is_success());
+    let taken = send("button=add_user&name=K1&role=admin").await;
     is_page(&taken, StatusCode::CONFLICT, "There is already a user");
     for kept in [
         "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",
@@ -591,7 +591,7 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     ] {
         assert!(taken.text.contains(kept), "{kept}: {}", taken.text);
     }
-    let refused = send("act=make_token&name=treadmill&days=soon&run=on").await;
+    let refused = send("button=make_token&name=treadmill&days=soon&run=on").await;
     is_page(
         &refused,
         StatusCode::UNPROCESSABLE_ENTITY,
@@ -603,7 +603,7 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     assert!(!refused.text.contains("name=\"read\" checked"), "{}", refused.text);
     assert_eq!(refused.text.matches("aria-invalid").count(), 1);
     assert!(!refused.text.contains("gait_"), "no secret");
-    let nothing = send("act=make_token&name=treadmill&days=").await;
+    let nothing = send("button=make_token&name=treadmill&days=").await;
     is_page(&nothing, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Scopes\u{201d} must be one or more of");
     service.stop().await;
 }
@@ -676,7 +676,7 @@ async fn study_is_renamed_tagged_found_and_archived() {
     let other = service.study(|new| (new.trial_budget, new.name) = (1, Some("Other".to_owned()))).await;
     service.wait_for(other, &[StudyState::Finished]).await;
     let details = format!("/studies/{study}/details");
-    let form = "act=save&name=Visit+2&tags=treadmill,+pilot,pilot&notes=shoes%0D%0Anew";
+    let form = "button=save&name=Visit+2&tags=treadmill,+pilot,pilot&notes=shoes%0D%0Anew";
     assert_eq!(made(&service.post_text(&details, FORM, form).await), study);
     let stored = service.get(study).await;
     assert_eq!((stored.plan.name.as_str(), stored.tags.join(" ")), ("Visit 2", "pilot treadmill".to_owned()));
@@ -697,17 +697,17 @@ async fn study_is_renamed_tagged_found_and_archived() {
     assert_eq!(lists("?text=%25").await, [false, false], "no wildcard");
     is_page(&service.fetch("/?state=lost").await, StatusCode::UNPROCESSABLE_ENTITY, "a state from the list");
 
-    let taken = service.post_text(&details, FORM, "act=save&name=Other&tags=&notes=kept").await;
+    let taken = service.post_text(&details, FORM, "button=save&name=Other&tags=&notes=kept").await;
     is_page(&taken, StatusCode::UNPROCESSABLE_ENTITY, "for example \u{201c}Other (2)\u{201d}");
     assert!(taken.text.contains("kept</textarea>"), "{}", taken.text);
-    let long = format!("act=save&name=x&tags={}&notes=", "t".repeat(41));
+    let long = format!("button=save&name=x&tags={}&notes=", "t".repeat(41));
     is_page(&service.post_text(&details, FORM, &long).await, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Tags\u{201d}");
 
-    assert_eq!(service.post_text(&details, FORM, "act=archive").await.status, StatusCode::SEE_OTHER);
+    assert_eq!(service.post_text(&details, FORM, "button=archive").await.status, StatusCode::SEE_OTHER);
     assert_eq!((lists("").await, lists("?archived=yes").await), ([false, true], [true, false]));
     assert_eq!((rest("").await, rest("?archived=true").await), ([false, true], [true, false]));
     assert!(service.fetch(&format!("/studies/{study}")).await.status.is_success(), "it is still there");
-    assert_eq!(service.post_text(&details, FORM, "act=restore").await.status, StatusCode::SEE_OTHER);
+    assert_eq!(service.post_text(&details, FORM, "button=restore").await.status, StatusCode::SEE_OTHER);
     assert_eq!(lists("").await, [true, true]);
     service.stop().await;
 }
@@ -717,7 +717,7 @@ async fn running_study_cannot_be_archived() {
     let (_folder, service) = service().await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
-    let refused = service.post_text(&format!("/studies/{study}/details"), FORM, "act=archive").await;
+    let refused = service.post_text(&format!("/studies/{study}/details"), FORM, "button=archive").await;
     is_page(&refused, StatusCode::CONFLICT, "A study that has not ended cannot be archived");
     assert!(service.get(study).await.archived_at.is_none());
     service.stop().await;

@@ -264,6 +264,26 @@ fn every_link_of_a_page_to_a_guide_has_its_section() {
     }
 }
 
+/// The glossary alone does not count: the footer of every page links to it.
+#[test]
+fn every_page_links_to_the_guide_it_is_about() {
+    // Pages without a caller, errors, and the guides themselves.
+    let without = ["sign_in", "sign_in_link", "no_account", "error", "unsent_form", "study_closed", "help"];
+    let mut pages = 0;
+    for template in std::fs::read_dir(repository().join("web/templates")).unwrap() {
+        let template = template.unwrap().path();
+        let text = std::fs::read_to_string(&template).unwrap();
+        let name = template.file_stem().unwrap().to_string_lossy();
+        if !text.contains("{% extends \"base.html\" %}") || without.contains(&name.as_ref()) {
+            continue;
+        }
+        pages += 1;
+        let mut guides = text.split("href=\"/help/").skip(1).map(|rest| rest.split(['"', '#']).next().unwrap());
+        assert!(guides.any(|guide| guide != "glossary"), "{name} links to no guide");
+    }
+    assert!(pages > 20, "{pages}");
+}
+
 #[test]
 fn guides_have_every_tuned_bound() {
     let guide = |name: &str| std::fs::read_to_string(repository().join("docs").join(name)).unwrap();

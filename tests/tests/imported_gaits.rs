@@ -37,7 +37,7 @@ async fn imported(folder: &Path, from: &Store, study: StudyId) -> [Store; 2] {
 
 async fn certify(store: &Store, trial: &Trial, passed: bool) {
     let mut writer = store.write().await.unwrap();
-    certificates::keep(&mut writer, trial.id, &certificate(passed)).await.unwrap();
+    certificates::insert(&mut writer, trial.id, &certificate(passed)).await.unwrap();
     commit(writer).await.unwrap();
 }
 

@@ -88,7 +88,8 @@ async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     let row: LabSessionId = id(&session).parse().unwrap();
     let drawn = if gait_a_first(&service.store, row).await { ["gait_a", "gait_b"] } else { ["gait_b", "gait_a"] };
     assert_eq!(conditions(&told), [json!("normal"), json!(drawn[0]), json!(drawn[1])]);
-    let after: Vec<_> = told["walks"].as_array().unwrap().iter().map(|walk| &walk["after_unblinding"]).collect();
+    let after: Vec<_> =
+        told["walks"].as_array().unwrap().iter().map(|walk| &walk["recorded_after_unblinding"]).collect();
     assert_eq!(after, [&json!(false), &json!(false), &json!(true)]);
     assert_eq!(told["walks"][2]["recorded"]["note"], "tired");
 
@@ -623,7 +624,7 @@ async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_l
 
     let columns =
         "column_RF_L=EMG+1&column_TA_L=TA_L&column_BF_L=BF_L&column_GAS_L=GAS_L&column_RF_R=RF_R&column_BF_R=BF_R";
-    let first = send("act=preview").await;
+    let first = send("button=preview").await;
     assert_eq!(first.status, StatusCode::OK, "{}", first.text);
     assert!(
         first.text.contains("Not ready for upload") && first.text.contains("<option>EMG 1</option>"),
@@ -631,22 +632,22 @@ async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_l
         first.text
     );
     let shown =
-        send(&format!("act=preview&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
+        send(&format!("button=preview&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
     assert!(shown.text.contains("The file can be uploaded: walk1.csv."), "{}", shown.text);
     assert_eq!(shown.text.matches("raw signal</span>").count(), 6, "a chart for each channel");
     assert!(shown.text.contains("<option selected>EMG 1</option>") && shown.text.contains("<td>rejected</td>"));
     assert_eq!(files().await, json!([]), "a preview stores nothing");
-    let unreadable = service.post_text(&page, FORM, "walk=1&format=csv&recording=time_s,a%0A0,x&act=preview").await;
+    let unreadable = service.post_text(&page, FORM, "walk=1&format=csv&recording=time_s,a%0A0,x&button=preview").await;
     assert_eq!(unreadable.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", unreadable.text);
 
-    let beyond = send(&format!("act=upload&heel_strike_column=heel&rejected_strides=9&{columns}")).await;
+    let beyond = send(&format!("button=upload&heel_strike_column=heel&rejected_strides=9&{columns}")).await;
     assert!(
         beyond.status == StatusCode::UNPROCESSABLE_ENTITY && beyond.text.contains("Rejected strides"),
         "{}",
         beyond.text
     );
     let kept =
-        send(&format!("act=upload&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
+        send(&format!("button=upload&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
     assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     assert_eq!(files().await[0]["file_name"], "walk1.csv");
     let result = service.post(&format!("/api/v1/lab-sessions/{}/emg-results", id(&session)), &json!({})).await.json();

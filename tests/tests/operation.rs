@@ -59,7 +59,7 @@ async fn exported_study_gives_the_same_posterior_in_another_record() {
     let explained = converged[1].id;
     let why = explanation(&converged[1].action, SolveStatus::Infeasible, &[]);
     assert!(explanations::request(&mut writer, explained, &Actor::program()).await.unwrap());
-    assert!(explanations::keep(&mut writer, explained, "{}", &why).await.unwrap());
+    assert!(explanations::insert(&mut writer, explained, "{}", &why).await.unwrap());
     commit(writer).await.unwrap();
     let file = exported(&service.store, study).await;
 
@@ -122,7 +122,7 @@ async fn prune_drops_old_trajectories_and_keeps_the_best() {
     let measured = trials.iter().filter(|trial| trial.gait_rmse_rad.is_some());
     let best = measured.min_by(|a, b| a.gait_rmse_rad.partial_cmp(&b.gait_rmse_rad).unwrap()).unwrap().id;
     let mut writer = service.store.write().await.unwrap();
-    certificates::keep(&mut writer, best, &certificate(true)).await.unwrap();
+    certificates::insert(&mut writer, best, &certificate(true)).await.unwrap();
     commit(writer).await.unwrap();
     // Its warm start is kept, so its problem can be solved again.
     let started_from =
@@ -313,7 +313,7 @@ async fn every_command_reads_record_and_second_anchor_from_the_settings_file() {
     Service::start(&database, Analytic::default(), 1).await.stop().await;
     let store = Store::open(&database).await.unwrap();
     let mut writer = store.write().await.unwrap();
-    gaitwright_service::access::user_administration::way_in(&mut writer).await.unwrap();
+    gaitwright_service::access::user_administration::operator_administrator(&mut writer).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     let (done, text) = verified();

@@ -40,7 +40,7 @@ impl Target {
     }
 
     /// Sends a request and requires that the program does not fail.
-    async fn stands(&self, request: Request<Body>, what: &str) {
+    async fn survives(&self, request: Request<Body>, what: &str) {
         let shown = format!("{what}: {} {}", request.method(), request.uri());
         let answer = self.service.send(request).await;
         assert!(answer.status.as_u16() < 500, "{shown}: {} {}", answer.status, answer.text);
@@ -138,7 +138,7 @@ async fn malformed_bodies_are_refused_without_server_errors() {
                     .header("content-type", "application/json")
                     .body(Body::from(body))
                     .unwrap();
-                target.stands(request, &json.to_string()).await;
+                target.survives(request, &json.to_string()).await;
             }
         }
     }
@@ -157,7 +157,21 @@ async fn malformed_forms_are_refused_without_server_errors() {
         "/sign-in".to_owned(),
         "/account".to_owned(),
     ];
-    let names = ["act", "a", "b", "answer", "source", "author", "key", "note", "name", "password", "subject", "seed"];
+    let names = [
+        "button",
+        "transition",
+        "a",
+        "b",
+        "answer",
+        "source",
+        "author",
+        "key",
+        "note",
+        "name",
+        "password",
+        "subject",
+        "seed",
+    ];
     let field =
         (prop::sample::select(names.to_vec()), "\\PC{0,20}").prop_map(|(name, value)| format!("{name}={value}"));
     let text = prop_oneof![
@@ -169,7 +183,7 @@ async fn malformed_forms_are_refused_without_server_errors() {
             .header("content-type", "application/x-www-form-urlencoded")
             .body(Body::from(body.clone()))
             .unwrap();
-        target.stands(request, &String::from_utf8_lossy(&body)).await;
+        target.survives(request, &String::from_utf8_lossy(&body)).await;
     }
     target.service.stop().await;
 }
@@ -248,7 +262,7 @@ async fn malformed_cursors_and_identifiers_are_refused_without_server_errors() {
     for text in drawn(&text) {
         for path in &paths {
             if let Ok(request) = Request::get(format!("{path}{text}")).body(Body::empty()) {
-                target.stands(request, &text).await;
+                target.survives(request, &text).await;
             }
         }
     }

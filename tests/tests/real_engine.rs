@@ -10,7 +10,7 @@ use gaitwright_service::access::Reach;
 use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
-use gaitwright_service::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
+use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Evaluate, GaitSolver};
 use gaitwright_store::studies::{FeedbackMode, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
@@ -66,25 +66,31 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     assert!(warm["iterations"].as_u64() < cold["iterations"].as_u64());
     assert_eq!(warm["lineage"]["ancestors"], json!([ancestor(&cold)]));
 
-    // Every basin that the guesses reach is kept, and can be started from.
+    // Every local optimum that the guesses reach is kept, and can be started from.
     let many = ["solve", "--json", "--initial-guesses", "4", "--out", "many.json"];
     let many = json_of(&gaitwright(folder, &[&many[..], &COARSE].concat()));
     let attempts = many["attempts"].as_array().unwrap();
-    let answer = attempts.iter().find(|attempt| attempt["chosen"] == true).unwrap()["basin"].as_u64().unwrap();
-    let other = attempts.iter().find(|attempt| attempt["basin"].as_u64().is_some_and(|basin| basin != answer)).unwrap();
-    let number = other["basin"].to_string();
-    let again = ["solve", "--json", "--warm", "many.json", "--warm-basin", &number];
+    let answer = attempts.iter().find(|attempt| attempt["chosen"] == true).unwrap()["local_optimum"].as_u64().unwrap();
+    let other = attempts
+        .iter()
+        .find(|attempt| attempt["local_optimum"].as_u64().is_some_and(|local_optimum| local_optimum != answer))
+        .unwrap();
+    let number = other["local_optimum"].to_string();
+    let again = ["solve", "--json", "--warm", "many.json", "--warm-local-optimum", &number];
     let again = json_of(&gaitwright(folder, &[&again[..], &COARSE].concat()));
     assert_eq!(again["attempts"][0]["status"], "converged");
     let away = again["attempts"][0]["gait_rmse_rad"].as_f64().unwrap() - other["gait_rmse_rad"].as_f64().unwrap();
     assert!(away.abs() < 1e-3, "{away}");
-    assert_eq!(again["lineage"]["ancestors"][0]["basin"].as_u64(), other["basin"].as_u64());
-    let unknown =
-        cli::run(BINARY, folder, &[&["solve", "--warm", "many.json", "--warm-basin", "9"][..], &COARSE].concat());
+    assert_eq!(again["lineage"]["ancestors"][0]["local_optimum"].as_u64(), other["local_optimum"].as_u64());
+    let unknown = cli::run(
+        BINARY,
+        folder,
+        &[&["solve", "--warm", "many.json", "--warm-local-optimum", "9"][..], &COARSE].concat(),
+    );
     assert_eq!(unknown.status.code(), Some(2));
     assert!(
         String::from_utf8_lossy(&unknown.stderr)
-            .contains("many.json has no local optimum (basin) with the number 9. Numbers for --warm-basin: 1, 2")
+            .contains("many.json has no local optimum with the number 9. Numbers for --warm-local-optimum: 1, 2")
     );
 
     let [reachable, unreachable] = ["a5=0.013", "a7=5,a8=5"];
@@ -112,7 +118,7 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
 fn ancestor(figures: &Value) -> Value {
     let lineage = &figures["lineage"];
     json!({
-        "id": lineage["id"], "basin": lineage["basin"], "objective": figures["objective"],
+        "id": lineage["id"], "local_optimum": lineage["local_optimum"], "objective": figures["objective"],
         "gait_rmse_rad": figures["gait_rmse_rad"]
     })
 }
@@ -125,7 +131,7 @@ fn gait_file_lists_its_ancestors() {
         json_of(&gaitwright(folder, &[&["solve", "--json", "--initial-guesses", "1"], arguments, &COARSE].concat()))
     };
     let first = solve(&["--out", "first.json"]);
-    assert_eq!((&first["lineage"]["basin"], &first["lineage"]["ancestors"]), (&json!(1), &json!([])));
+    assert_eq!((&first["lineage"]["local_optimum"], &first["lineage"]["ancestors"]), (&json!(1), &json!([])));
     let second = solve(&["--warm", "first.json", "--bounds", "a5=0.013", "--out", "second.json"]);
     let third = solve(&["--warm", "second.json", "--bounds", "a5=0.02"]);
     assert_eq!(third["started_from"], "warm");
@@ -137,7 +143,7 @@ fn gait_file_lists_its_ancestors() {
     let text = String::from_utf8_lossy(&output.stdout);
     for (words, gait) in [("started from", &second), ("which came from", &first)] {
         let id = gait["lineage"]["id"].as_str().unwrap();
-        assert!(text.contains(&format!("  {words:<19}gait {id} (basin 1, objective ")), "{text}");
+        assert!(text.contains(&format!("  {words:<19}gait {id} (local optimum 1, objective ")), "{text}");
     }
 
     // A file of a version that kept no lineage, and one whose gait is not the one it speaks of.
@@ -431,8 +437,8 @@ fn broker_delivers_a_result_with_muscles() {
     let iterations: Vec<_> = iterations.iter().cycle().take(3000).copied().collect();
     order.warm_start = Some(outcome.warm_start.clone());
     let order = pack(&SolveOrder { program: String::new(), assignment: order }).unwrap().len();
-    let finding = Finding::Ended { outcome: Box::new(outcome), iterations };
-    let result = pack(&ResultMessage { attempt, worker: "worker".to_owned(), finding }).unwrap().len();
+    let result = AssignmentResult::Ended { outcome: Box::new(outcome), iterations };
+    let result = pack(&ResultMessage { attempt, worker: "worker".to_owned(), result }).unwrap().len();
     eprintln!("a job takes {order} bytes, a result {result}");
     assert!(order.max(result) < 512 << 10, "a job takes {order} bytes, a result {result}");
 }

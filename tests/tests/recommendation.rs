@@ -28,7 +28,7 @@ use std::time::Duration;
 
 async fn certified(service: &Service, trial: TrialId, passed: bool) {
     let mut writer = service.store.write().await.unwrap();
-    assert!(certificates::keep(&mut writer, trial, &certificate(passed)).await.unwrap());
+    assert!(certificates::insert(&mut writer, trial, &certificate(passed)).await.unwrap());
     commit(writer).await.unwrap();
 }
 
@@ -308,11 +308,11 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
         assert!(before.gaits[..place].iter().all(|other| !is_same_gait(find(other.trials[0]), find(gait.trials[0]))));
     }
     assert!(before.gaits.windows(2).all(|pair| pair[0].utility.mean >= pair[1].utility.mean));
-    assert!(before.surprises.iter().all(|surprise| surprise.probability.is_none_or(|p| p < 0.5)));
+    assert!(before.unexpected_answers.iter().all(|unexpected| unexpected.probability.is_none_or(|p| p < 0.5)));
     let doubted = |belief: &Belief| {
         let Agreement { comparisons, comparisons_agreeing, ties, ties_agreeing, .. } = belief.agreement;
         comparisons - comparisons_agreeing + ties - ties_agreeing
     };
-    assert_eq!(before.surprises.len(), doubted(&before));
+    assert_eq!(before.unexpected_answers.len(), doubted(&before));
     service.stop().await;
 }

@@ -94,7 +94,7 @@ async fn every_change_writes_exactly_one_row_of_the_audit_trail() {
         (format!("/api/v1/studies/{held}/start"), "application/json", String::new()),
         (format!("/api/v1/studies/{held}/pause"), "application/json", String::new()),
         (format!("/api/v1/studies/{held}/resume"), "application/json", String::new()),
-        (format!("/studies/{held}/do"), form, "act=stop".to_owned()),
+        (format!("/studies/{held}/do"), form, "transition=stop".to_owned()),
         (
             format!("/api/v1/preferences/{}/retract", given["id"].as_str().unwrap()),
             "application/json",
@@ -115,7 +115,7 @@ async fn every_change_writes_exactly_one_row_of_the_audit_trail() {
         assert_eq!(audit_rows(&service).await, before + count + 1, "{path}");
     }
     let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, ChainCheck::Whole { rows, .. } if rows == before as u64 + 9));
+    assert!(matches!(verdict, ChainCheck::Intact { rows, .. } if rows == before as u64 + 9));
     service.stop().await;
 }
 

@@ -130,7 +130,7 @@ async fn preview_shows_strikes_and_strides_of_a_recording_and_stores_nothing() {
     let previewed = async |name: &str, strikes: &str, recording: &str| {
         let recording = recording.replace('\n', "%0D%0A").replace(',', "%2C");
         let form = format!(
-            "act=preview&name={name}&format=csv&strikes=kinematics&heel_strikes_s={strikes}&recording={recording}"
+            "button=preview&name={name}&format=csv&strikes=kinematics&heel_strikes_s={strikes}&recording={recording}"
         );
         service.post_text("/reference-gaits", kind, &form).await
     };

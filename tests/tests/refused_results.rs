@@ -5,7 +5,7 @@
 use async_nats::jetstream::stream::{Config, RetentionPolicy};
 use gait_optimizer::{GaitProblem, SolveOptions, Subject};
 use gaitwright_service::workers::nats::{JetStream, ResultMessage, Worker, pack};
-use gaitwright_service::workers::{Assignment, Attempt, Dispatch, Evaluate, Finding, News};
+use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Dispatch, EngineMessage, Evaluate};
 use gaitwright_store::TrialId;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::broker::Broker;
@@ -31,7 +31,8 @@ async fn unrecordable_result_is_delivered_ten_times_and_then_dropped() {
     let engine = JetStream::connect(&broker.url(), QUEUE, 1, Duration::from_millis(200)).await.unwrap();
     let context = async_nats::jetstream::new(async_nats::connect(broker.url()).await.unwrap());
     let attempt = job(1).attempt;
-    let brought = ResultMessage { attempt, worker: "w".to_owned(), finding: Finding::Broke("as asked".to_owned()) };
+    let brought =
+        ResultMessage { attempt, worker: "w".to_owned(), result: AssignmentResult::Broke("as asked".to_owned()) };
     let stream = loop {
         match context.get_stream(format!("{QUEUE}-results")).await {
             Ok(stream) => break stream,
@@ -99,7 +100,7 @@ async fn worker_gives_up_a_refused_result_and_takes_the_next_job() {
     let mut ended = Vec::new();
     while ended.len() < 2 {
         let next = tokio::time::timeout(2 * LONGEST, engine.next()).await.expect("no result comes");
-        if let News::Ended { attempt, receipt, .. } = next {
+        if let EngineMessage::Ended { attempt, receipt, .. } = next {
             receipt.sign().await;
             if !ended.contains(&attempt.trial) {
                 ended.push(attempt.trial);

@@ -4,7 +4,7 @@
 
 use axum::body::Body;
 use axum::http::{Request, header};
-use gaitwright_service::studies::retention::{Dropped, drop_expired};
+use gaitwright_service::studies::retention::{DeletedCounts, delete_expired};
 use gaitwright_store::audit;
 use gaitwright_store::seals::{self, SealCheck};
 use gaitwright_store::studies::StudyState;
@@ -75,8 +75,8 @@ async fn only_expired_keys_sessions_and_links_are_deleted() {
     gaitwright_store::commit(writer).await.unwrap();
 
     let before = counts(&service).await;
-    let dropped = drop_expired(&service.store).await.unwrap();
-    assert_eq!(dropped, Dropped { answers: 1, sessions: 2, links: 2 });
+    let dropped = delete_expired(&service.store).await.unwrap();
+    assert_eq!(dropped, DeletedCounts { answers: 1, sessions: 2, links: 2 });
     for ((table, before), (_, after)) in before.into_iter().zip(counts(&service).await) {
         let expected = match table.as_str() {
             "idempotency_keys" => 1,
@@ -87,10 +87,10 @@ async fn only_expired_keys_sessions_and_links_are_deleted() {
         };
         assert_eq!(before - after, expected, "{table}");
     }
-    assert_eq!(drop_expired(&service.store).await.unwrap(), Dropped::default());
+    assert_eq!(delete_expired(&service.store).await.unwrap(), DeletedCounts::default());
     let mut reader = service.store.read().await.unwrap();
-    assert!(matches!(seals::verify(&mut reader).await.unwrap(), SealCheck::Whole { .. }));
-    assert!(matches!(audit::verify(&mut reader).await.unwrap(), audit::ChainCheck::Whole { .. }));
+    assert!(matches!(seals::verify(&mut reader).await.unwrap(), SealCheck::Intact { .. }));
+    assert!(matches!(audit::verify(&mut reader).await.unwrap(), audit::ChainCheck::Intact { .. }));
     drop(reader);
     service.stop().await;
 }

@@ -5,7 +5,7 @@
 use axum::http::StatusCode;
 use futures_util::future::BoxFuture;
 use gaitwright_service::dispatch_error::DispatchError;
-use gaitwright_service::workers::{Assignment, Dispatch, InProcess, News};
+use gaitwright_service::workers::{Assignment, Dispatch, EngineMessage, InProcess};
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
@@ -230,7 +230,7 @@ impl Dispatch for Breaks {
     fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()> {
         self.inner.cancel(trial)
     }
-    fn next(&self) -> BoxFuture<'_, News> {
+    fn next(&self) -> BoxFuture<'_, EngineMessage> {
         assert!(!self.broken.load(Ordering::SeqCst), "the engine broke");
         self.inner.next()
     }

@@ -44,7 +44,7 @@ async fn touched(database: &Path, sql: &str) -> PathBuf {
 #[tokio::test]
 async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted() {
     let (_folder, database) = filled().await;
-    assert!(matches!(verify(&database).await, SealCheck::Whole { .. }));
+    assert!(matches!(verify(&database).await, SealCheck::Intact { .. }));
     for sealed in seals::TABLES {
         let (table, key) = (sealed.table, sealed.key[0]);
         let written = match table {
@@ -88,7 +88,7 @@ async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted()
 #[tokio::test]
 async fn audit_verify_finds_missing_seals_and_audit_rows_at_the_end() {
     let (_folder, database) = filled().await;
-    let SealCheck::Whole { seals: count, .. } = verify(&database).await else { panic!("whole") };
+    let SealCheck::Intact { seals: count, .. } = verify(&database).await else { panic!("whole") };
     let count = i64::try_from(count).unwrap();
     for (sql, seq) in [
         (format!("delete from seals where seq = {count}"), count),
@@ -272,7 +272,7 @@ async fn later_change_does_not_seal_a_row_of_another_program() {
         let text = format!("{refused:?}");
         assert!(matches!(refused, Err(StoreError::Damaged { .. })) && text.contains(table), "{sql}, {change}: {text}");
         let found = seals::verify(&mut store.read().await.unwrap()).await.unwrap();
-        assert!(!matches!(found, SealCheck::Whole { .. }), "{sql}, {change}: the forged row was sealed");
+        assert!(!matches!(found, SealCheck::Intact { .. }), "{sql}, {change}: the forged row was sealed");
         // Other changes are still possible.
         commit(store.write().await.unwrap()).await.unwrap();
         store.close().await;

@@ -273,6 +273,25 @@ async fn cookie_of_a_known_browser_allows_no_more_guesses_than_many_networks() {
 }
 
 #[tokio::test]
+async fn failures_of_a_network_begin_with_the_first_failure_after_a_success() {
+    let (_folder, service) = service().await;
+    let network = "192.0.2.7";
+    let mut writer = service.store.write().await.unwrap();
+    let success = now();
+    sign_in_failures::count(&mut writer, network, success, true).await.unwrap();
+    sign_in_failures::uncount(&mut writer, network).await.unwrap();
+    let failure = now();
+    for at in [failure, now()] {
+        sign_in_failures::count(&mut writer, network, at, false).await.unwrap();
+    }
+    let found = sign_in_failures::of_network(&mut writer, network).await.unwrap().unwrap();
+    assert!(success < failure);
+    assert_eq!((found.attempts, found.first_at), (2, failure));
+    drop(writer);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn ten_thousand_aborted_sign_ins_do_not_erase_the_failures_of_an_account() {
     let (folder, service) = service().await;
     with_password(&service, "Ada", Role::Admin, RIGHT).await;
@@ -408,7 +427,7 @@ async fn role_changes_apply_from_the_next_request_and_are_audited() {
     let (done, changed) = put(&service, &admin, &role, &json!({"role": "clinician"})).await;
     assert_eq!((done, &changed["role"]), (StatusCode::OK, &json!("clinician")));
     assert_eq!(send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status, StatusCode::OK);
-    let form = format!("act=role&id={ada}&role=rater");
+    let form = format!("button=role&id={ada}&role=rater");
     let page = send(&service, &admin, &Method::POST, "/users", FORM, &form).await;
     assert!(page.status == StatusCode::OK && page.text.contains("Ada now has the role rater"), "{}", page.text);
     assert_eq!(
@@ -514,7 +533,7 @@ async fn sessions_are_listed_and_ended_one_by_one() {
         [status(&service, &desk).await, status(&service, &phone).await],
         [StatusCode::OK, StatusCode::UNAUTHORIZED]
     );
-    let form = format!("act=end_session&id={desk_id}");
+    let form = format!("button=end_session&id={desk_id}");
     let page = send(&service, &admin, &Method::POST, "/users", FORM, &form).await;
     assert!(page.text.contains("Ended a session of Ada"), "{}", page.text);
     assert_eq!(status(&service, &desk).await, StatusCode::UNAUTHORIZED);
@@ -692,10 +711,10 @@ async fn new_administrator_is_created_if_all_are_disabled() {
     let mut writer = service.store.write().await.unwrap();
     let add = NewUser { name: "admin".to_owned(), role: Role::Admin };
     let admin = user_administration::add(&mut writer, &Actor::program(), &add).await.unwrap();
-    assert_eq!(user_administration::way_in(&mut writer).await.unwrap().id, admin.id);
+    assert_eq!(user_administration::operator_administrator(&mut writer).await.unwrap().id, admin.id);
     let disable = "update users set disabled_at = created_at";
     sqlx::query(disable).execute(&mut **writer).await.unwrap();
-    let fresh = user_administration::way_in(&mut writer).await.unwrap();
+    let fresh = user_administration::operator_administrator(&mut writer).await.unwrap();
     assert_eq!((fresh.name.as_str(), fresh.role, fresh.has_password), ("admin-2", Role::Admin, false));
     assert!(user_administration::link(&mut writer, &Actor::terminal(), fresh.id).await.is_ok());
     commit(writer).await.unwrap();

@@ -224,7 +224,7 @@ async fn studies_of_a_subject_who_withdrew_cannot_be_changed_except_by_removing_
     }
     assert!(refused > 40, "{refused}");
     let page = format!("/studies/{study}/members");
-    for form in ["act=add&who=user+a+admin", "act=restrict", "act=open", "act=invite&name=R7"] {
+    for form in ["button=add&who=user+a+admin", "button=restrict", "button=open", "button=invite&name=R7"] {
         let answer = send(service, admin, &Method::POST, &page, FORM, form).await;
         assert_eq!(answer.status, StatusCode::CONFLICT, "{form}: {}", answer.text);
     }
@@ -250,7 +250,7 @@ async fn members_are_removed_on_the_page_of_a_study_whose_subject_withdrew() {
     let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
     post(service, admin, &withdraw, &json!({"reason": "moved away"})).await;
     let page = format!("/studies/{study}/members");
-    let form = format!("act=remove&member={}", closed.names["study-members"]);
+    let form = format!("button=remove&member={}", closed.names["study-members"]);
     let answer = send(service, admin, &Method::POST, &page, FORM, &form).await;
     assert_eq!(answer.status, StatusCode::SEE_OTHER, "{}", answer.text);
     let listed = send(service, admin, &Method::GET, &format!("/api/v1{page}"), "", "").await.items();
@@ -457,16 +457,16 @@ async fn rater_is_invited_with_assignment_and_link_in_one_step() {
 
     // The same on the page; a clinician assigns and removes there.
     let page = format!("/studies/{study}/members");
-    let shown = send(&service, &admin, &Method::POST, &page, FORM, "act=invite&name=R8").await;
+    let shown = send(&service, &admin, &Method::POST, &page, FORM, "button=invite&name=R8").await;
     assert!(shown.text.contains("R8 is assigned") && shown.text.contains("/sign-in/"), "{}", shown.text);
-    let refused = send(&service, &clinician, &Method::POST, &page, FORM, "act=invite&name=R9").await;
+    let refused = send(&service, &clinician, &Method::POST, &page, FORM, "button=invite&name=R9").await;
     assert_eq!(refused.status, StatusCode::FORBIDDEN);
-    let added = send(&service, &clinician, &Method::POST, &page, FORM, "act=add&who=user+a+rater").await;
+    let added = send(&service, &clinician, &Method::POST, &page, FORM, "button=add&who=user+a+rater").await;
     assert_eq!(added.status, StatusCode::SEE_OTHER, "{}", added.text);
     let listed = send(&service, &clinician, &Method::GET, &format!("/api/v1{page}"), "", "").await.items();
     let names: Vec<_> = listed.as_array().unwrap().iter().map(|member| &member["name"]).collect();
     assert_eq!(names, ["R7", "R8", "a rater"]);
-    let remove = format!("act=remove&member={}", listed[2]["id"].as_str().unwrap());
+    let remove = format!("button=remove&member={}", listed[2]["id"].as_str().unwrap());
     let removed = send(&service, &clinician, &Method::POST, &page, FORM, &remove).await;
     assert_eq!(removed.status, StatusCode::SEE_OTHER, "{}", removed.text);
     let shown = send(&service, &clinician, &Method::GET, &page, "", "").await;

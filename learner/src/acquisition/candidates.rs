@@ -4,26 +4,26 @@ use std::collections::HashSet;
 
 use crate::acquisition::line;
 use crate::action::ActionIndex;
-use crate::excluded::Taken;
+use crate::excluded::ForbiddenActions;
 use crate::posterior::Posterior;
 use crate::random::Random;
 
 /// Number of lines through the best action among the candidates of a large grid.
 const LINES: usize = 20;
 
-/// At most `count` actions outside `taken`: those of some lines through the best action, then random ones.
+/// At most `count` actions outside `forbidden`: those of some lines through the best action, then random ones.
 pub(crate) fn near_best_or_random(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &Taken<'_>,
+    forbidden: &ForbiddenActions<'_>,
     count: usize,
     random: &mut Random,
 ) -> Vec<ActionIndex> {
     let space = posterior.space();
     let mut seen = HashSet::new();
     let mut chosen: Vec<ActionIndex> = (0..LINES).flat_map(|_| line::through(space, best, random)).collect();
-    chosen.extend((0..count).map_while(|_| taken.random_other(random)));
-    chosen.retain(|action| !taken.contains(*action) && seen.insert(*action));
+    chosen.extend((0..count).map_while(|_| forbidden.random_other(random)));
+    chosen.retain(|action| !forbidden.contains(*action) && seen.insert(*action));
     chosen.truncate(count);
     chosen
 }

@@ -11,7 +11,7 @@ use crate::acquisition::eubo_bounds::{GainBound, ProbabilityBound, expected_gain
 use crate::acquisition::line;
 use crate::action::ActionIndex;
 use crate::action_moments::{ActionMoments, ActionSet};
-use crate::excluded::Taken;
+use crate::excluded::ForbiddenActions;
 use crate::gaussian_process::GaussianProcess;
 use crate::linalg::BLOCK;
 use crate::posterior::Posterior;
@@ -162,7 +162,7 @@ impl<'a> Chance<'a> {
     }
 }
 
-/// The action outside `taken` that maximises EUBO against `best`, times the probability that it is feasible if labels
+/// The action outside `forbidden` that maximises EUBO against `best`, times the probability that it is feasible if labels
 /// are separate.
 ///
 /// `among` restricts the search. The utilities of `pending` actions count as known. The region of avoidance is searched
@@ -170,7 +170,7 @@ impl<'a> Chance<'a> {
 pub(crate) fn against(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &Taken<'_>,
+    forbidden: &ForbiddenActions<'_>,
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
 ) -> Option<ActionIndex> {
@@ -182,9 +182,9 @@ pub(crate) fn against(
         }
     };
     let avoidance = Avoidance::of(posterior);
-    let found = maximiser(posterior, &set, best, taken, pending, among, avoidance.as_ref());
+    let found = maximiser(posterior, &set, best, forbidden, pending, among, avoidance.as_ref());
     if found.is_none() && avoidance.is_some() {
-        return maximiser(posterior, &set, best, taken, pending, among, None);
+        return maximiser(posterior, &set, best, forbidden, pending, among, None);
     }
     found
 }
@@ -193,7 +193,7 @@ fn maximiser(
     posterior: &Posterior,
     set: &ActionSet,
     best: ActionIndex,
-    taken: &Taken<'_>,
+    forbidden: &ForbiddenActions<'_>,
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
     avoidance: Option<&Avoidance<'_>>,
@@ -218,9 +218,9 @@ fn maximiser(
         }
     };
     for &action in among.unwrap_or_default() {
-        mark(action, !taken.contains(action));
+        mark(action, !forbidden.contains(action));
     }
-    for action in taken.listed() {
+    for action in forbidden.listed() {
         mark(action, false);
     }
     if let Some(avoidance) = avoidance {
@@ -276,22 +276,22 @@ pub(crate) fn proposal(
     posterior: &Posterior,
     best: ActionIndex,
     pending: &[ActionIndex],
-    taken: &Taken<'_>,
+    forbidden: &ForbiddenActions<'_>,
     random: &mut Random,
 ) -> Option<ActionIndex> {
     let lines = posterior.settings().lines;
     if lines > 0 && posterior.visited().len() < posterior.settings().line_trials {
         let candidates: Vec<ActionIndex> =
             (0..lines).flat_map(|_| line::through(posterior.space(), best, random)).collect();
-        if let Some(action) = against(posterior, best, taken, pending, Some(&candidates)) {
+        if let Some(action) = against(posterior, best, forbidden, pending, Some(&candidates)) {
             return Some(action);
         }
     }
     if posterior.space().enumerable().is_ok() {
-        return against(posterior, best, taken, pending, None);
+        return against(posterior, best, forbidden, pending, None);
     }
-    let candidates = near_best_or_random(posterior, best, taken, CANDIDATES, random);
-    against(posterior, best, taken, pending, Some(&candidates))
+    let candidates = near_best_or_random(posterior, best, forbidden, CANDIDATES, random);
+    against(posterior, best, forbidden, pending, Some(&candidates))
 }
 
 #[cfg(test)]
@@ -334,10 +334,10 @@ mod tests {
             let posterior = posterior(&space, &log, &settings).unwrap();
             let best = posterior.best().unwrap();
             let excluded = ExcludedActions::default();
-            let taken = Taken::new(&space, log.visited.iter().copied(), &excluded);
+            let forbidden = ForbiddenActions::new(&space, log.visited.iter().copied(), &excluded);
             let incumbent = posterior.utility.view(best, space.levels(best));
             let mut top = (0.0, ActionIndex(0));
-            for action in (0..space.len()).map(ActionIndex).filter(|a| !taken.contains(*a)) {
+            for action in (0..space.len()).map(ActionIndex).filter(|a| !forbidden.contains(*a)) {
                 let (mean, variance) =
                     posterior.utility.difference(&posterior.utility.view(action, space.levels(action)), &incumbent);
                 let chance = posterior.feasibility.as_ref().map_or(1.0, |feasibility| {
@@ -349,7 +349,7 @@ mod tests {
                     top = (gain, action);
                 }
             }
-            assert_eq!(against(&posterior, best, &taken, &[], None), Some(top.1));
+            assert_eq!(against(&posterior, best, &forbidden, &[], None), Some(top.1));
         }
     }
 
@@ -391,11 +391,11 @@ mod tests {
             let best = posterior.best().unwrap();
             let pending = [ActionIndex(5), ActionIndex(77), ActionIndex(130)];
             let excluded = ExcludedActions::default();
-            let taken = Taken::new(&space, log.visited.iter().chain(&pending).copied(), &excluded);
+            let forbidden = ForbiddenActions::new(&space, log.visited.iter().chain(&pending).copied(), &excluded);
             let avoidance = Avoidance::of(&posterior);
             let all: Vec<ActionIndex> = (0..space.len()).rev().map(ActionIndex).collect();
             let [on_grid, on_list] = [ActionSet::Grid(180), ActionSet::list(all)]
-                .map(|set| maximiser(&posterior, &set, best, &taken, &pending, None, avoidance.as_ref()));
+                .map(|set| maximiser(&posterior, &set, best, &forbidden, &pending, None, avoidance.as_ref()));
             assert!(on_grid.is_some());
             assert_eq!(on_grid, on_list, "{seed}");
         }
@@ -410,9 +410,9 @@ mod tests {
             let posterior = posterior(&space, &log, &settings).unwrap();
             let best = posterior.best().unwrap();
             let excluded = ExcludedActions::default();
-            let taken = Taken::new(&space, log.visited.iter().copied(), &excluded);
+            let forbidden = ForbiddenActions::new(&space, log.visited.iter().copied(), &excluded);
             let mut random = Random::new(seed, 20);
-            let candidates = near_best_or_random(&posterior, best, &taken, CANDIDATES, &mut random);
+            let candidates = near_best_or_random(&posterior, best, &forbidden, CANDIDATES, &mut random);
             let incumbent = posterior.utility.view(best, space.levels(best));
             let feasibility = posterior.feasibility.as_ref().unwrap();
             let value = |&action: &ActionIndex| {

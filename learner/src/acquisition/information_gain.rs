@@ -10,7 +10,7 @@
 
 use crate::acquisition::avoidance::Avoidance;
 use crate::action::ActionIndex;
-use crate::excluded::Taken;
+use crate::excluded::ForbiddenActions;
 use crate::likelihood::Interval;
 use crate::posterior::Posterior;
 use crate::random::Random;
@@ -111,12 +111,12 @@ impl<'a> InformationGain<'a> {
     }
 }
 
-/// The most informative of some random actions outside `taken`, and outside the region of avoidance if possible. `None`
-/// if every action is taken.
+/// The most informative of some random actions outside `forbidden`, and outside the region of avoidance if possible. `None`
+/// if every action is forbidden.
 pub(crate) fn over_candidates(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &Taken<'_>,
+    forbidden: &ForbiddenActions<'_>,
     random: &mut Random,
 ) -> Option<ActionIndex> {
     let space = posterior.space();
@@ -133,7 +133,7 @@ pub(crate) fn over_candidates(
     let compared = posterior.feasibility.is_none() || !posterior.infeasible.contains(&partner);
     let mut top: Option<((bool, f64), ActionIndex)> = None;
     for _ in 0..CANDIDATES {
-        let action = taken.random_other(random)?;
+        let action = forbidden.random_other(random)?;
         let view = utility.view(action, space.levels(action));
         let pair = JointMoments {
             mean: [view.mean, other.mean],
@@ -228,11 +228,11 @@ mod tests {
         let mut posterior = posterior(&space, &log, &settings).unwrap();
         let best = posterior.best().unwrap();
         let excluded = ExcludedActions::default();
-        let taken = Taken::new(&space, log.visited.iter().copied(), &excluded);
+        let forbidden = ForbiddenActions::new(&space, log.visited.iter().copied(), &excluded);
         let mut proposals = HashSet::new();
         for preference_noise in [0.02, 1.0, 20.0] {
             posterior.preference_noise = preference_noise;
-            proposals.insert(over_candidates(&posterior, best, &taken, &mut Random::new(3, 0)).unwrap());
+            proposals.insert(over_candidates(&posterior, best, &forbidden, &mut Random::new(3, 0)).unwrap());
         }
         assert!(proposals.len() > 1, "{proposals:?}");
     }

@@ -7,7 +7,7 @@ use crate::acquisition::candidates::highest;
 use crate::acquisition::line;
 use crate::action::ActionIndex;
 use crate::error::Result;
-use crate::excluded::{ExcludedActions, Taken};
+use crate::excluded::{ExcludedActions, ForbiddenActions};
 use crate::posterior::Posterior;
 use crate::random::Random;
 
@@ -22,16 +22,16 @@ const MAX_SAMPLES: usize = 50;
 pub(crate) fn unvisited_on_line(
     posterior: &Posterior,
     best: ActionIndex,
-    taken: &Taken<'_>,
+    forbidden: &ForbiddenActions<'_>,
     random: &mut Random,
 ) -> Result<Option<ActionIndex>> {
     let suggested: Vec<ActionIndex> =
-        posterior.utility.observed().points.iter().copied().filter(|a| !taken.contains(*a)).collect();
+        posterior.utility.observed().points.iter().copied().filter(|a| !forbidden.contains(*a)).collect();
     let avoidance = Avoidance::of(posterior);
     for attempt in 0..MAX_LINES {
         let mut candidates = suggested.clone();
         for action in line::through(posterior.space(), best, random) {
-            if !taken.contains(action) && !candidates.contains(&action) {
+            if !forbidden.contains(action) && !candidates.contains(&action) {
                 candidates.push(action);
             }
         }
@@ -90,13 +90,13 @@ pub(crate) fn visited_or_on_line(
 pub(crate) fn random_fallback(
     posterior: &Posterior,
     pending: &[ActionIndex],
-    taken: &Taken<'_>,
+    forbidden: &ForbiddenActions<'_>,
     repeats: bool,
     random: &mut Random,
 ) -> Option<ActionIndex> {
-    taken.random_other(random).or_else(|| {
+    forbidden.random_other(random).or_else(|| {
         let none = ExcludedActions::default();
-        let pending = Taken::new(posterior.space(), pending.iter().copied(), &none);
+        let pending = ForbiddenActions::new(posterior.space(), pending.iter().copied(), &none);
         pending.random_other(random).filter(|_| repeats)
     })
 }

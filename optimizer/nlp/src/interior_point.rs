@@ -3,7 +3,7 @@
 
 use crate::barrier;
 use crate::formulation::Objective;
-use crate::iterate::{Ending, Iterate, SolveSession, StepRecord};
+use crate::iterate::{Iterate, IterationEnd, SolveSession, StepRecord};
 use crate::optimality::OptimalityError;
 use crate::primal_dual::largest;
 use crate::restoration;
@@ -11,7 +11,7 @@ use crate::settings::NlpSettings;
 use crate::status::{NlpIteration, NlpPhase};
 
 /// Whether a restoration phase ends at this w.
-pub(crate) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
+pub(crate) type RestorationExit<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
 
 /// A primal step below this is short (`NlpSettings::short_step_limit`).
 const SHORT_STEP: f64 = 0.05;
@@ -54,9 +54,9 @@ impl Iterate<'_> {
 
     /// Runs the restoration phase from the current point. `None` if it reaches an acceptable point; otherwise the
     /// ending of the solve, at the last point of the phase.
-    fn restore(&mut self, session: &mut SolveSession) -> Option<Ending> {
+    fn restore(&mut self, session: &mut SolveSession) -> Option<IterationEnd> {
         let theta = self.theta();
-        let Some(mut phase) = restoration::begin(self, session) else { return Some(Ending::Stalled) };
+        let Some(mut phase) = restoration::begin(self, session) else { return Some(IterationEnd::Stalled) };
         let ending = {
             let mut leave = restoration::may_leave(self, session.settings, theta);
             phase.iterate(session, Some(&mut leave))
@@ -65,7 +65,7 @@ impl Iterate<'_> {
     }
 
     /// Iterates until an ending. `leave` is called after each step of a restoration phase.
-    pub(crate) fn iterate(&mut self, session: &mut SolveSession, mut leave: Option<Leave>) -> Ending {
+    pub(crate) fn iterate(&mut self, session: &mut SolveSession, mut leave: Option<RestorationExit>) -> IterationEnd {
         session.newton.fit(&self.form);
         let settings = session.settings;
         let mut tiny_steps = 0usize;
@@ -75,22 +75,22 @@ impl Iterate<'_> {
             let now = self.current_optimality();
             self.report(session, &now);
             if self.is_converged(settings, &now) {
-                return Ending::Converged;
+                return IterationEnd::Converged;
             }
             if (session.cancel)() {
-                return Ending::Cancelled;
+                return IterationEnd::Cancelled;
             }
             if session.iterations >= settings.max_iterations {
-                return Ending::IterationLimit;
+                return IterationEnd::IterationLimit;
             }
             if session.started.elapsed().as_secs_f64() >= settings.max_seconds {
-                return Ending::TimeLimit;
+                return IterationEnd::TimeLimit;
             }
             if largest(&self.point.w[..self.form.n]) > settings.constants.divergence_limit {
-                return Ending::Unbounded;
+                return IterationEnd::Unbounded;
             }
             if tiny_steps > 1 && self.mu <= barrier::smallest_mu(settings, self.form.objective_scale) {
-                return Ending::Stalled;
+                return IterationEnd::Stalled;
             }
             self.update_mu(settings, &now, tiny_steps > 0);
             session.iterations += 1;
@@ -105,7 +105,7 @@ impl Iterate<'_> {
             if found && self.line_search(session) {
                 recentred = 0;
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
-                    return Ending::Left;
+                    return IterationEnd::Left;
                 }
                 short_steps = if session.last_step.alpha_primal < SHORT_STEP { short_steps + 1 } else { 0 };
                 let crawls = settings.short_step_limit > 0
@@ -124,7 +124,7 @@ impl Iterate<'_> {
                 NlpPhase::Restoration => {
                     recentred += 1;
                     if recentred > 2 {
-                        return Ending::Stalled;
+                        return IterationEnd::Stalled;
                     }
                     self.recentre(session);
                 }
@@ -132,7 +132,7 @@ impl Iterate<'_> {
                     let nearly_feasible = largest(&self.c) <= 1e-2 * settings.tolerance;
                     if nearly_feasible || session.counts.restoration_phases >= settings.constants.max_restoration_phases
                     {
-                        return Ending::Stalled;
+                        return IterationEnd::Stalled;
                     }
                     if let Some(ending) = self.restore(session) {
                         return ending;

@@ -37,7 +37,7 @@ pub(crate) struct StepRecord {
 
 /// How the iteration on a formulation ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ending {
+pub(crate) enum IterationEnd {
     Converged,
     /// The restoration phase reached an acceptable point.
     Left,

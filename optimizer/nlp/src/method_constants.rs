@@ -49,7 +49,7 @@ pub struct MethodConstants {
     pub residual_limit: f64,
     /// Refinement steps per system.
     pub max_refinements: usize,
-    /// Whether a large residual before refinement is a reason to distrust the factorisation.
+    /// Whether a large residual before refinement is a reason to reject the factorisation.
     pub distrusts_unrefined: bool,
     /// After this many consecutive distrusted matrices, the next ones go to the most trusted factorisation directly; 0:
     /// never.

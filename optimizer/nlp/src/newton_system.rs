@@ -92,9 +92,9 @@ impl NewtonSystem {
         self.solver.fallbacks()
     }
 
-    /// See [`KktSolver::distrust`].
-    pub(crate) fn distrust(&mut self) -> bool {
-        self.solver.distrust()
+    /// See [`KktSolver::reject_factorisation`].
+    pub(crate) fn reject_factorisation(&mut self) -> bool {
+        self.solver.reject_factorisation()
     }
 
     /// Resizes the work vectors for a formulation; that of the restoration phase is longer.
@@ -174,7 +174,7 @@ impl NewtonSystem {
                     return (largest(&y) <= settings.constants.multiplier_limit).then_some(y);
                 }
             }
-            if !self.solver.distrust() {
+            if !self.solver.reject_factorisation() {
                 return None;
             }
         }
@@ -461,7 +461,7 @@ mod tests {
         fn factor_entries(&self) -> usize {
             self.exact.factor_entries()
         }
-        fn distrust(&mut self) -> bool {
+        fn reject_factorisation(&mut self) -> bool {
             (self.factor, self.miscounted) = (1.0, 0);
             std::mem::take(&mut self.has_another_method)
         }

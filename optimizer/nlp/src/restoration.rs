@@ -7,7 +7,7 @@
 
 use crate::barrier;
 use crate::formulation::{EvaluationTally, Formulation, Objective, RowForm, RowVariable};
-use crate::iterate::{Ending, Iterate, SolveSession};
+use crate::iterate::{Iterate, IterationEnd, SolveSession};
 use crate::primal_dual::{PrimalDual, largest};
 use crate::settings::{BoundMultiplierStart, NlpSettings};
 
@@ -102,7 +102,12 @@ pub(crate) fn may_leave(run: &mut Iterate, settings: &NlpSettings, theta: f64) -
 
 /// Returns from the restoration phase to the problem. `None` if the solve continues from the point of the phase;
 /// otherwise the ending of the solve at that point.
-pub(crate) fn finish(run: &mut Iterate, session: &mut SolveSession, phase: &Iterate, ending: Ending) -> Option<Ending> {
+pub(crate) fn finish(
+    run: &mut Iterate,
+    session: &mut SolveSession,
+    phase: &Iterate,
+    ending: IterationEnd,
+) -> Option<IterationEnd> {
     let settings = session.settings;
     let length = run.form.length();
     run.form.tally.seconds += phase.form.tally.seconds;
@@ -118,21 +123,21 @@ pub(crate) fn finish(run: &mut Iterate, session: &mut SolveSession, phase: &Iter
     let slack_upper = run.at.slack_upper.clone();
     run.evaluate();
     if !run.is_finite() {
-        return Some(Ending::Stalled);
+        return Some(IterationEnd::Stalled);
     }
 
     let near = 100.0 * settings.tolerance.min(NEAR_TOLERANCE);
     let feasible = run.program_violation() <= settings.violation_tolerance.max(near);
     match ending {
-        Ending::Left => {}
-        Ending::Converged if !feasible || run.program_violation() > LEFT_OVER * settings.violation_tolerance => {
+        IterationEnd::Left => {}
+        IterationEnd::Converged if !feasible || run.program_violation() > LEFT_OVER * settings.violation_tolerance => {
             // The multipliers of the phase belong to an objective without scale.
             for (y, of_phase) in run.point.y.iter_mut().zip(&phase.point.y) {
                 *y = of_phase * run.form.objective_scale;
             }
-            return Some(Ending::Infeasible);
+            return Some(IterationEnd::Infeasible);
         }
-        Ending::Converged => return Some(Ending::Stalled),
+        IterationEnd::Converged => return Some(IterationEnd::Stalled),
         other => return Some(other),
     }
 

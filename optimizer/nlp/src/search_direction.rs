@@ -43,7 +43,7 @@ impl Iterate<'_> {
                     );
                     let distrusts = settings.constants.distrusts_unrefined
                         && solved.unrefined > settings.constants.residual_limit
-                        && session.newton.distrust();
+                        && session.newton.reject_factorisation();
                     let solves = !distrusts && solved.refined <= settings.constants.residual_limit;
                     if solves {
                         self.correction.accept(settings);

@@ -134,7 +134,7 @@ pub fn sensitivities(
         let found =
             parameters.iter().map(|parameter| sensitivity(&iterate, settings, &mut system, parameter)).collect();
         // Another factorisation may be more accurate.
-        if !matches!(found, Err(SensitivityError::Inaccurate(_))) || !system.distrust() {
+        if !matches!(found, Err(SensitivityError::Inaccurate(_))) || !system.reject_factorisation() {
             return found;
         }
     }
@@ -164,7 +164,7 @@ fn factorise(iterate: &Iterate, system: &mut NewtonSystem) -> Result<(), Sensiti
         if inertia.is_some_and(|inertia| inertia.zero == 0 && inertia.negative == iterate.form.m) {
             return Ok(());
         }
-        if !system.distrust() {
+        if !system.reject_factorisation() {
             return Err(SensitivityError::Irregular);
         }
     }

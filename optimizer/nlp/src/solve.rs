@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::barrier;
 use crate::factorisation::{self, check_blocks};
 use crate::formulation::{Formulation, RowForm, entries};
-use crate::iterate::{Ending, Iterate, SolveSession, StepRecord};
+use crate::iterate::{Iterate, IterationEnd, SolveSession, StepRecord};
 use crate::kkt::KktMatrix;
 use crate::newton_system::NewtonSystem;
 use crate::nonlinear_program::NonlinearProgram;
@@ -218,7 +218,7 @@ fn check_evaluations(run: &Iterate) -> Result<(), NlpError> {
     Ok(())
 }
 
-fn report(run: &mut Iterate, session: &SolveSession, ending: Ending, analysis: f64) -> NlpResult {
+fn report(run: &mut Iterate, session: &SolveSession, ending: IterationEnd, analysis: f64) -> NlpResult {
     let scaled_residuals = run.current_optimality().scaled();
     let form = &run.form;
     let (n, m) = (form.n, form.m);
@@ -292,13 +292,13 @@ fn report(run: &mut Iterate, session: &SolveSession, ending: Ending, analysis: f
     counts.solver_fallbacks = session.newton.solver_fallbacks();
     NlpResult {
         status: match ending {
-            Ending::Converged => NlpStatus::Converged,
-            Ending::Infeasible => NlpStatus::Infeasible,
-            Ending::Stalled | Ending::Left => NlpStatus::Stalled,
-            Ending::Unbounded => NlpStatus::Unbounded,
-            Ending::IterationLimit => NlpStatus::IterationLimit,
-            Ending::TimeLimit => NlpStatus::TimeLimit,
-            Ending::Cancelled => NlpStatus::Cancelled,
+            IterationEnd::Converged => NlpStatus::Converged,
+            IterationEnd::Infeasible => NlpStatus::Infeasible,
+            IterationEnd::Stalled | IterationEnd::Left => NlpStatus::Stalled,
+            IterationEnd::Unbounded => NlpStatus::Unbounded,
+            IterationEnd::IterationLimit => NlpStatus::IterationLimit,
+            IterationEnd::TimeLimit => NlpStatus::TimeLimit,
+            IterationEnd::Cancelled => NlpStatus::Cancelled,
         },
         x,
         row_multipliers,

@@ -32,7 +32,7 @@ impl Check {
 
     /// The limit as text.
     pub fn limit_in_words(&self) -> String {
-        self.limit.map_or_else(|| "no limit (reported only)".to_owned(), |limit| self.in_unit(limit))
+        self.limit.map_or_else(|| "no limit; reported only".to_owned(), |limit| self.in_unit(limit))
     }
 
     /// A figure with the unit, if there is one.
@@ -67,20 +67,20 @@ pub(super) struct Quantity {
 
 impl Quantity {
     /// A quantity with a limit.
-    pub(super) const fn judged(name: &'static str, unit: &'static str, limit: f64) -> Self {
+    pub(super) const fn limited(name: &'static str, unit: &'static str, limit: f64) -> Self {
         Self { name, unit, limit: Some(limit) }
     }
 }
 
 /// The worst values of quantities so far.
 #[derive(Debug, Default)]
-pub(super) struct Worst {
+pub(super) struct WorstValues {
     checks: Vec<Check>,
 }
 
-impl Worst {
+impl WorstValues {
     /// Adds a value. A value that is not finite counts as undetermined and is the worst.
-    pub(super) fn note(&mut self, quantity: Quantity, value: f64, place: CheckLocation<'_>) {
+    pub(super) fn add(&mut self, quantity: Quantity, value: f64, place: CheckLocation<'_>) {
         let value = value.is_finite().then_some(value);
         let words = || match place.time_s {
             Some(time_s) => format!("{}, {time_s:.4} s", place.domain),

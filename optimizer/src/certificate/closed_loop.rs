@@ -1,8 +1,8 @@
 //! The closed loop: consecutive strides, and contacts, friction and torques over the periodic stride.
 
-use super::check::{Check, CheckLocation, Quantity, Worst};
+use super::check::{Check, CheckLocation, Quantity, WorstValues};
 use super::feedback_linearization::{State, split};
-use super::hybrid_walker::{Fall, HybridWalker, Passage};
+use super::hybrid_walker::{CompletedDomain, Fall, HybridWalker};
 use super::limit_excess::{AllowedRanges, CONTACT_THRESHOLD_N, FRICTION_THRESHOLD_N, depth_below_ground};
 use crate::body::PointState;
 use crate::gait::Gait;
@@ -12,29 +12,29 @@ use crate::walking::CYCLE;
 /// Number of simulated strides.
 pub const STRIDES: usize = 20;
 
-const ORBIT_ANGLE: Quantity = Quantity::judged("orbit error, angles", "rad", 5e-3);
-const ORBIT_RATE: Quantity = Quantity::judged("orbit error, rates", "rad/s", 0.05);
+const ORBIT_ANGLE: Quantity = Quantity::limited("orbit error, angles", "rad", 5e-3);
+const ORBIT_RATE: Quantity = Quantity::limited("orbit error, rates", "rad/s", 0.05);
 // An optimal gait unloads the trailing foot completely, on the boundary of contact and friction, and the simulation may
 // cross it by the mesh error. The limit is the force below which a gait laboratory does not register contact.
-const NORMAL_FORCE: Quantity = Quantity::judged("unilateral contact", "N", CONTACT_THRESHOLD_N);
-const FRICTION: Quantity = Quantity::judged("friction cone", "N", FRICTION_THRESHOLD_N);
-const TORQUE: Quantity = Quantity::judged("torques", "N m", 5.0);
-const ANGLE: Quantity = Quantity::judged("joint angles", "rad", 0.01);
-const SPEED: Quantity = Quantity::judged("velocities", "rad/s", 0.2);
-const DEPTH: Quantity = Quantity::judged("feet above the ground", "m", 1e-3);
-const IMPULSE: Quantity = Quantity::judged("tensile landing impulse", "N s", 0.0);
+const NORMAL_FORCE: Quantity = Quantity::limited("unilateral contact", "N", CONTACT_THRESHOLD_N);
+const FRICTION: Quantity = Quantity::limited("friction cone", "N", FRICTION_THRESHOLD_N);
+const TORQUE: Quantity = Quantity::limited("torques", "N m", 5.0);
+const ANGLE: Quantity = Quantity::limited("joint angles", "rad", 0.01);
+const SPEED: Quantity = Quantity::limited("velocities", "rad/s", 0.2);
+const DEPTH: Quantity = Quantity::limited("feet above the ground", "m", 1e-3);
+const IMPULSE: Quantity = Quantity::limited("tensile landing impulse", "N s", 0.0);
 
 /// Simulates [`STRIDES`] strides from the first state of the gait, and measures the distance to it after each stride.
 pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Check>, Fall> {
-    let mut worst = Worst::default();
+    let mut worst = WorstValues::default();
     let mut x = *start;
     for stride in 1..=STRIDES {
         x = walker.after_stride(&x)?;
         let distance = x - start;
         let name = format!("stride {stride}");
         let place = CheckLocation { domain: &name, time_s: None };
-        worst.note(ORBIT_ANGLE, distance.rows(2, 7).amax(), place);
-        worst.note(ORBIT_RATE, distance.rows(9, 9).amax(), place);
+        worst.add(ORBIT_ANGLE, distance.rows(2, 7).amax(), place);
+        worst.add(ORBIT_RATE, distance.rows(9, 9).amax(), place);
     }
     Ok(worst.into_checks(", closed loop"))
 }
@@ -45,14 +45,14 @@ pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: 
     let passages = walker.stride(periodic, &mut |d, time, x| samples.push((d, time, *x)))?;
     let starts: Vec<f64> = passages
         .iter()
-        .scan(0.0, |elapsed, passage: &Passage| {
+        .scan(0.0, |elapsed, passage: &CompletedDomain| {
             let start = *elapsed;
             *elapsed += passage.duration;
             Some(start)
         })
         .collect();
     let limits = AllowedRanges::new(gait);
-    let mut worst = Worst::default();
+    let mut worst = WorstValues::default();
     for (d, time, x) in &samples {
         let control = &walker.controls[*d];
         let place = CheckLocation { domain: control.domain.name(), time_s: Some(starts[*d] + time) };
@@ -70,20 +70,20 @@ pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: 
             ),
             None => (f64::NAN, f64::NAN, f64::NAN),
         };
-        worst.note(NORMAL_FORCE, pulling, place);
-        worst.note(FRICTION, sliding, place);
-        worst.note(TORQUE, torque, place);
+        worst.add(NORMAL_FORCE, pulling, place);
+        worst.add(FRICTION, sliding, place);
+        worst.add(TORQUE, torque, place);
         let excess = limits.motion(&q, &qd, &qdd);
-        worst.note(ANGLE, excess.angle, place);
-        worst.note(SPEED, excess.speed, place);
+        worst.add(ANGLE, excess.angle, place);
+        worst.add(SPEED, excess.speed, place);
         let state = PointState::new(&q, &qd, &[0.0; 9]);
-        worst.note(DEPTH, depth_below_ground(walker.model, control.domain, &state), place);
+        worst.add(DEPTH, depth_below_ground(walker.model, control.domain, &state), place);
     }
     for (d, passage) in passages.iter().enumerate() {
         let opens = CYCLE[(d + 1) % CYCLE.len()];
         if let (Some(impact), Some(row)) = (&passage.impact, opens.landing_row()) {
             let place = CheckLocation { domain: opens.name(), time_s: Some(starts[d] + passage.duration) };
-            worst.note(IMPULSE, -impact.impulse[row], place);
+            worst.add(IMPULSE, -impact.impulse[row], place);
         }
     }
     Ok(worst.into_checks(", closed loop"))

@@ -92,7 +92,7 @@ impl<const N: usize> DenseStep<N> {
     }
 
     /// A step of another length from the same start.
-    pub(super) fn retake(&self, system: &impl System<N>, length: f64) -> Result<Self, StepError> {
+    pub(super) fn with_length(&self, system: &impl System<N>, length: f64) -> Result<Self, StepError> {
         Self::take(system, &self.start, &self.stages[0], length)
     }
 

@@ -1,6 +1,6 @@
 //! The findings of the residuals: the worst value of each quantity, at the nodes and between them.
 
-use super::check::{Check, CheckLocation, Quantity, Worst};
+use super::check::{Check, CheckLocation, Quantity, WorstValues};
 use crate::gait::motion::GaitInstant;
 
 /// A quantity with two limits: at the nodes, where the gait problem imposes the constraint, and between them, where the
@@ -29,19 +29,19 @@ pub(super) struct GridPoint<'a> {
 /// The worst values at the nodes, between them, and of quantities of the whole stride.
 #[derive(Default)]
 pub(super) struct Findings {
-    at_points: Worst,
-    between: Worst,
-    pub(super) other: Worst,
+    at_points: WorstValues,
+    between: WorstValues,
+    pub(super) other: WorstValues,
 }
 
 impl Findings {
-    pub(super) fn note(&mut self, point: &GridPoint<'_>, measured: &MeasuredQuantity, value: f64) {
+    pub(super) fn add(&mut self, point: &GridPoint<'_>, measured: &MeasuredQuantity, value: f64) {
         let (worst, limit) = if point.on_mesh {
             (&mut self.at_points, Some(measured.at_points))
         } else {
             (&mut self.between, measured.between)
         };
-        worst.note(Quantity { name: measured.name, unit: measured.unit, limit }, value, point.place);
+        worst.add(Quantity { name: measured.name, unit: measured.unit, limit }, value, point.place);
     }
 
     pub(super) fn into_checks(self) -> Vec<Check> {

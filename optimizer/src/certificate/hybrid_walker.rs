@@ -46,7 +46,7 @@ pub enum Fall {
 
 /// A completed domain.
 #[derive(Debug, Clone)]
-pub(super) struct Passage {
+pub(super) struct CompletedDomain {
     /// Duration, s.
     pub(super) duration: f64,
     /// Initial state of the next domain.
@@ -105,22 +105,27 @@ impl<'a> HybridWalker<'a> {
     }
 
     /// Simulates a domain from a state to its guard and through the reset.
-    pub(super) fn passage(&self, d: usize, start: &State, watch: SimulationObserver<'_>) -> Result<Passage, Fall> {
+    pub(super) fn passage(
+        &self,
+        d: usize,
+        start: &State,
+        watch: SimulationObserver<'_>,
+    ) -> Result<CompletedDomain, Fall> {
         let control = &self.controls[d];
         let (duration, before) = self.to_event(d, control, start, watch)?;
         self.after_event(d, duration, before)
     }
 
-    fn after_event(&self, d: usize, duration: f64, before: State) -> Result<Passage, Fall> {
+    fn after_event(&self, d: usize, duration: f64, before: State) -> Result<CompletedDomain, Fall> {
         let opens = CYCLE[(d + 1) % CYCLE.len()];
         let (after, impact) = reset(self.model, opens, &before)
             .ok_or_else(|| not_integrable(opens.name(), "the contact rows are linearly dependent"))?;
-        Ok(Passage { duration, after, impact })
+        Ok(CompletedDomain { duration, after, impact })
     }
 
     /// Simulates a stride from the start of DS2_R.
-    pub(super) fn stride(&self, start: &State, watch: SimulationObserver<'_>) -> Result<Vec<Passage>, Fall> {
-        let mut passages: Vec<Passage> = Vec::with_capacity(CYCLE.len());
+    pub(super) fn stride(&self, start: &State, watch: SimulationObserver<'_>) -> Result<Vec<CompletedDomain>, Fall> {
+        let mut passages: Vec<CompletedDomain> = Vec::with_capacity(CYCLE.len());
         for d in 0..CYCLE.len() {
             let from = passages.last().map_or(*start, |p| p.after);
             passages.push(self.passage(d, &from, watch)?);
@@ -213,7 +218,7 @@ fn refine<const N: usize, S: System<N>>(
     let singular = || failed(StepError::Singular);
     let mut length = guess.clamp(0.0, step.length);
     for _ in 0..EVENT_REFINEMENTS {
-        let x = walker_part(&step.retake(system, length).map_err(failed)?.end);
+        let x = walker_part(&step.with_length(system, length).map_err(failed)?.end);
         let value = control.guard_value(&x).ok_or_else(singular)?;
         let gradient = control.guard_gradient(&x).ok_or_else(singular)?;
         let rate = gradient.dot(&control.derivative(&x).ok_or_else(singular)?);
@@ -222,7 +227,7 @@ fn refine<const N: usize, S: System<N>>(
         }
         length = (length - value / rate).clamp(0.0, step.length);
     }
-    step.retake(system, length).map_err(failed)
+    step.with_length(system, length).map_err(failed)
 }
 
 fn not_integrable(domain: &'static str, reason: &str) -> Fall {

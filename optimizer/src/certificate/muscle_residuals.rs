@@ -1,6 +1,6 @@
 //! Residuals of C5 to C12.
 
-use super::check::{CheckLocation, Quantity, Worst};
+use super::check::{CheckLocation, Quantity, WorstValues};
 use super::findings::{Findings, GridPoint, MeasuredQuantity};
 use crate::gait::MuscleTrajectory;
 use crate::gait::motion::MuscleInstant;
@@ -13,10 +13,10 @@ const LENGTH: MeasuredQuantity = MeasuredQuantity::new("C8 fibre lengths from th
 const TORQUE: MeasuredQuantity = MeasuredQuantity::new("C9-C12 joint torques of the muscles", "N m", 1e-4, None);
 const RANGE: MeasuredQuantity =
     MeasuredQuantity::new("C5-C8 activations, fibre lengths and velocities", "", 3e-6, Some(0.05));
-const RESET: Quantity = Quantity::judged("C2 continuity of fibre lengths", "l_opt", 1e-6);
+const RESET: Quantity = Quantity::limited("C2 continuity of fibre lengths", "l_opt", 1e-6);
 
 /// Measures a grid point.
-pub(super) fn note(
+pub(super) fn add(
     point: &GridPoint<'_>,
     table: &[Muscle; MUSCLE_COUNT],
     muscles: &MuscleInstant,
@@ -42,32 +42,32 @@ pub(super) fn note(
         }
     }
     let torque_error = (0..4).map(|i| (point.instant.u[i] - torque[i]).abs()).fold(0.0, f64::max);
-    worst.note(point, &FORCE, force_error);
-    worst.note(point, &VELOCITY, velocity_error);
-    worst.note(point, &TORQUE, torque_error);
-    worst.note(point, &RANGE, excess);
+    worst.add(point, &FORCE, force_error);
+    worst.add(point, &VELOCITY, velocity_error);
+    worst.add(point, &TORQUE, torque_error);
+    worst.add(point, &RANGE, excess);
 }
 
 /// Distance of the fibre lengths at a node from the cubic through the ends of its interval.
-pub(super) fn note_written(
+pub(super) fn add_interpolation_error(
     point: &GridPoint<'_>,
     written: &[f64; MUSCLE_COUNT],
     cubic: &[f64; MUSCLE_COUNT],
     worst: &mut Findings,
 ) {
     let apart = written.iter().zip(cubic).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    worst.note(point, &LENGTH, apart);
+    worst.add(point, &LENGTH, apart);
 }
 
 /// Continuity of the fibre lengths from one domain to the next.
-pub(super) fn note_reset(
+pub(super) fn add_reset(
     before: &MuscleTrajectory,
     after: &MuscleTrajectory,
     place: CheckLocation<'_>,
-    worst: &mut Worst,
+    worst: &mut WorstValues,
 ) {
     if let (Some(last), Some(first)) = (before.fibre_length.last(), after.fibre_length.first()) {
         let jump = last.iter().zip(first).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        worst.note(RESET, jump, place);
+        worst.add(RESET, jump, place);
     }
 }

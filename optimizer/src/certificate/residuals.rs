@@ -1,6 +1,6 @@
 //! Residuals of C1 to C4 at the nodes and on a finer grid between them.
 
-use super::check::{Check, CheckLocation, Quantity, Worst};
+use super::check::{Check, CheckLocation, Quantity, WorstValues};
 use super::contact_kinematics::Contact;
 use super::findings::{Findings, GridPoint, MeasuredQuantity};
 use super::limit_excess::{AllowedRanges, FRICTION_THRESHOLD_N, depth_below_ground};
@@ -37,13 +37,13 @@ const ANGLE: MeasuredQuantity = MeasuredQuantity::new("C4 joint angles beyond a6
 const SPEED: MeasuredQuantity = MeasuredQuantity::new("C4 velocities beyond a1", "rad/s", 3e-6, Some(0.1));
 const ACCELERATION: MeasuredQuantity = MeasuredQuantity::new("C4 accelerations beyond a2", "rad/s²", 3e-5, Some(5.0));
 const TORQUE: MeasuredQuantity = MeasuredQuantity::new("C4 torques beyond their limits", "N m", 1e-4, Some(2.0));
-const IMPACT: Quantity = Quantity::judged("C2 velocities after impacts", "rad/s", 1e-5);
-const IMPULSE: Quantity = Quantity::judged("C2 impulses of the impacts", "N s", 1e-4);
-const IMPULSE_SIZE: Quantity = Quantity::judged("C3 impulses beyond their limit", "N s", 1e-4);
-const IMPACT_FRICTION: Quantity = Quantity::judged("C3 friction cone of heel strikes", "N s", 1e-4);
-const RESET: Quantity = Quantity::judged("C2 continuity of the stride", "rad", 3e-6);
-const TOUCHDOWN: Quantity = Quantity::judged("C3 touchdown speed", "m/s", 1e-6);
-const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "", 1e-6);
+const IMPACT: Quantity = Quantity::limited("C2 velocities after impacts", "rad/s", 1e-5);
+const IMPULSE: Quantity = Quantity::limited("C2 impulses of the impacts", "N s", 1e-4);
+const IMPULSE_SIZE: Quantity = Quantity::limited("C3 impulses beyond their limit", "N s", 1e-4);
+const IMPACT_FRICTION: Quantity = Quantity::limited("C3 friction cone of heel strikes", "N s", 1e-4);
+const RESET: Quantity = Quantity::limited("C2 continuity of the stride", "rad", 3e-6);
+const TOUCHDOWN: Quantity = Quantity::limited("C3 touchdown speed", "m/s", 1e-6);
+const STRIDE: Quantity = Quantity::limited("C4 hip velocity (a3, a4), steps, speed, durations", "", 1e-6);
 
 /// Largest absolute value.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
@@ -80,13 +80,13 @@ pub(super) fn residuals_on(model: &WalkerModel, gait: &Gait, between_nodes: usiz
             let point =
                 GridPoint { instant: &here, place: CheckLocation::within(trajectory, share), on_mesh: node.is_some() };
             if let (Some(written), Some(of_cubic)) = (written, of_cubic) {
-                muscle_residuals::note_written(&point, &written, &of_cubic, &mut worst);
+                muscle_residuals::add_interpolation_error(&point, &written, &of_cubic, &mut worst);
             }
             domain.mechanics(&point, &mut worst);
             domain.outputs(&point, share, &mut worst);
             domain.limits(&point, share, &mut worst);
             if let Some(muscles) = &point.instant.muscles {
-                muscle_residuals::note(&point, &table, muscles, &gait.settings.limits, &mut worst);
+                muscle_residuals::add(&point, &table, muscles, &gait.settings.limits, &mut worst);
             }
         }
         domain.reset(&mut worst);
@@ -145,12 +145,12 @@ impl DomainResiduals<'_> {
                 rest[i] -= gradient * force;
             }
         }
-        worst.note(point, &FORCE, largest(rest[..2].iter().copied()));
-        worst.note(point, &MOMENT, largest(rest[2..].iter().copied()));
+        worst.add(point, &FORCE, largest(rest[..2].iter().copied()));
+        worst.add(point, &MOMENT, largest(rest[2..].iter().copied()));
         let of_contacts = |value: &dyn Fn(&Contact) -> f64| largest(self.contacts.iter().map(value));
-        worst.note(point, &CONTACT_POSITION, of_contacts(&|c| c.position(&state) - self.foothold(c)));
-        worst.note(point, &CONTACT_VELOCITY, of_contacts(&|c| c.velocity(&state)));
-        worst.note(point, &CONTACT_ACCELERATION, of_contacts(&|c| c.acceleration(&state)));
+        worst.add(point, &CONTACT_POSITION, of_contacts(&|c| c.position(&state) - self.foothold(c)));
+        worst.add(point, &CONTACT_VELOCITY, of_contacts(&|c| c.velocity(&state)));
+        worst.add(point, &CONTACT_ACCELERATION, of_contacts(&|c| c.acceleration(&state)));
     }
 
     fn outputs(&self, point: &GridPoint<'_>, share: f64, worst: &mut Findings) {
@@ -163,14 +163,14 @@ impl DomainResiduals<'_> {
                 _ => qd[output] - y[1] * phase.rate,
             }))
         };
-        worst.note(point, &OUTPUT, errors(0));
-        worst.note(point, &OUTPUT_RATE, errors(1));
+        worst.add(point, &OUTPUT, errors(0));
+        worst.add(point, &OUTPUT_RATE, errors(1));
         if let Some(wanted) = self.constraints.hip_velocity {
             let trajectory = &self.gait.domains[self.d];
             let [position, velocity, _] = self.constraints.hip(q, qd, qdd);
             let planned = trajectory.phase_start_m + wanted * trajectory.duration_s * share;
-            worst.note(point, &HIP_POSITION, (position - planned).abs());
-            worst.note(point, &HIP_VELOCITY, (velocity - wanted).abs());
+            worst.add(point, &HIP_POSITION, (position - planned).abs());
+            worst.add(point, &HIP_VELOCITY, (velocity - wanted).abs());
         }
     }
 
@@ -178,31 +178,31 @@ impl DomainResiduals<'_> {
         let GaitInstant { q, qd, qdd, u, forces, .. } = point.instant;
         let rows = self.domain.contact_rows();
         let state = PointState::new(q, qd, qdd);
-        worst.note(point, &NORMAL_FORCE, self.limits.normal_force(&rows, forces));
-        worst.note(point, &FRICTION, self.limits.friction(&rows, forces));
+        worst.add(point, &NORMAL_FORCE, self.limits.normal_force(&rows, forces));
+        worst.add(point, &FRICTION, self.limits.friction(&rows, forces));
         for (c, (row, force)) in rows.iter().zip(forces).enumerate() {
             if let Some(kept) = self.kept_load(c, *row, share) {
-                worst.note(point, &KEPT_LOAD, kept - force);
+                worst.add(point, &KEPT_LOAD, kept - force);
             }
         }
         if self.domain.kind == DomainKind::Ss1 {
             let velocity = self.constraints.hip(q, qd, qdd)[1];
-            worst.note(point, &PROGRESS, self.gait.settings.limits.phase_rate_min_m_s - velocity);
+            worst.add(point, &PROGRESS, self.gait.settings.limits.phase_rate_min_m_s - velocity);
         }
-        worst.note(point, &DEPTH, depth_below_ground(self.model, self.domain, &state));
+        worst.add(point, &DEPTH, depth_below_ground(self.model, self.domain, &state));
         if let Some(wanted) = self.wanted_clearance(share) {
             let swing = self.domain.stance.other();
             let lowest = [FootPoint::Heel, FootPoint::Toe]
                 .map(|foot| state.contact_position(&self.model.contact_point(foot, swing))[1])
                 .into_iter()
                 .fold(f64::INFINITY, f64::min);
-            worst.note(point, &CLEARANCE, wanted - lowest);
+            worst.add(point, &CLEARANCE, wanted - lowest);
         }
         let excess = self.limits.motion(q, qd, qdd);
-        worst.note(point, &ANGLE, excess.angle);
-        worst.note(point, &SPEED, excess.speed);
-        worst.note(point, &ACCELERATION, excess.acceleration);
-        worst.note(point, &TORQUE, self.limits.torque(u));
+        worst.add(point, &ANGLE, excess.angle);
+        worst.add(point, &SPEED, excess.speed);
+        worst.add(point, &ACCELERATION, excess.acceleration);
+        worst.add(point, &TORQUE, self.limits.torque(u));
     }
 
     /// Smallest allowed force of contact row `c`, N: the load of the trailing foot in gradual weight transfer, and the
@@ -223,11 +223,11 @@ impl DomainResiduals<'_> {
     }
 
     /// Checks the impulses of an impact: their limit, and the friction cone at heel strike.
-    fn impulses(&self, kind: DomainKind, impulse: &[f64], place: CheckLocation<'_>, worst: &mut Worst) {
+    fn impulses(&self, kind: DomainKind, impulse: &[f64], place: CheckLocation<'_>, worst: &mut WorstValues) {
         let limits = &self.gait.settings.limits;
-        worst.note(IMPULSE_SIZE, largest(impulse.iter().copied()) - limits.impulse_max_n_s, place);
+        worst.add(IMPULSE_SIZE, largest(impulse.iter().copied()) - limits.impulse_max_n_s, place);
         if let (DomainKind::Ds2, [tangential, normal, ..]) = (kind, impulse) {
-            worst.note(IMPACT_FRICTION, tangential.abs() - limits.impact_friction * normal, place);
+            worst.add(IMPACT_FRICTION, tangential.abs() - limits.impact_friction * normal, place);
         }
     }
 
@@ -254,19 +254,19 @@ impl DomainResiduals<'_> {
         if next == 0 {
             position_jump[0] += self.gait.stride_length_m;
         }
-        worst.other.note(RESET, largest(position_jump.into_iter()), place);
+        worst.other.add(RESET, largest(position_jump.into_iter()), place);
         let expected = if CYCLE[next].opens_with_impact() {
             let impact = crate::walking::impact(self.model, CYCLE[next], q, qd);
             let by_physics = impact.as_ref().map_or(&[][..], |impact| &impact.impulse);
             let missed = to.impulse.iter().flatten().zip(by_physics).map(|(told, found)| told - found);
-            worst.other.note(IMPULSE, if by_physics.is_empty() { f64::NAN } else { largest(missed) }, place);
+            worst.other.add(IMPULSE, if by_physics.is_empty() { f64::NAN } else { largest(missed) }, place);
             self.impulses(CYCLE[next].kind, by_physics, place, &mut worst.other);
             impact.map(|impact| impact.velocity_after)
         } else {
             Some(*qd)
         };
         let error = expected.map_or(f64::NAN, |after| largest((0..9).map(|i| to.qd[0][i] - after[i])));
-        worst.other.note(IMPACT, error, place);
+        worst.other.add(IMPACT, error, place);
         let landing = match self.domain.kind {
             DomainKind::Ds2 => Some((FootPoint::Toe, self.domain.stance, self.gait.settings.limits.toe_touchdown_m_s)),
             DomainKind::Ss1 => {
@@ -277,10 +277,10 @@ impl DomainResiduals<'_> {
         if let Some((point, side, slowest)) = landing {
             let state = PointState::new(q, qd, &[0.0; 9]);
             let velocity = state.contact_velocity(&self.model.contact_point(point, side))[1];
-            worst.other.note(TOUCHDOWN, velocity + slowest, place);
+            worst.other.add(TOUCHDOWN, velocity + slowest, place);
         }
         if let (Some(before), Some(after)) = (&from.muscles, &to.muscles) {
-            muscle_residuals::note_reset(before, after, place, &mut worst.other);
+            muscle_residuals::add_reset(before, after, place, &mut worst.other);
         }
     }
 }
@@ -289,7 +289,7 @@ impl DomainResiduals<'_> {
 fn stride(gait: &Gait, worst: &mut Findings) {
     let (limits, bounds) = (&gait.settings.limits, &gait.bounds);
     let place = CheckLocation { domain: "stride", time_s: None };
-    let mut range = |value: f64, low: f64, high: f64| worst.other.note(STRIDE, (low - value).max(value - high), place);
+    let mut range = |value: f64, low: f64, high: f64| worst.other.add(STRIDE, (low - value).max(value - high), place);
     for velocity in gait.hip_velocity_m_s {
         range(velocity, bounds.a3, bounds.a4);
     }

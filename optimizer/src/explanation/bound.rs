@@ -37,7 +37,7 @@ pub(super) fn loosened(bounds: &TunedBounds, set: BoundSet, level: Level) -> Res
 }
 
 /// Bounds at a fraction of the way to looser ones, geometrically if possible, rounded to few digits.
-fn moved(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds, ModelError> {
+fn interpolated(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds, ModelError> {
     let (mut values, ends) = (from.to_array(), to.to_array());
     for (value, end) in values.iter_mut().zip(ends).filter(|(value, end)| **value != *end) {
         *value = between(*value, end, share);
@@ -47,7 +47,7 @@ fn moved(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds
 
 /// Bounds halfway between two sets of bounds.
 pub(super) fn halfway(a: &TunedBounds, b: &TunedBounds) -> Result<TunedBounds, ModelError> {
-    moved(a, b, 0.5)
+    interpolated(a, b, 0.5)
 }
 
 fn between(from: f64, to: f64, share: f64) -> f64 {
@@ -79,7 +79,7 @@ pub(super) fn step(bound: usize, from: f64, to: f64) -> f64 {
 }
 
 /// Distance between two sets of bounds.
-pub(super) fn way(from: &TunedBounds, to: &TunedBounds) -> f64 {
+pub(super) fn distance(from: &TunedBounds, to: &TunedBounds) -> f64 {
     let (from, to) = (from.to_array(), to.to_array());
     (0..from.len()).map(|bound| step(bound, from[bound], to[bound])).sum()
 }
@@ -100,7 +100,7 @@ pub(super) fn least_move<E: From<ModelError>>(
     let (mut none, mut gait) = ((0.0, *from), (1.0, *to));
     while gait.0 - none.0 > RESOLUTION && !are_close(&none.1, &gait.1) {
         let share = gait.0 - STEP * (gait.0 - none.0);
-        let tried = moved(from, to, share)?;
+        let tried = interpolated(from, to, share)?;
         if tried == none.1 || tried == gait.1 {
             break;
         }
@@ -159,7 +159,7 @@ mod tests {
         assert!((step(1, 40.0, 80.0) - 2f64.ln()).abs() < 1e-15);
         assert!((step(4, 0.0, 0.03) - 0.1).abs() < 1e-15);
         let usual = TunedBounds::default();
-        assert!((way(&usual, &TunedBounds { a2: 45.0, a5: 0.03, ..usual }) - 2f64.ln() - 0.1).abs() < 1e-15);
+        assert!((distance(&usual, &TunedBounds { a2: 45.0, a5: 0.03, ..usual }) - 2f64.ln() - 0.1).abs() < 1e-15);
     }
 
     #[test]

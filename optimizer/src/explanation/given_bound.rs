@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// A tuned bound with its given value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GivenBound {
+pub struct BoundValue {
     /// Name of the bound.
     pub bound: String,
     /// What it limits, with its unit.

@@ -2,7 +2,7 @@
 
 use super::bound::{Level, least_move, loosened, step};
 use super::conflict::BoundSet;
-use super::given_bound::GivenBound;
+use super::given_bound::BoundValue;
 use super::search::Search;
 use super::solves::{SearchEnd, Starts};
 use crate::solve::WarmStart;
@@ -126,7 +126,7 @@ impl Search<'_> {
             None => (loosened(&given, set, Level::Loosest)?, self.searched(set)?),
         };
         let (starts, undecided) = (searches.iter().map(|s| s.starts).sum(), searches.iter().any(|s| s.undecided));
-        let of_bound = |one: GivenBound, bound: usize| RelaxedBound {
+        let of_bound = |one: BoundValue, bound: usize| RelaxedBound {
             bound: one.bound,
             meaning: one.meaning,
             from: one.value,
@@ -144,7 +144,7 @@ impl Search<'_> {
 }
 
 /// A joint relaxation that consists of one bound.
-pub(super) fn alone(joint: JointRelaxation) -> Option<Relaxation> {
+pub(super) fn of_one_bound(joint: JointRelaxation) -> Option<Relaxation> {
     let JointRelaxation { bounds, undecided, solves, starts, warm_start } = joint;
     let RelaxedBound { bound, meaning, from, to, not_with } = bounds.into_iter().next()?;
     Some(Relaxation { bound, meaning, from, to, not_with, undecided, solves, starts, warm_start })

@@ -1,6 +1,6 @@
 //! The solves of an explanation: tests whether bounds have a gait, with a memory of earlier results.
 
-use super::bound::{halfway, is_as_loose, way};
+use super::bound::{distance, halfway, is_as_loose};
 use crate::gait_problem::GaitProblem;
 use crate::solve::{
     CONVERGED_VIOLATION, CancelToken, InitialGuess, SolveError, SolveOptions, SolveOutcome, SolveStatus, Violation,
@@ -42,7 +42,7 @@ pub(super) enum Starts {
 
 /// A failed search: bounds without a gait, and the nearest motion.
 #[derive(Debug, Clone)]
-pub(super) struct Unmet {
+pub(super) struct FailedSearch {
     bounds: TunedBounds,
     /// Violations of the nearest motion, worst first. Stationary points of the violation are preferred.
     pub(super) violations: Vec<Violation>,
@@ -53,7 +53,7 @@ pub(super) struct Unmet {
     pub(super) undecided: bool,
 }
 
-impl Unmet {
+impl FailedSearch {
     fn new(bounds: &TunedBounds) -> Self {
         let rank = (true, f64::INFINITY);
         Self { bounds: *bounds, violations: Vec::new(), rank, starts: 0, undecided: false }
@@ -85,7 +85,7 @@ pub(super) struct Solves<'a> {
     options: SolveOptions,
     cancel: &'a CancelToken,
     met: Vec<(TunedBounds, WarmStart)>,
-    unmet: Vec<Unmet>,
+    unmet: Vec<FailedSearch>,
     /// Number of solves so far.
     pub(super) count: usize,
 }
@@ -128,16 +128,16 @@ impl<'a> Solves<'a> {
 
     /// Searches a gait with these bounds: from the nearest known gait, in one or two steps, then from initial guesses.
     pub(super) fn solve(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<Option<WarmStart>, SearchEnd> {
-        let mut unmet = Unmet::new(bounds);
-        let nearest = self.met.iter().min_by(|a, b| way(&a.0, bounds).total_cmp(&way(&b.0, bounds))).cloned();
+        let mut unmet = FailedSearch::new(bounds);
+        let nearest = self.met.iter().min_by(|a, b| distance(&a.0, bounds).total_cmp(&distance(&b.0, bounds))).cloned();
         let cold = starts == Starts::All || nearest.is_none();
         if let Some((from, gait)) = nearest {
             if self.warm(bounds, &gait, &mut unmet)? {
                 return Ok(self.latest());
             }
             let middle = halfway(&from, bounds)?;
-            if way(&from, bounds) > FAR
-                && self.warm(&middle, &gait, &mut Unmet::new(&middle))?
+            if distance(&from, bounds) > FAR
+                && self.warm(&middle, &gait, &mut FailedSearch::new(&middle))?
                 && let Some(gait) = self.latest()
                 && self.warm(bounds, &gait, &mut unmet)?
             {
@@ -154,7 +154,7 @@ impl<'a> Solves<'a> {
         Ok(None)
     }
 
-    fn warm(&mut self, bounds: &TunedBounds, gait: &WarmStart, unmet: &mut Unmet) -> Result<bool, SearchEnd> {
+    fn warm(&mut self, bounds: &TunedBounds, gait: &WarmStart, unmet: &mut FailedSearch) -> Result<bool, SearchEnd> {
         let max_iterations = self.options.max_iterations.min(MAX_ITERATIONS_WARM);
         let options = SolveOptions { max_iterations, ..self.options };
         let outcome = solve_from_warm_start(&self.with(bounds), gait, &options, self.cancel)?;
@@ -162,7 +162,12 @@ impl<'a> Solves<'a> {
     }
 
     /// Adds the result of a solve to a failed search.
-    fn is_gait(&mut self, bounds: &TunedBounds, outcome: SolveOutcome, unmet: &mut Unmet) -> Result<bool, SearchEnd> {
+    fn is_gait(
+        &mut self,
+        bounds: &TunedBounds,
+        outcome: SolveOutcome,
+        unmet: &mut FailedSearch,
+    ) -> Result<bool, SearchEnd> {
         self.count += outcome.report.attempts.len();
         if self.cancel.is_cancelled() {
             return Err(SearchEnd::Cancelled);
@@ -192,7 +197,7 @@ impl<'a> Solves<'a> {
     }
 
     /// The failed search with these bounds or looser ones.
-    pub(super) fn unmet(&self, bounds: &TunedBounds) -> Option<&Unmet> {
+    pub(super) fn unmet(&self, bounds: &TunedBounds) -> Option<&FailedSearch> {
         self.unmet.iter().find(|known| is_as_loose(&known.bounds, bounds))
     }
 }

@@ -1,6 +1,6 @@
 //! Infeasibility explanations as sentences, for the command line, pages and programs.
 
-use super::given_bound::GivenBound;
+use super::given_bound::BoundValue;
 use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
 use crate::number_format::figure;
 use crate::solve::{SolveStatus, Violation};
@@ -90,7 +90,7 @@ fn caveat(undecided: bool) -> &'static str {
 impl Conflict {
     /// The conflicting bounds and the violated constraint, as sentences.
     pub fn in_words(&self) -> String {
-        let quantities: Vec<String> = self.bounds.iter().map(GivenBound::in_words).collect();
+        let quantities: Vec<String> = self.bounds.iter().map(BoundValue::in_words).collect();
         let without = match self.without.len() {
             0 => String::new(),
             1 => format!("With {} at its loosest value, another conflict remains. ", list(&self.without)),
@@ -135,7 +135,7 @@ impl Conflict {
     }
 }
 
-impl GivenBound {
+impl BoundValue {
     /// `a7 = 5° (hip angle)`.
     fn in_words(&self) -> String {
         quantity(&self.bound, &self.meaning, self.value)
@@ -187,7 +187,7 @@ impl JointRelaxation {
     }
 }
 
-impl GivenBound {
+impl BoundValue {
     /// The limit in words: `a hip angle of at most 15°`.
     fn limit_in_words(&self) -> String {
         let (limited, unit) = parts(&self.meaning);
@@ -206,7 +206,7 @@ impl Explanation {
             return Some("The bounds of this trial do not conflict: the solve missed a gait.".to_owned());
         }
         let conflict = self.conflicts.first()?;
-        let limits: Vec<String> = conflict.bounds.iter().map(GivenBound::limit_in_words).collect();
+        let limits: Vec<String> = conflict.bounds.iter().map(BoundValue::limit_in_words).collect();
         Some(match limits.as_slice() {
             [] => "No value of the tuned bounds gives a gait: fixed constraints conflict.".to_owned(),
             [one] if conflict.undecided => format!("With {one}, there is probably no gait, whatever the other bounds."),
@@ -285,7 +285,7 @@ mod tests {
     fn conflict(bounds: &[(usize, f64)]) -> Conflict {
         let given = |(bound, value): &(usize, f64)| {
             let (bound, meaning) = named(*bound);
-            GivenBound { bound, meaning, value: *value }
+            BoundValue { bound, meaning, value: *value }
         };
         Conflict {
             bounds: bounds.iter().map(given).collect(),

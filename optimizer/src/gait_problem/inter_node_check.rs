@@ -270,10 +270,10 @@ mod tests {
         assert!((by - of_angles[0].1[1] * scale[knee(5, Q)]).abs() < 1e-12);
         assert_eq!(tightened.variable_range(knee(4, Q)), program.variable_range(knee(4, Q)));
         // Margins near their bound stay relevant; others do not.
-        let on = margins.bearing_on(&program, &x);
+        let on = margins.relevant_at(&program, &x);
         assert!(on.variables.contains_key(&knee(5, Q)) && on.variables.contains_key(&knee(6, Q)));
         x[knee(5, Q)] = 0.0;
-        assert!(!margins.bearing_on(&program, &x).variables.contains_key(&knee(5, Q)));
+        assert!(!margins.relevant_at(&program, &x).variables.contains_key(&knee(5, Q)));
     }
 
     #[test]

@@ -73,7 +73,7 @@ impl Margins {
     /// The margins that are relevant at the point `x`: those with a distance to the tightened bound of at most the
     /// margin.
     #[must_use]
-    pub fn bearing_on(&self, program: &GaitProgram, x: &[f64]) -> Self {
+    pub fn relevant_at(&self, program: &GaitProgram, x: &[f64]) -> Self {
         let mut values = vec![0.0; program.rows.names.len()];
         program.constraints(x, &mut values);
         let bears = |distance: f64, margin: f64| distance <= 2.0 * margin;

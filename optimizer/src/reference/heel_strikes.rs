@@ -112,7 +112,7 @@ impl MotionRecording {
             });
             let hint = match how {
                 HeelStrikes::Kinematics => {
-                    "; for a recording of exactly one stride, such as an exported gait, take its first and last row"
+                    "; for a recording of exactly one stride, such as an exported gait, choose \"ends\": its first and last row"
                 }
                 _ => "",
             };

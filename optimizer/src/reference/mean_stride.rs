@@ -2,7 +2,7 @@
 
 use super::heel_strikes::{HeelStrikes, ROUNDING_S};
 use super::motion_recording::MotionRecording;
-use super::plausibility::{no_walker, unlike_builtin};
+use super::plausibility::{unlike_builtin, why_implausible};
 use super::reference_gait::{MeasuredPerson, REFERENCE_ROWS, ReferenceGait};
 use crate::model_error::ModelError;
 
@@ -117,7 +117,7 @@ impl MotionRecording {
                 deviation[row][i] = if strides.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
             }
         }
-        if let Some(reason) = no_walker(&mean).or_else(|| not_from_right_heel_strike(&mean)) {
+        if let Some(reason) = why_implausible(&mean).or_else(|| not_from_right_heel_strike(&mean)) {
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let found = match how {

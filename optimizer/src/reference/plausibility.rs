@@ -25,7 +25,7 @@ const COMPARED: [(usize, &str); 4] = [(1, "left hip"), (KNEE, "left knee"), (ANK
 const LEAST_CORRELATION: f64 = 0.5;
 
 /// The reason why a mean stride is impossible, if any.
-pub(super) fn no_walker(mean: &[[f64; 5]]) -> Option<String> {
+pub(super) fn why_implausible(mean: &[[f64; 5]]) -> Option<String> {
     torso(&curve(mean, TORSO))
         .map(|reason| (TORSO, reason))
         .or_else(|| knee(&curve(mean, KNEE)).map(|reason| (KNEE, reason)))

@@ -3,7 +3,7 @@
 
 use super::error::SolveError;
 use super::multi_start::InitialGuess;
-use super::options::BasinChoice;
+use super::options::LocalOptimumChoice;
 use super::phases::{AttemptRun, SolveContext};
 use super::progress::{IterationRecord, SolvePhase};
 use super::report::{CONVERGED_VIOLATION, LinearAlgebra, SolveAttempt, SolveStatus};
@@ -62,14 +62,14 @@ impl Candidate {
             objective: self.objective,
             gait_rmse_rad: self.rmse,
             reason: run.reason.clone(),
-            basin: None,
+            local_optimum: None,
             chosen: false,
         }
     }
 }
 
 /// A finished attempt.
-pub(super) struct Tried {
+pub(super) struct FinishedAttempt {
     pub(super) candidate: Candidate,
     pub(super) attempt: SolveAttempt,
     /// Tightened bounds.
@@ -78,7 +78,7 @@ pub(super) struct Tried {
     pub(super) linear_algebra: LinearAlgebra,
 }
 
-impl Tried {
+impl FinishedAttempt {
     /// Whether no further attempt is needed: it converged or was stopped.
     pub(super) fn is_final(&self) -> bool {
         matches!(self.candidate.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
@@ -108,7 +108,7 @@ pub(super) fn try_warm(
     context: &SolveContext<'_>,
     start: MeshStart,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Tried, SolveError> {
+) -> Result<FinishedAttempt, SolveError> {
     let mut run = AttemptRun::new(context, context.options.threads, observer);
     let MeshStart { point, mut margins, strategy } = start;
     if context.options.tightening_rounds == 0 {
@@ -119,11 +119,11 @@ pub(super) fn try_warm(
     } else {
         run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)
     }?;
-    Ok(Tried::new(context, result, strategy, margins, &run))
+    Ok(FinishedAttempt::new(context, result, strategy, margins, &run))
 }
 
 /// Numbers the local optima of the attempts. Attempts with the same objective and Gait RMSE share a local optimum.
-pub(super) fn number_basins(tried: &mut [Tried]) {
+pub(super) fn number_local_optima(tried: &mut [FinishedAttempt]) {
     let mut known: Vec<(f64, f64)> = Vec::new();
     for attempt in tried.iter_mut().map(|t| &mut t.attempt).filter(|a| a.status == SolveStatus::Converged) {
         let (objective, rmse) = (attempt.objective, attempt.gait_rmse_rad);
@@ -134,7 +134,7 @@ pub(super) fn number_basins(tried: &mut [Tried]) {
             known.push((objective, rmse));
             known.len() - 1
         });
-        attempt.basin = Some(number + 1);
+        attempt.local_optimum = Some(number + 1);
     }
 }
 
@@ -142,7 +142,7 @@ pub(super) fn number_basins(tried: &mut [Tried]) {
 /// violation or the rounds are used up. Returns the index of the last converged attempt, or of a cancelled one.
 pub(super) fn enforce_between_nodes(
     context: &SolveContext<'_>,
-    tried: &mut Vec<Tried>,
+    tried: &mut Vec<FinishedAttempt>,
     mut chosen: usize,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<usize, SolveError> {
@@ -161,8 +161,9 @@ pub(super) fn enforce_between_nodes(
         let mut run = AttemptRun::new(context, context.options.threads, observer);
         run.guess = tried.len();
         let result = run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)?;
-        let mut next = Tried::new(context, result, "bounds tightened between nodes", margins, &run);
-        next.attempt.basin = tried[chosen].attempt.basin.filter(|_| next.candidate.status == SolveStatus::Converged);
+        let mut next = FinishedAttempt::new(context, result, "bounds tightened between nodes", margins, &run);
+        next.attempt.local_optimum =
+            tried[chosen].attempt.local_optimum.filter(|_| next.candidate.status == SolveStatus::Converged);
         let status = next.candidate.status;
         tried.push(next);
         if !matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {
@@ -179,18 +180,18 @@ fn try_guess(
     guess: &InitialGuess,
     threads: usize,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Tried, SolveError> {
+) -> Result<FinishedAttempt, SolveError> {
     let mut run = AttemptRun::new(context, threads, observer);
     run.guess = index;
     let result = run.cold(guess)?;
-    Ok(Tried::new(context, result, &guess.label(), Margins::default(), &run))
+    Ok(FinishedAttempt::new(context, result, &guess.label(), Margins::default(), &run))
 }
 
 /// Messages from the threads of the attempts to the calling thread.
 #[allow(clippy::large_enum_variant)] // A few messages per solve, each moved once.
 enum Message {
     Iteration(IterationRecord),
-    Done(usize, Result<Tried, SolveError>),
+    Done(usize, Result<FinishedAttempt, SolveError>),
 }
 
 /// Tries all guesses, as many in parallel as there are threads. The results have the order of the guesses, the first
@@ -200,14 +201,14 @@ pub(super) fn try_guesses(
     guesses: &[InitialGuess],
     first: usize,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Vec<Tried>, SolveError> {
+) -> Result<Vec<FinishedAttempt>, SolveError> {
     let threads = context.options.threads;
     let workers = threads.min(guesses.len());
     if workers <= 1 {
         return (first..).zip(guesses).map(|(i, guess)| try_guess(context, i, guess, threads, observer)).collect();
     }
     let next = AtomicUsize::new(0);
-    let mut done: Vec<Option<Result<Tried, SolveError>>> = guesses.iter().map(|_| None).collect();
+    let mut done: Vec<Option<Result<FinishedAttempt, SolveError>>> = guesses.iter().map(|_| None).collect();
     std::thread::scope(|scope| {
         let (sender, receiver) = mpsc::channel();
         for _ in 0..workers {
@@ -244,7 +245,7 @@ const MOST_INFEASIBLE: usize = 3;
 pub(super) fn try_multi_start(
     context: &SolveContext<'_>,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Vec<Tried>, SolveError> {
+) -> Result<Vec<FinishedAttempt>, SolveError> {
     let muscles = context.problem.muscles;
     let asked_for = context.options.initial_guesses;
     let guesses = InitialGuess::first(asked_for.max(InitialGuess::MULTI_START.len()), muscles);
@@ -252,7 +253,7 @@ pub(super) fn try_multi_start(
     let mut tried = try_guesses(context, first, 0, observer)?;
     for guess in others.iter().filter(|guess| context.options.retry && InitialGuess::MULTI_START.contains(guess)) {
         let infeasible = tried.iter().filter(|t| t.candidate.status == SolveStatus::Infeasible).count();
-        if tried.iter().any(Tried::is_final) || infeasible >= MOST_INFEASIBLE {
+        if tried.iter().any(FinishedAttempt::is_final) || infeasible >= MOST_INFEASIBLE {
             break;
         }
         tried.extend(try_guesses(context, std::slice::from_ref(guess), tried.len(), observer)?);
@@ -263,7 +264,7 @@ pub(super) fn try_multi_start(
 /// Index of the outcome: a cancelled attempt, otherwise a converged one by `choice`, otherwise the one with the
 /// smallest violation. Among the latter, stationary points of the violation come first, because they show which
 /// constraints conflict.
-pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
+pub(super) fn choose(tried: &[FinishedAttempt], choice: LocalOptimumChoice) -> usize {
     if let Some(cancelled) = tried.iter().position(|t| t.candidate.status == SolveStatus::Cancelled) {
         return cancelled;
     }
@@ -275,8 +276,8 @@ pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
             .map(|(index, t)| (index, t.candidate.objective))
     };
     let Some((lowest, objective)) = least(&|c| c.objective, f64::INFINITY) else {
-        let gave_up = |t: &Tried| t.candidate.status != SolveStatus::Infeasible;
-        let violation = |t: &Tried| t.candidate.violation;
+        let gave_up = |t: &FinishedAttempt| t.candidate.status != SolveStatus::Infeasible;
+        let violation = |t: &FinishedAttempt| t.candidate.violation;
         return tried
             .iter()
             .enumerate()
@@ -284,8 +285,8 @@ pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
             .map_or(0, |(index, _)| index);
     };
     match choice {
-        BasinChoice::LowestObjective => lowest,
-        BasinChoice::NearestToReference { within_percent } => {
+        LocalOptimumChoice::LowestObjective => lowest,
+        LocalOptimumChoice::NearestToReference { within_percent } => {
             least(&|c| c.rmse, objective + 0.01 * within_percent * objective.abs()).map_or(lowest, |(index, _)| index)
         }
     }

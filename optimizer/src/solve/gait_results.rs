@@ -57,7 +57,7 @@ impl GaitResults {
     }
 
     /// The results that a report states.
-    pub fn stated_in(report: &SolveReport) -> Self {
+    pub fn of_report(report: &SolveReport) -> Self {
         Self {
             cost_of_transport: report.cost_of_transport,
             gait_rmse_rad: report.gait_rmse_rad,

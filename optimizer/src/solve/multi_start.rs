@@ -137,7 +137,7 @@ impl InitialGuess {
     /// The fixed guesses. A cold start always tries the first [`SolveOptions::initial_guesses`](super::SolveOptions),
     /// and the others until one converges. If more are requested, [perturbed](Self::perturbed) ones follow. The
     /// timing of the domains has the largest influence on the local optimum, then the curvature of the constraints
-    /// (`examples/basins.rs`).
+    /// (`examples/local_optima.rs`).
     pub const MULTI_START: [Self; 14] = [
         Self::NATURAL,
         Self::EARLY_RISE,

@@ -25,7 +25,7 @@ pub struct SolveOptions {
     /// Whether further guesses follow until one converges.
     pub retry: bool,
     /// The choice among converged attempts.
-    pub basin_choice: BasinChoice,
+    pub local_optimum_choice: LocalOptimumChoice,
     /// Largest number of rounds in which bounds are tightened if the gait violates them between nodes by more than
     /// half of the limit of the certificate. 0 disables the check.
     pub tightening_rounds: usize,
@@ -44,7 +44,7 @@ impl Default for SolveOptions {
             threads: 1,
             initial_guesses: 2,
             retry: true,
-            basin_choice: BasinChoice::default(),
+            local_optimum_choice: LocalOptimumChoice::default(),
             tightening_rounds: 4,
             solver: solver_settings::default(),
         }
@@ -61,7 +61,7 @@ impl SolveOptions {
         ModelError::check_range("max_iterations", self.max_iterations as f64, 1.0, 1e6)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
         ModelError::check_range("initial_guesses", self.initial_guesses as f64, 1.0, InitialGuess::MOST as f64)?;
-        self.basin_choice.validate()?;
+        self.local_optimum_choice.validate()?;
         ModelError::check_range("tightening_rounds", self.tightening_rounds as f64, 0.0, 20.0)?;
         solver_settings::validate(&self.solver)?;
         if let Some(limit) = self.time_limit_s {
@@ -74,7 +74,7 @@ impl SolveOptions {
 /// The choice among several converged gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
-pub enum BasinChoice {
+pub enum LocalOptimumChoice {
     /// The gait with the lowest objective.
     #[default]
     LowestObjective,
@@ -85,7 +85,7 @@ pub enum BasinChoice {
     },
 }
 
-impl BasinChoice {
+impl LocalOptimumChoice {
     /// Checks the percentage.
     ///
     /// # Errors
@@ -94,7 +94,7 @@ impl BasinChoice {
         match self {
             Self::LowestObjective => Ok(()),
             Self::NearestToReference { within_percent } => {
-                ModelError::check_range("basin_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
+                ModelError::check_range("local_optimum_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
             }
         }
     }

@@ -4,7 +4,8 @@ use super::attempts::Candidate;
 use super::gait_results::GaitResults;
 use super::phases::SolveContext;
 use super::report::{
-    LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
+    LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
+    Violation,
 };
 use super::warm_start::WarmStart;
 use crate::gait_problem::margins::Margins;
@@ -35,7 +36,7 @@ pub(super) fn outcome(
     let Candidate { result, gait, status, .. } = candidate;
     let x = &result.x;
     let figures = GaitResults::of_well_formed(&gait, &program.model, &problem.reference);
-    let margins = margins.bearing_on(program, x);
+    let margins = margins.relevant_at(program, x);
     let violations = program.violations(x);
     let warm_start = warm_start(context, &result, margins);
     let converged = ConvergedGait {
@@ -86,18 +87,18 @@ pub(super) fn outcome(
         let above = violations.iter().filter(|v| v.amount.is_nan() || v.amount > context.options.tolerance);
         above.take(MAX_VIOLATIONS).map(|v| describe(program, v)).collect()
     };
-    SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
+    SolveOutcome { report, gait, warm_start, violations, other_local_optima: Vec::new() }
 }
 
 /// The gait of another local optimum.
-pub(super) fn other_basin(
+pub(super) fn other_local_optimum(
     context: &SolveContext<'_>,
     candidate: Candidate,
     attempt: &SolveAttempt,
-    basin: usize,
-) -> OtherBasin {
-    OtherBasin {
-        basin,
+    local_optimum: usize,
+) -> OtherLocalOptimum {
+    OtherLocalOptimum {
+        local_optimum,
         objective: attempt.objective,
         gait_rmse_rad: attempt.gait_rmse_rad,
         warm_start: warm_start(context, &candidate.result, Margins::default()),

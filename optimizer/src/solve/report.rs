@@ -73,7 +73,7 @@ pub struct SolveAttempt {
     /// Number of its local optimum, from 1 in the order of the attempts. Attempts with the same number have the same
     /// gait. `None` if it did not converge.
     #[serde(default)]
-    pub basin: Option<usize>,
+    pub local_optimum: Option<usize>,
     /// Whether it is the outcome of the solve.
     pub chosen: bool,
 }
@@ -206,9 +206,9 @@ pub struct Violation {
 
 /// Another local optimum that a guess of the solve reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OtherBasin {
+pub struct OtherLocalOptimum {
     /// Number of the local optimum among the attempts.
-    pub basin: usize,
+    pub local_optimum: usize,
     /// Objective.
     pub objective: f64,
     /// Gait RMSE, rad.
@@ -232,7 +232,7 @@ pub struct SolveOutcome {
     pub violations: Vec<Violation>,
     /// The other local optima, with one gait for each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub other_basins: Vec<OtherBasin>,
+    pub other_local_optima: Vec<OtherLocalOptimum>,
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 
 pub mod priority;
 
-use priority::{COMPUTING, STACK_BYTES, stand_back};
+use priority::{COMPUTING, STACK_BYTES, lower_priority};
 use std::sync::Arc;
 use thiserror::Error;
 use tokio::sync::{Semaphore, oneshot};
@@ -36,21 +36,21 @@ pub enum ComputeError {
 #[derive(Debug, Clone)]
 pub struct Pool {
     places: Arc<Semaphore>,
-    stands_back: bool,
+    has_lower_priority: bool,
 }
 
 impl Default for Pool {
     /// One computation for each core, at least two, at lower priority than requests.
     fn default() -> Self {
         let size = std::thread::available_parallelism().map_or(2, |cores| cores.get().max(2));
-        Self { stands_back: true, ..Self::new(size) }
+        Self { has_lower_priority: true, ..Self::new(size) }
     }
 }
 
 impl Pool {
     /// A pool of `size` threads (at least one).
     pub fn new(size: usize) -> Self {
-        Self { places: Arc::new(Semaphore::new(size.max(1))), stands_back: false }
+        Self { places: Arc::new(Semaphore::new(size.max(1))), has_lower_priority: false }
     }
 
     /// Computes as soon as a thread is free. Work that has started continues, and keeps its slot, even if the caller
@@ -63,18 +63,18 @@ impl Pool {
         work: impl FnOnce(&OnPool) -> T + Send + 'static,
     ) -> Result<T, ComputeError> {
         let place = Arc::clone(&self.places).acquire_owned().await.map_err(|_| ComputeError::Closed)?;
-        let (tell, told) = oneshot::channel();
-        let stands_back = self.stands_back;
+        let (sender, result) = oneshot::channel();
+        let has_lower_priority = self.has_lower_priority;
         let work = move || {
             let _place = place;
-            if stands_back {
-                stand_back(COMPUTING);
+            if has_lower_priority {
+                lower_priority(COMPUTING);
             }
             // Fails only if the caller went away.
-            let _ = tell.send(work(&OnPool(())));
+            let _ = sender.send(work(&OnPool(())));
         };
         std::thread::Builder::new().name("compute".to_owned()).stack_size(STACK_BYTES).spawn(work)?;
-        told.await.map_err(|_| ComputeError::Panicked)
+        result.await.map_err(|_| ComputeError::Panicked)
     }
 }
 

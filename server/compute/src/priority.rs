@@ -13,7 +13,7 @@ pub const AFTERWARDS: i32 = 19;
 pub const STACK_BYTES: usize = 16 << 20;
 
 /// Lowers the priority of the calling thread, if the system allows it.
-pub fn stand_back(niceness: i32) {
+pub fn lower_priority(niceness: i32) {
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::setpriority_process(None, niceness) {
         tracing::debug!(%error, niceness, "cannot lower the priority of a thread");
@@ -27,16 +27,16 @@ pub fn stand_back(niceness: i32) {
 ///
 /// # Errors
 /// If no thread can be started.
-pub fn behind_solves<T: Send + 'static>(
+pub fn run_below_solves<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> io::Result<oneshot::Receiver<T>> {
-    let (tell, told) = oneshot::channel();
+    let (sender, result) = oneshot::channel();
     let work = move || {
-        stand_back(AFTERWARDS);
+        lower_priority(AFTERWARDS);
         // Fails only if the receiver was dropped.
-        let _ = tell.send(work());
+        let _ = sender.send(work());
     };
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES).spawn(work)?;
-    Ok(told)
+    Ok(result)
 }

@@ -21,7 +21,7 @@ Description: tuning of walking gaits for powered prostheses
  Gaitwright tunes walking gaits of powered prostheses: an optimiser computes
  gaits, a preference learner proposes bounds, people or motion capture compare.
 """
-# The service is started by the administrator, after the settings.
+# The administrator starts the service after editing the settings.
 POSTINST = """#!/bin/sh
 set -e
 if [ -d /run/systemd/system ]; then systemctl daemon-reload; fi

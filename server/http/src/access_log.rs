@@ -140,7 +140,7 @@ pub async fn keep_pruning(store: Store, days: u32, task: Task) -> Result<(), Err
 }
 
 /// Adds the caller to the response, for [`note`].
-pub(super) async fn say_caller(request: Request, next: Next) -> Response {
+pub(super) async fn add_caller(request: Request, next: Next) -> Response {
     let caller = request.extensions().get::<Caller>().cloned();
     let mut response = next.run(request).await;
     if let Some(caller) = caller {

@@ -125,7 +125,7 @@ async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result
 /// The study of the object that the path names, for [`Idempotent`](super::idempotent::Idempotent), which reads the
 /// request afterwards.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OfStudy(pub(super) Option<StudyId>);
+pub(super) struct StudyOfPath(pub(super) Option<StudyId>);
 
 /// The identifier `{id}` in the path, of an object for which the caller has the right `P`. A request that changes an
 /// object whose subject withdrew consent is refused.
@@ -155,7 +155,7 @@ impl<T: Located, P: Permission> FromRequestParts<AppState> for DespiteWithdrawal
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, RefusedRequest> {
         let found = in_path::<T, P>(parts, app).await;
         // A stored response of such a handler has no data of the subject, so it may be repeated.
-        parts.extensions.insert(OfStudy(None));
+        parts.extensions.insert(StudyOfPath(None));
         found.map(|(id, _)| Self(id, PhantomData)).map_err(|error| RefusedRequest::of(parts, error))
     }
 }
@@ -172,7 +172,7 @@ pub(super) async fn in_path<T: Located, P: Permission>(
     let unknown = || Error::NotFound { what: "object with the identifier".to_owned(), id: text.to_owned() };
     let id: T = text.parse().map_err(|_| unknown())?;
     let study = located(&mut *app.read().await?, reach, id).await?;
-    parts.extensions.insert(OfStudy(study));
+    parts.extensions.insert(StudyOfPath(study));
     Ok((id, study))
 }
 

@@ -9,7 +9,7 @@ use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::Caller;
-use gaitwright_service::access::sign_in::{self, Recognised};
+use gaitwright_service::access::sign_in::{self, SignInLookup};
 use gaitwright_service::error::Error;
 use gaitwright_store::{Instant, commit};
 
@@ -57,21 +57,21 @@ async fn caller(app: &AppState, path: &str, headers: &HeaderMap) -> Result<Optio
         return Ok(app.access.open.then(Caller::without_sign_in));
     }
     match credential.recognise(app).await? {
-        (Recognised::Known { caller, seen }, now) => {
+        (SignInLookup::Known { caller, seen }, now) => {
             // Automatic requests of a page do not keep a session alive.
             if let Some(session) = seen.filter(|_| !path.ends_with("/live") && !path.ends_with("/events")) {
                 let mut writer = app.write().await?;
-                sign_in::seen(&mut writer, session, now).await?;
+                sign_in::record_activity(&mut writer, session, now).await?;
                 commit(writer).await?;
             }
             return Ok(Some(caller));
         }
-        (Recognised::Ended(session), now) => {
+        (SignInLookup::Ended(session), now) => {
             let mut writer = app.write().await?;
-            sign_in::note_ended(&mut writer, session, now).await?;
+            sign_in::record_expiry(&mut writer, session, now).await?;
             commit(writer).await?;
         }
-        (Recognised::Nobody, _) => {}
+        (SignInLookup::Nobody, _) => {}
     }
     match credential {
         Credential::Token(_) => Err(Error::NotSignedIn(
@@ -98,13 +98,13 @@ impl Credential {
     }
 
     /// Looks up the credential. Returns the result and the time of the decision, and writes nothing.
-    async fn recognise(&self, app: &AppState) -> Result<(Recognised, Instant), Error> {
+    async fn recognise(&self, app: &AppState) -> Result<(SignInLookup, Instant), Error> {
         let mut reader = app.read().await?;
         let now = app.access.clock.now(&mut reader).await?;
         let found = match self {
             Self::Token(token) => sign_in::of_token(&mut reader, token, now).await?,
             Self::Session(session) => sign_in::of_session(&mut reader, session, app.access.limits, now).await?,
-            Self::None => Recognised::Nobody,
+            Self::None => SignInLookup::Nobody,
         };
         Ok((found, now))
     }
@@ -112,8 +112,8 @@ impl Credential {
     /// Looks up the caller again, for streams that outlive their request.
     pub(super) async fn caller(&self, app: &AppState) -> Result<Option<Caller>, Error> {
         Ok(match self.recognise(app).await?.0 {
-            Recognised::Known { caller, .. } => Some(caller),
-            Recognised::Ended(_) | Recognised::Nobody => match self {
+            SignInLookup::Known { caller, .. } => Some(caller),
+            SignInLookup::Ended(_) | SignInLookup::Nobody => match self {
                 Self::Token(_) => None,
                 Self::Session(_) | Self::None => app.access.open.then(Caller::without_sign_in),
             },

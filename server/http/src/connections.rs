@@ -151,7 +151,7 @@ struct ClientConnection {
     /// Time of the last byte in either direction, in milliseconds since the start.
     active_at: AtomicU64,
     /// Whether the client has sent a byte.
-    heard: AtomicBool,
+    has_sent_request: AtomicBool,
     /// Cancelled when the connection must close.
     closing: CancellationToken,
 }
@@ -180,7 +180,7 @@ impl Connections {
         let connection = Arc::new(ClientConnection {
             network,
             active_at: self.milliseconds().into(),
-            heard: false.into(),
+            has_sent_request: false.into(),
             closing: CancellationToken::new(),
         });
         let number = self.table().enter(&connection);
@@ -247,7 +247,7 @@ impl Connections {
             .values()
             .filter(|connection| !connection.closing.is_cancelled() && among(connection))
             .filter(|connection| u128::from(now.saturating_sub(quiet_since(connection))) >= idle.as_millis())
-            .min_by_key(|connection| (connection.heard.load(Ordering::Relaxed), quiet_since(connection)))
+            .min_by_key(|connection| (connection.has_sent_request.load(Ordering::Relaxed), quiet_since(connection)))
             .cloned();
         let Some(quietest) = quietest else { return false };
         quietest.closing.cancel();
@@ -343,7 +343,7 @@ impl AsyncRead for HeldConnection {
         let before = buffer.filled().len();
         let read = Pin::new(&mut self.stream).poll_read(cx, buffer);
         if buffer.filled().len() > before {
-            self.connection.heard.store(true, Ordering::Relaxed);
+            self.connection.has_sent_request.store(true, Ordering::Relaxed);
             self.active();
         }
         read

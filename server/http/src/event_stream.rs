@@ -32,14 +32,14 @@ const AHEAD: usize = 16;
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 /// A listener to a study with the right `P`. Handlers of streams take it instead of [`Visible`].
-pub(crate) struct Listening<P> {
+pub(crate) struct StudyListener<P> {
     app: AppState,
     credential: Credential,
     study: StudyId,
     right: PhantomData<P>,
 }
 
-impl<P: Permission> FromRequestParts<AppState> for Listening<P> {
+impl<P: Permission> FromRequestParts<AppState> for StudyListener<P> {
     type Rejection = Response;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Response> {
@@ -51,7 +51,7 @@ impl<P: Permission> FromRequestParts<AppState> for Listening<P> {
     }
 }
 
-impl<P: Permission> Listening<P> {
+impl<P: Permission> StudyListener<P> {
     /// The study.
     pub(crate) fn study(&self) -> StudyId {
         self.study
@@ -60,7 +60,7 @@ impl<P: Permission> Listening<P> {
     /// Responds with the events that `produce` sends, as long as the listener is authorised.
     pub(crate) fn stream<F>(self, produce: impl FnOnce(Sender<P>) -> F) -> Response
     where
-        F: Future<Output = Result<(), Gone>> + Send + 'static,
+        F: Future<Output = Result<(), ListenerGone>> + Send + 'static,
     {
         let (events, receiver) = mpsc::channel(AHEAD);
         let sender = Sender { listening: self.copy(), events, asked: None };
@@ -104,11 +104,11 @@ impl<P: Permission> Listening<P> {
 }
 
 /// The listener went away, or lost its authorisation.
-pub(crate) struct Gone;
+pub(crate) struct ListenerGone;
 
 /// Sends events to a listener.
 pub(crate) struct Sender<P> {
-    listening: Listening<P>,
+    listening: StudyListener<P>,
     events: mpsc::Sender<Event>,
     /// Time of the last successful check.
     asked: Option<Instant>,
@@ -116,14 +116,14 @@ pub(crate) struct Sender<P> {
 
 impl<P: Permission> Sender<P> {
     /// Sends an event.
-    pub(crate) async fn send(&mut self, event: Event) -> Result<(), Gone> {
+    pub(crate) async fn send(&mut self, event: Event) -> Result<(), ListenerGone> {
         if self.asked.is_none_or(|asked| asked.elapsed() > HOLDS_FOR) {
             if !self.listening.may_listen().await {
-                return Err(Gone);
+                return Err(ListenerGone);
             }
             self.asked = Some(Instant::now());
         }
-        self.events.send(event).await.map_err(|_| Gone)
+        self.events.send(event).await.map_err(|_| ListenerGone)
     }
 
     /// Waits until the listener disconnects.

@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, Method, StatusCode, header};
 use gaitwright_service::error::Error;
 use gaitwright_service::json_document;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 
 /// Reads a JSON body. Errors name the field.
 pub(crate) fn body<T: DeserializeOwned>(method: &Method, headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
@@ -48,6 +49,9 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
 /// A submitted form.
 #[derive(Debug)]
 pub(crate) struct Form<T>(pub(crate) T);
+
+/// The entries of a form whose fields depend on data, by field name.
+pub(crate) type FormFields = BTreeMap<String, String>;
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Form<T> {
     type Rejection = super::page_error::PageError;

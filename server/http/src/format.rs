@@ -107,7 +107,7 @@ pub(crate) fn answers_by(mode: FeedbackMode) -> &'static str {
 }
 
 /// What a study waits for besides its solves; empty if it waits for solves only.
-pub(crate) fn besides_solves(mode: FeedbackMode) -> &'static str {
+pub(crate) fn also_waits_for(mode: FeedbackMode) -> &'static str {
     if mode == FeedbackMode::Human { ", plus the time that people need to answer" } else { "" }
 }
 

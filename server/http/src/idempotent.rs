@@ -1,7 +1,7 @@
 //! Idempotent requests: with an Idempotency-Key, a repeated request has one effect and the same response.
 
 use super::AppState;
-use super::accessible::OfStudy;
+use super::accessible::StudyOfPath;
 use super::authorization::permitted;
 use super::extractors::{body, unreadable};
 use crate::problem_details::Refusal;
@@ -13,7 +13,7 @@ use gaitwright_service::access::{Caller, Permission};
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::idempotency::{self, KEY_UNIQUE, StoredResponse, fingerprint};
-use gaitwright_store::{LentWriter, OnConstraint, StudyId, commit, consents};
+use gaitwright_store::{BorrowedWriter, OnConstraint, StudyId, commit, consents};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::marker::PhantomData;
@@ -40,11 +40,11 @@ pub(crate) struct IdempotentWith<P, T>(pub(crate) Idempotent<P>, pub(crate) T);
 
 /// The body of a stored response, an extension of the repeated one.
 #[derive(Debug, Clone)]
-pub(crate) struct KeptBody(pub(crate) String);
+pub(crate) struct StoredBody(pub(crate) String);
 
 impl<P: Permission> Idempotent<P> {
     /// Begins the transaction of the effect. The inner `Err` is the stored response of an earlier request with the key.
-    pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<LentWriter<'a>, Response>, Error> {
+    pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<BorrowedWriter<'a>, Response>, Error> {
         let mut writer = app.write().await?;
         let Some(key) = &self.key else { return Ok(Ok(writer)) };
         match idempotency::find(&mut writer, &self.actor, key).await? {
@@ -56,7 +56,7 @@ impl<P: Permission> Idempotent<P> {
                 }
                 let mut repeated = response(&kept);
                 repeated.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
-                repeated.extensions_mut().insert(KeptBody(kept.body));
+                repeated.extensions_mut().insert(StoredBody(kept.body));
                 Ok(Err(repeated))
             }
             Some(_) => {
@@ -74,7 +74,7 @@ impl<P: Permission> Idempotent<P> {
     }
 
     /// Begins the transaction of an effect whose response contains a secret, and therefore must not be stored.
-    pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<LentWriter<'a>, Error> {
+    pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<BorrowedWriter<'a>, Error> {
         if self.key.is_some() {
             let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown once.";
             return Err(Error::Malformed(reason.to_owned()));
@@ -86,7 +86,7 @@ impl<P: Permission> Idempotent<P> {
     pub(crate) async fn created<T: Serialize>(
         &self,
         app: &AppState,
-        writer: LentWriter<'_>,
+        writer: BorrowedWriter<'_>,
         location: String,
         body: &T,
     ) -> Result<Response, Refusal> {
@@ -97,7 +97,7 @@ impl<P: Permission> Idempotent<P> {
     pub(crate) async fn done<T: Serialize>(
         &self,
         app: &AppState,
-        writer: LentWriter<'_>,
+        writer: BorrowedWriter<'_>,
         body: &T,
     ) -> Result<Response, Refusal> {
         self.finish(app, writer, StatusCode::OK, None, body).await
@@ -107,7 +107,7 @@ impl<P: Permission> Idempotent<P> {
     pub(crate) async fn accepted<T: Serialize>(
         &self,
         app: &AppState,
-        writer: LentWriter<'_>,
+        writer: BorrowedWriter<'_>,
         location: String,
         body: &T,
     ) -> Result<Response, Refusal> {
@@ -118,7 +118,7 @@ impl<P: Permission> Idempotent<P> {
     async fn finish<T: Serialize>(
         &self,
         app: &AppState,
-        mut writer: LentWriter<'_>,
+        mut writer: BorrowedWriter<'_>,
         status: StatusCode,
         location: Option<String>,
         body: &T,
@@ -127,7 +127,7 @@ impl<P: Permission> Idempotent<P> {
         let kept = StoredResponse { request: self.request.clone(), status: status.as_u16(), location, body };
         if let Some(key) = &self.key {
             // Two concurrent requests with the same key can both have found no stored response.
-            idempotency::keep(&mut writer, &self.actor, key, &kept).await.on_constraint(KEY_UNIQUE, || {
+            idempotency::insert(&mut writer, &self.actor, key, &kept).await.on_constraint(KEY_UNIQUE, || {
                 Error::conflict(
                     "Another request with this Idempotency-Key was answered at the same time. Send the request again.",
                 )
@@ -168,7 +168,7 @@ async fn read<P: Permission, S: Send + Sync>(
     let caller = permitted::<P>(request.extensions())?;
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
     let headers = request.headers().clone();
-    let study = request.extensions().get::<OfStudy>().and_then(|of| of.0);
+    let study = request.extensions().get::<StudyOfPath>().and_then(|of| of.0);
     let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
     let idempotent = Idempotent {
         actor: caller.actor.clone(),

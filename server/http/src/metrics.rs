@@ -48,7 +48,7 @@ pub(super) async fn get(_: Authorized<Read>, State(app): State<AppState>) -> Res
         (
             "gaitwright_solves_running",
             "Number of solves running in this process",
-            app.scheduler.board().running() as f64,
+            app.scheduler.running_solves().running() as f64,
         ),
         ("gaitwright_database_bytes", "Size of the record", totals.bytes as f64),
         ("gaitwright_oldest_queued_seconds", "Waiting time of the oldest queued solve", totals.oldest_queued_seconds),

@@ -173,7 +173,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     }
     if changes {
         problems.push(("409", "Conflict with the current state"));
-        problems.push(("507", "The disk is full"));
+        problems.push(("507", "Not enough disk space"));
     }
     if if_match {
         problems.push(("412", "Changed since it was read"));

@@ -120,7 +120,7 @@ const SOLVE_OPTIONS: [Described; 8] = [
     ("SolveOptions", "retry", "Whether a cold start tries further initial guesses until one converges."),
     (
         "SolveOptions",
-        "basin_choice",
+        "local_optimum_choice",
         "Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the lowest \
          Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.",
     ),

@@ -11,7 +11,7 @@ use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
 use gait_optimizer::settings::Naturalness;
-use gait_optimizer::{BasinChoice, Device, GaitSettings, SolveOptions, Subject, TunedBounds};
+use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
@@ -75,7 +75,7 @@ pub(super) fn state(document: &mut Value) {
         ] {
             add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
-        for component in ["Tell", "StudyActionReason"] {
+        for component in ["Tell", "TransitionReason"] {
             add(schemas, component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["NewSubject", "NewLabSession"] {
@@ -235,11 +235,11 @@ fn widest_durations() -> GaitSettings {
 fn solve_options() -> Value {
     let of = |options: SolveOptions| settings(options, |s: &SolveOptions| s.validate().err().map(Error::from));
     let mut schema = of(SolveOptions::default());
-    let nearest = BasinChoice::NearestToReference { within_percent: 0.0 };
+    let nearest = LocalOptimumChoice::NearestToReference { within_percent: 0.0 };
     let object =
-        of(SolveOptions { basin_choice: nearest, ..SolveOptions::default() })["properties"]["basin_choice"].take();
-    let word = json!({ "type": "string", "enum": [BasinChoice::LowestObjective] });
-    schema["properties"]["basin_choice"] = json!({ "oneOf": [word, object] });
+        of(SolveOptions { local_optimum_choice: nearest, ..SolveOptions::default() })["properties"]["local_optimum_choice"].take();
+    let word = json!({ "type": "string", "enum": [LocalOptimumChoice::LowestObjective] });
+    schema["properties"]["local_optimum_choice"] = json!({ "oneOf": [word, object] });
     schema
 }
 

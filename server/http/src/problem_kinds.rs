@@ -203,7 +203,7 @@ impl ProblemKind {
             Self::StorageFull => entry(
                 "/problems/storage-full",
                 StatusCode::INSUFFICIENT_STORAGE,
-                "The disk is full",
+                "Not enough disk space",
                 "The disk that holds the record has too little space for the change, or for the work that it \
                  would start. Nothing was changed.",
                 "Free some space, then send the request again. The service does not need a restart.",

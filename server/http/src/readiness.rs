@@ -14,5 +14,5 @@ pub(crate) async fn check(app: &AppState) -> Result<(), Error> {
     if let Err(reason) = app.store().probe().await {
         return Err(Error::NotReady(format!("The record cannot be written: {}.", reason.trim_end_matches('.'))));
     }
-    app.scheduler.trouble().map_or(Ok(()), |trouble| Err(Error::NotReady(trouble)))
+    app.scheduler.problem().map_or(Ok(()), |problem| Err(Error::NotReady(problem)))
 }

@@ -9,10 +9,10 @@ pub(crate) const BUCKETS: [f64; 8] = [0.001, 0.005, 0.025, 0.1, 0.25, 1.0, 5.0, 
 
 /// Requests by method, route and status class.
 #[derive(Debug, Default)]
-pub struct Requests(Mutex<BTreeMap<(String, String, u16), Timed>>);
+pub struct Requests(Mutex<BTreeMap<(String, String, u16), RouteCounts>>);
 
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Timed {
+pub(crate) struct RouteCounts {
     pub(crate) count: u64,
     pub(crate) seconds: f64,
     pub(crate) within: [u64; BUCKETS.len()],
@@ -21,15 +21,15 @@ pub(crate) struct Timed {
 impl Requests {
     pub(crate) fn add(&self, method: String, route: String, status: StatusCode, seconds: f64) {
         let mut map = self.map();
-        let timed = map.entry((method, route, status.as_u16())).or_default();
-        timed.count += 1;
-        timed.seconds += seconds;
-        for (within, end) in timed.within.iter_mut().zip(BUCKETS) {
+        let counts = map.entry((method, route, status.as_u16())).or_default();
+        counts.count += 1;
+        counts.seconds += seconds;
+        for (within, end) in counts.within.iter_mut().zip(BUCKETS) {
             *within += u64::from(seconds <= end);
         }
     }
 
-    pub(crate) fn map(&self) -> MutexGuard<'_, BTreeMap<(String, String, u16), Timed>> {
+    pub(crate) fn map(&self) -> MutexGuard<'_, BTreeMap<(String, String, u16), RouteCounts>> {
         // The map is consistent between statements, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -45,7 +45,7 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
     };
     routes
         .layer(middleware::from_fn(saved_as::name))
-        .layer(middleware::from_fn(access_log::say_caller))
+        .layer(middleware::from_fn(access_log::add_caller))
         .layer(middleware::from_fn_with_state(state.clone(), authentication::identify))
         .layer(middleware::from_fn_with_state(state.clone(), access_log::note))
         .layer(middleware::from_fn_with_state(state.clone(), metrics::count))

@@ -6,14 +6,14 @@ use super::request_counts::Requests;
 use super::unwritten_access::AccessLog;
 use gaitwright_compute::{ComputeError, OnPool};
 use gaitwright_service::access::Clock;
-use gaitwright_service::access::secret::Turns;
+use gaitwright_service::access::secret::PasswordCheckQueues;
 use gaitwright_service::access::sign_in::SessionLimits;
 use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::job_status::Runners;
 use gaitwright_service::studies::scheduler::Scheduler;
-use gaitwright_store::{Instant, LentWriter, Reader, Store, StoreResult, access_clock};
+use gaitwright_store::{BorrowedWriter, Instant, Reader, Store, StoreResult, access_clock};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -60,7 +60,7 @@ pub struct AccessState {
     /// The clock of expiry.
     pub clock: Clock,
     /// Queues of password checks.
-    pub turns: Turns,
+    pub password_checks: PasswordCheckQueues,
 }
 
 impl AccessState {
@@ -73,7 +73,7 @@ impl AccessState {
             log: AccessLog::default(),
             secure: false,
             clock: Clock::default(),
-            turns: Turns::default(),
+            password_checks: PasswordCheckQueues::default(),
         }
     }
 
@@ -119,7 +119,7 @@ impl AppState {
     ///
     /// # Errors
     /// If no transaction can be started.
-    pub async fn write(&self) -> StoreResult<LentWriter<'_>> {
+    pub async fn write(&self) -> StoreResult<BorrowedWriter<'_>> {
         self.store.write().await
     }
 
@@ -138,7 +138,7 @@ impl AppState {
     ///
     /// # Errors
     /// If no transaction can be started.
-    pub async fn write_access(&self) -> Result<(LentWriter<'_>, Instant), Error> {
+    pub async fn write_access(&self) -> Result<(BorrowedWriter<'_>, Instant), Error> {
         let mut writer = self.write().await?;
         let now = self.access.clock.now(&mut writer).await?;
         access_clock::reach(&mut writer, now).await?;

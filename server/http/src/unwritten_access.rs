@@ -71,7 +71,7 @@ impl AccessLog {
         }
     }
 
-    /// Writes the rows that are due, and those that commands noted next to the record.
+    /// Writes the rows that are due, and those that commands logged next to the record.
     ///
     /// # Errors
     /// Errors of the database. No row is lost then.
@@ -84,8 +84,8 @@ impl AccessLog {
         }
         if let Some(mut spool) = access_spool::take(store.path())? {
             // If this ends early, rows are written twice rather than lost.
-            while let Some(noted) = spool.more()? {
-                append(store, &noted).await?;
+            while let Some(accesses) = spool.more()? {
+                append(store, &accesses).await?;
             }
             spool.clear()?;
         }

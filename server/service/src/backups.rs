@@ -100,7 +100,7 @@ impl Backups {
         writer: &mut Writer,
         actor: &Actor,
     ) -> Result<Requested, Error> {
-        backup::room(store)?;
+        backup::check_free_space(store)?;
         let id = BackupId::fresh();
         audit::append(writer, actor, REQUESTED, &object(id), &json!({})).await?;
         let cancel = CancellationToken::new();

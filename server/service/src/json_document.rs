@@ -63,6 +63,9 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
     let allowed = match (missing, twice) {
         (Some(_), _) => "present".to_owned(),
         (_, Some(_)) => "present only once".to_owned(),
+        _ if message.starts_with("UUID parsing failed") || message.ends_with("a formatted UUID string") => {
+            "an identifier".to_owned()
+        }
         _ => expected(message),
     };
     let message = match (missing, twice) {
@@ -247,6 +250,20 @@ mod tests {
         assert!(text.starts_with("The field start is false (line 1, column ") && text.contains("it must be"), "{text}");
         let broken = refusal::<gait_learner::LearnerSettings>(r#"{"start": fals}"#);
         assert!(broken.starts_with("The field start is not JSON"), "{broken}");
+    }
+
+    #[test]
+    fn value_in_place_of_an_identifier_is_refused_in_plain_words() {
+        #[derive(Debug, serde::Deserialize)]
+        struct Named {
+            #[expect(dead_code)]
+            trial: gaitwright_store::TrialId,
+        }
+        for value in ["\"SUBJECT\"", "null", "7"] {
+            let text = refusal::<Named>(&format!("{{\"trial\": {value}}}"));
+            assert!(text.starts_with(&format!("The field trial is {value}")), "{text}");
+            assert!(text.ends_with("; it must be an identifier."), "{text}");
+        }
     }
 
     #[test]

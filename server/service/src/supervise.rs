@@ -75,7 +75,7 @@ impl Tasks {
     }
 
     /// Which task is down or fails often, and why; `None` if all work.
-    pub fn trouble(&self) -> Option<String> {
+    pub fn problem(&self) -> Option<String> {
         self.all().iter().find_map(|(name, state)| {
             let recent = state.failures.iter().filter(|at| at.elapsed() < RECENTLY).count();
             match &state.down {
@@ -152,9 +152,9 @@ mod tests {
                 tasks.keep("planning", &stop, begin).await;
             }
         });
-        until(|| tasks.trouble().as_deref() == Some("The task \"planning\" is down: it panicked: as asked.")).await;
-        until(|| tasks.trouble().as_deref() == Some("The task \"planning\" is down: refused.")).await;
-        until(|| tasks.trouble().is_none()).await;
+        until(|| tasks.problem().as_deref() == Some("The task \"planning\" is down: it panicked: as asked.")).await;
+        until(|| tasks.problem().as_deref() == Some("The task \"planning\" is down: refused.")).await;
+        until(|| tasks.problem().is_none()).await;
         assert_eq!(begun.load(Ordering::SeqCst), 3);
         stop.cancel();
         kept.await.unwrap();
@@ -168,7 +168,7 @@ mod tests {
             Task { name: task, tasks: tasks.clone() }.works();
         }
         assert_eq!(
-            tasks.trouble().as_deref(),
+            tasks.problem().as_deref(),
             Some("The task \"planning\" failed 5 times within a minute. The last reason: refused.")
         );
     }

@@ -12,7 +12,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::archive::{self, PublicKey, SigningKey};
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::certified_best;
-use gaitwright_service::studies::retention::{self, Dropped};
+use gaitwright_service::studies::retention::{self, DeletedCounts};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::audit::{self, Actor};
@@ -108,9 +108,9 @@ impl Prune {
         exists(&settings.database())?;
         let mut store = settings.open_record().await?;
         let done = prune(&mut store, self.older_than_days).await;
-        let expired = retention::drop_expired(&store).await;
+        let expired = retention::delete_expired(&store).await;
         store.close().await;
-        let (Dropped { answers, sessions, links }, trajectories) = (expired?, done?);
+        let (DeletedCounts { answers, sessions, links }, trajectories) = (expired?, done?);
         let (keys, sessions) = (count(answers, "idempotency key"), count(sessions, "session"));
         tell(&format!("deleted {keys}, {sessions} and {}", count(links, "sign-in link")));
         data(&format!("trajectories deleted: {trajectories}"))

@@ -46,7 +46,7 @@ impl Certify {
 /// Checks the figures that a file states against those of its gait. The error is the reason.
 fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -> Result<(), String> {
     let figures = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
-    match figures.difference(&GaitResults::stated_in(report)) {
+    match figures.difference(&GaitResults::of_report(report)) {
         None => Ok(()),
         Some((name, computed, stated)) if name.starts_with("gait_rmse") => Err(format!(
             "the file says that {name} is {stated}; with the reference gait {:?} it is {computed}. If the solve \

@@ -1,4 +1,4 @@
-//! The database file that a command of the command line reads: that it exists, and that its reading is noted.
+//! The database file that a command of the command line reads: that it exists, and that its reading is logged.
 
 use super::output::tell;
 use gaitwright_service::error::Error;

@@ -32,7 +32,7 @@ pub(super) fn days(text: &str) -> Result<u32, String> {
     whole(text, 1, 36_500)
 }
 
-pub(super) fn basin(text: &str) -> Result<usize, String> {
+pub(super) fn local_optimum(text: &str) -> Result<usize, String> {
     text.trim().parse().map_err(|_| "must be a whole number".to_owned())
 }
 

@@ -1,4 +1,4 @@
-//! The lineage of a gait: the gaits from which it was computed by warm starts, back to the basin of the first cold
+//! The lineage of a gait: the gaits from which it was computed by warm starts, back to the local optimum of the first cold
 //! start. Files of `solve --out` contain it.
 
 use gait_optimizer::{SolveOutcome, SolveReport, StartedFrom, WarmStart};
@@ -25,9 +25,9 @@ pub(super) fn identifier(end: &WarmStart) -> String {
 pub(super) struct Ancestor {
     /// Its identifier.
     pub(super) id: String,
-    /// Its basin, as numbered by the solve that found it.
+    /// Its local optimum, as numbered by the solve that found it.
     #[serde(default)]
-    pub(super) basin: Option<usize>,
+    pub(super) local_optimum: Option<usize>,
     /// Its objective, with the bounds of its own solve.
     #[serde(default)]
     pub(super) objective: Option<f64>,
@@ -37,10 +37,10 @@ pub(super) struct Ancestor {
 }
 
 impl Ancestor {
-    /// As text: `gait 0123456789abcdef (basin 2, objective 0.06341, Gait RMSE 1.0938 rad)`.
+    /// As text: `gait 0123456789abcdef (local optimum 2, objective 0.06341, Gait RMSE 1.0938 rad)`.
     pub(super) fn in_words(&self) -> String {
         let known = [
-            self.basin.map(|basin| format!("basin {basin}")),
+            self.local_optimum.map(|number| format!("local optimum {number}")),
             self.objective.map(|objective| format!("objective {objective:.5}")),
             self.gait_rmse_rad.map(|rmse| format!("Gait RMSE {rmse:.4} rad")),
         ];
@@ -54,8 +54,8 @@ impl Ancestor {
 pub(super) struct Lineage {
     /// Identifier of the gait.
     pub(super) id: String,
-    /// Its basin, as numbered by this solve; `None` if the solve did not converge.
-    pub(super) basin: Option<usize>,
+    /// Its local optimum, as numbered by this solve; `None` if the solve did not converge.
+    pub(super) local_optimum: Option<usize>,
     /// Its ancestors by warm starts, the nearest first. Empty after a cold start, even if that followed a failed warm
     /// start.
     #[serde(default)]
@@ -71,7 +71,7 @@ impl Lineage {
             }
             StartedFrom::Cold | StartedFrom::ColdAfterWarm => Vec::new(),
         };
-        Self { id: identifier(&outcome.warm_start), basin: basin_of_answer(&outcome.report), ancestors }
+        Self { id: identifier(&outcome.warm_start), local_optimum: chosen_local_optimum(&outcome.report), ancestors }
     }
 }
 
@@ -87,14 +87,14 @@ pub(super) struct LineageStart {
 impl LineageStart {
     /// A point without further information.
     pub(super) fn unknown(point: WarmStart) -> Self {
-        let gait = Ancestor { id: identifier(&point), basin: None, objective: None, gait_rmse_rad: None };
+        let gait = Ancestor { id: identifier(&point), local_optimum: None, objective: None, gait_rmse_rad: None };
         Self { point, gait, before: Vec::new() }
     }
 
     /// The gait of an outcome; `lineage` is the one in its file.
     pub(super) fn answer(outcome: SolveOutcome, lineage: Option<Lineage>) -> Self {
         let report = &outcome.report;
-        let figures = (basin_of_answer(report), report.objective, report.gait_rmse_rad);
+        let figures = (chosen_local_optimum(report), report.objective, report.gait_rmse_rad);
         let mut start = Self::cold(outcome.warm_start, figures);
         // Ignore the lineage of a different gait.
         let own = lineage.filter(|lineage| lineage.id == start.gait.id);
@@ -102,18 +102,18 @@ impl LineageStart {
         start
     }
 
-    /// A gait that a cold start found, with basin, objective and Gait RMSE.
-    pub(super) fn cold(point: WarmStart, (basin, objective, rmse): (Option<usize>, f64, f64)) -> Self {
+    /// A gait that a cold start found, with local optimum, objective and Gait RMSE.
+    pub(super) fn cold(point: WarmStart, (local_optimum, objective, rmse): (Option<usize>, f64, f64)) -> Self {
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         let (objective, gait_rmse_rad) = (finite(objective), finite(rmse));
-        let gait = Ancestor { id: identifier(&point), basin, objective, gait_rmse_rad };
+        let gait = Ancestor { id: identifier(&point), local_optimum, objective, gait_rmse_rad };
         Self { point, gait, before: Vec::new() }
     }
 }
 
-/// The basin of the gait of a solve.
-pub(super) fn basin_of_answer(report: &SolveReport) -> Option<usize> {
-    report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.basin)
+/// The local optimum whose gait is the result of a solve.
+pub(super) fn chosen_local_optimum(report: &SolveReport) -> Option<usize> {
+    report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.local_optimum)
 }
 
 #[cfg(test)]
@@ -139,7 +139,7 @@ mod tests {
     fn ancestor_text_has_all_known_values() {
         let start = LineageStart::cold(end(&[0.5]), (Some(2), 0.063_41, f64::NAN));
         let id = &start.gait.id;
-        assert_eq!(start.gait.in_words(), format!("gait {id} (basin 2, objective 0.06341)"));
+        assert_eq!(start.gait.in_words(), format!("gait {id} (local optimum 2, objective 0.06341)"));
         assert_eq!(LineageStart::unknown(end(&[0.5])).gait.in_words(), format!("gait {id}"));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::flag_numbers::{number, whole};
 use clap::Args;
-use gait_optimizer::{BasinChoice, InitialGuess, ModelError, SolveOptions};
+use gait_optimizer::{InitialGuess, LocalOptimumChoice, ModelError, SolveOptions};
 use gaitwright_service::error::Error;
 
 fn initial_guesses(text: &str) -> Result<usize, String> {
@@ -27,7 +27,7 @@ impl MultiStartFlags {
         options.initial_guesses = self.initial_guesses.unwrap_or(options.initial_guesses);
         if let Some(within_percent) = self.nearest_within {
             ModelError::check_range("--nearest-within", within_percent, 0.0, 100.0)?;
-            options.basin_choice = BasinChoice::NearestToReference { within_percent };
+            options.local_optimum_choice = LocalOptimumChoice::NearestToReference { within_percent };
         }
         options.validate()?;
         Ok(options)

@@ -1,14 +1,14 @@
 //! Flags of the gait problem, warm-start files and cancellation, shared by `solve` and `sweep`.
 
 use super::flag_numbers::{iterations, number};
-use super::lineage::{Lineage, LineageStart, basin_of_answer};
+use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
 use super::output::tell;
 use super::serve::interrupted;
 use super::subject_flags::{SubjectFlags, Switch};
 use clap::Args;
 use gait_optimizer::NlpSettings;
 use gait_optimizer::{
-    CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherBasin, ReferenceGait, SolveOptions, SolveOutcome,
+    CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherLocalOptimum, ReferenceGait, SolveOptions, SolveOutcome,
     TunedBounds,
 };
 use gaitwright_service::error::Error;
@@ -141,28 +141,29 @@ impl ProblemFlags {
         Ok(options)
     }
 
-    /// The warm start that was given. `basin` chooses a gait of another basin in the file.
-    pub(super) fn warm_start(&self, basin: Option<usize>) -> Result<Option<LineageStart>, Error> {
+    /// The warm start that was given. `local_optimum` chooses a gait of another local optimum in the file.
+    pub(super) fn warm_start(&self, local_optimum: Option<usize>) -> Result<Option<LineageStart>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
         let what = "a file written by `gaitwright solve --out`";
         let outcome: SolveOutcome = read_document(path, what, |_| Ok(()))?;
         let FileLineage { lineage } = read_document(path, what, |_| Ok(()))?;
-        let answers = basin_of_answer(&outcome.report);
-        let Some(basin) = basin.filter(|basin| Some(*basin) != answers) else {
+        let answers = chosen_local_optimum(&outcome.report);
+        let Some(local_optimum) = local_optimum.filter(|local_optimum| Some(*local_optimum) != answers) else {
             return Ok(Some(LineageStart::answer(outcome, lineage)));
         };
-        let mut known: Vec<usize> = answers.into_iter().chain(outcome.other_basins.iter().map(|o| o.basin)).collect();
+        let mut known: Vec<usize> =
+            answers.into_iter().chain(outcome.other_local_optima.iter().map(|o| o.local_optimum)).collect();
         known.sort_unstable();
-        let other = outcome.other_basins.into_iter().find(|other| other.basin == basin);
+        let other = outcome.other_local_optima.into_iter().find(|other| other.local_optimum == local_optimum);
         let refused = || {
             let known = known.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
             Error::Malformed(format!(
-                "{} has no local optimum (basin) with the number {basin}. Numbers for --warm-basin: {known}.",
+                "{} has no local optimum with the number {local_optimum}. Numbers for --warm-local-optimum: {known}.",
                 path.display()
             ))
         };
-        let start = |other: OtherBasin| {
-            LineageStart::cold(other.warm_start, (Some(other.basin), other.objective, other.gait_rmse_rad))
+        let start = |other: OtherLocalOptimum| {
+            LineageStart::cold(other.warm_start, (Some(other.local_optimum), other.objective, other.gait_rmse_rad))
         };
         other.map(|other| Some(start(other))).ok_or_else(refused)
     }

@@ -97,7 +97,7 @@ impl Serve {
         let engine: Arc<dyn Dispatch> = match settings.nats()? {
             #[cfg(feature = "nats")]
             Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
-            _ => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
+            _ => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).with_lower_priority()),
         };
         let scheduler = Scheduler::new(&store, engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
@@ -112,7 +112,7 @@ impl Serve {
             let scheduler = scheduler.clone();
             async move { Box::pin(scheduler.run()).await }
         });
-        let chores = tokio::spawn(keep_house(scheduler.clone(), store.clone(), access_log_days, backups));
+        let chores = tokio::spawn(run_maintenance(scheduler.clone(), store.clone(), access_log_days, backups));
         tracing::info!(database = %database.display(), workers = scheduler.workers(), "listening on {origin}");
         if !local && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted");
@@ -162,7 +162,7 @@ impl Serve {
             return Ok(None);
         }
         let mut writer = store.write().await?;
-        let admin = user_administration::way_in(&mut writer).await?;
+        let admin = user_administration::operator_administrator(&mut writer).await?;
         let secret = user_administration::link(&mut writer, &Actor::terminal(), admin.id).await?;
         commit(writer).await?;
         Ok(Some(secret))
@@ -208,8 +208,14 @@ pub(super) async fn interrupted() {
 
 /// Runs the housekeeping tasks until the scheduler stops: deletes expired data and makes backups. Failures are logged
 /// and retried. A task that panics is restarted, and `/ready` reports it.
-async fn keep_house(scheduler: Scheduler, store: Store, access_log_days: Option<u32>, backups: Option<ClaimedPlan>) {
-    let dropping = scheduler.keep("deleting expired data", |task| retention::keep_dropping(store.clone(), task));
+async fn run_maintenance(
+    scheduler: Scheduler,
+    store: Store,
+    access_log_days: Option<u32>,
+    backups: Option<ClaimedPlan>,
+) {
+    let dropping =
+        scheduler.keep("deleting expired data", |task| retention::delete_expired_hourly(store.clone(), task));
     let pruning = async {
         if let Some(days) = access_log_days {
             scheduler.keep("pruning the access log", |task| keep_pruning(store.clone(), days, task)).await;

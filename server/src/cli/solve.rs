@@ -1,8 +1,8 @@
 //! `gaitwright solve`: optimises one gait.
 
 use super::CommandEnd;
-use super::flag_numbers::basin;
-use super::lineage::{Lineage, LineageStart, basin_of_answer};
+use super::flag_numbers::local_optimum;
+use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -54,8 +54,8 @@ pub(super) struct Solve {
     problem: Option<PathBuf>,
     /// Local optimum in the --warm file to start from (default: that of the gait in the file). Local optima are numbered
     /// from 1, in the order of the initial guesses that reached them; `solve` lists them if there are several.
-    #[arg(long, value_name = "NUMBER", requires = "warm", value_parser = basin, allow_negative_numbers = true)]
-    warm_basin: Option<usize>,
+    #[arg(long, value_name = "NUMBER", requires = "warm", value_parser = local_optimum, allow_negative_numbers = true)]
+    warm_local_optimum: Option<usize>,
     #[command(flatten)]
     multi_start: MultiStartFlags,
     /// Output file (JSON) for the results, the gait, its multipliers, the gaits that it was warm-started from, and the
@@ -112,7 +112,7 @@ impl Solve {
         }
         let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
         let options = self.multi_start.applied_to(self.flags.options()?)?;
-        Ok((problem, options, self.flags.warm_start(self.warm_basin)?))
+        Ok((problem, options, self.flags.warm_start(self.warm_local_optimum)?))
     }
 
     pub(super) async fn run(self) -> Result<CommandEnd, Error> {
@@ -245,7 +245,7 @@ fn for_people(
     }
     lines.extend(linear_algebra_in_words(r));
     lines.extend(lineage_in_words(r, lineage, start));
-    lines.extend(basins_in_words(r));
+    lines.extend(local_optima_in_words(r));
     for violation in outcome.violations.iter().take(10) {
         lines.push(format!("  violated: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
     }
@@ -277,8 +277,8 @@ fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
 
 /// The gait and its ancestors.
 fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&LineageStart>) -> Vec<String> {
-    let basin = lineage.basin.map_or_else(String::new, |basin| format!(" (basin {basin})"));
-    let mut lines = vec![format!("  gait               {}{basin}", lineage.id)];
+    let local_optimum = lineage.local_optimum.map_or_else(String::new, |number| format!(" (local optimum {number})"));
+    let mut lines = vec![format!("  gait               {}{local_optimum}", lineage.id)];
     let given = start.map(|start| &start.gait);
     if let (StartedFrom::ColdAfterWarm, Some(given)) = (report.started_from, given) {
         lines.push(format!(
@@ -294,14 +294,16 @@ fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&Line
 }
 
 /// The local optima, if there are several, each as found by its first attempt.
-fn basins_in_words(report: &SolveReport) -> Vec<String> {
-    let answer = basin_of_answer(report);
+fn local_optima_in_words(report: &SolveReport) -> Vec<String> {
+    let answer = chosen_local_optimum(report);
     let mut lines: Vec<String> = Vec::new();
     for attempt in &report.attempts {
-        let Some(basin) = attempt.basin.filter(|basin| *basin > lines.len()) else { continue };
-        let chosen = if attempt.basin == answer { ", chosen" } else { "" };
+        let Some(local_optimum) = attempt.local_optimum.filter(|local_optimum| *local_optimum > lines.len()) else {
+            continue;
+        };
+        let chosen = if attempt.local_optimum == answer { ", chosen" } else { "" };
         lines.push(format!(
-            "  basin {basin:<13}objective {:.5}   Gait RMSE {:.4} rad{chosen}",
+            "  local optimum {local_optimum:<5}objective {:.5}   Gait RMSE {:.4} rad{chosen}",
             attempt.objective, attempt.gait_rmse_rad
         ));
     }

@@ -147,7 +147,8 @@ impl SweepTable {
 /// Reads and checks every row before anything is solved.
 fn actions(path: &Path) -> Result<Vec<TunedBounds>, Error> {
     let text = read(path)?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let mut reader = csv::ReaderBuilder::new();
+    let mut reader = reader.trim(csv::Trim::All).comment(Some(b'#')).flexible(true).from_reader(text.as_bytes());
     let malformed = |reason: String| Error::Malformed(format!("{}: {reason}", path.display()));
     let header = reader.headers().map_err(|e| malformed(e.to_string()))?.clone();
     if header.iter().ne(TunedBounds::NAMES) {
@@ -158,6 +159,10 @@ fn actions(path: &Path) -> Result<Vec<TunedBounds>, Error> {
     for record in reader.records() {
         let record = record.map_err(|e| malformed(e.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
+        if record.len() != TunedBounds::COUNT {
+            let reason = format!("the number of cells is {}; it must be {}", record.len(), TunedBounds::COUNT);
+            return Err(malformed(format!("line {line}: {reason}.")));
+        }
         let mut values = [0.0; TunedBounds::COUNT];
         for ((value, cell), name) in values.iter_mut().zip(&record).zip(TunedBounds::NAMES) {
             *value = cell

@@ -82,11 +82,11 @@ impl Tune {
         let lines = if self.json { Lines::Progress } else { Lines::Data };
         let ran = Box::pin(unattended::run_and_certify(&mut store, &study, workers, lines)).await;
         store.close().await;
-        let (ran, judged) = ran?;
+        let (ran, certification) = ran?;
         let (snapshot, beliefs) = (ran.snapshot.clone(), Arc::clone(&ran.beliefs));
         let choose = move |pool: &OnPool| best_trial(&snapshot, &*beliefs.posterior(pool, &snapshot)?);
         let best = store.compute(choose).await?.map_err(Error::Learner)?;
-        self.print(&summary::of(&ran.snapshot, best, judged))?;
+        self.print(&summary::of(&ran.snapshot, best, certification))?;
         if !self.json {
             tell(&format!("to view the study: gaitwright serve --database {}", settings.database().display()));
         }

@@ -5,7 +5,7 @@ use super::serve::interrupted;
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
-use gaitwright_service::studies::certified_best::{self, Judged};
+use gaitwright_service::studies::certified_best::{self, BestCertification};
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
@@ -55,7 +55,7 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
     let mut writer = store.write().await?;
     let wanted = study_plan::checked(&mut writer, new.clone()).await?;
     let unfinished =
-        studies::active(&mut writer).await?.into_iter().find(|study| study.plan.tries_the_same_as(&wanted));
+        studies::active(&mut writer).await?.into_iter().find(|study| study.plan.has_same_trials_as(&wanted));
     let study = if let Some(study) = unfinished {
         let done = trial_rows::counts(&mut writer, study.id).await?;
         let ended = done.total - done.open;
@@ -98,11 +98,14 @@ pub(super) async fn run_and_certify(
     study: &Study,
     workers: usize,
     lines: Lines,
-) -> Result<(Run, Judged), Error> {
+) -> Result<(Run, BestCertification), Error> {
     let ran = run(store, study, workers, lines).await?;
-    let judged =
-        if ran.interrupted { Judged::default() } else { certified(store, &ran.snapshot, &ran.beliefs).await? };
-    Ok((ran, judged))
+    let certification = if ran.interrupted {
+        BestCertification::default()
+    } else {
+        certified(store, &ran.snapshot, &ran.beliefs).await?
+    };
+    Ok((ran, certification))
 }
 
 /// Certifies the best gaits of a study.
@@ -110,7 +113,7 @@ pub(super) async fn certified(
     store: &mut Store,
     snapshot: &StudySnapshot,
     beliefs: &Arc<Beliefs>,
-) -> Result<Judged, Error> {
+) -> Result<BestCertification, Error> {
     tell("certifying the best gait");
     certified_best::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(beliefs)).await
 }
@@ -123,7 +126,7 @@ async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<()
         bar.set_style(style.progress_chars("=> "));
     }
     let mut pulse = scheduler.pulse();
-    let mut progress = scheduler.board().listen();
+    let mut progress = scheduler.running_solves().listen();
     let mut shown = std::collections::HashSet::new();
     loop {
         let mut reader = scheduler.store().read().await?;

@@ -59,9 +59,9 @@ impl Users {
         match &self.what {
             UsersCommand::List { .. } => {
                 for user in users::all(&mut *store.read().await?).await? {
-                    let way_in = if user.has_password { "password" } else { "one-time link" };
+                    let operator_administrator = if user.has_password { "password" } else { "one-time link" };
                     let disabled = if user.disabled_at.is_some() { "\tdisabled" } else { "" };
-                    data(&format!("{}\t{}\t{way_in}{disabled}", user.name, user.role.as_str()))?;
+                    data(&format!("{}\t{}\t{operator_administrator}{disabled}", user.name, user.role.as_str()))?;
                 }
                 Ok(())
             }

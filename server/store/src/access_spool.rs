@@ -2,7 +2,7 @@
 //! them to the access log.
 
 use super::access_log::{Access, Tally};
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::{Instant, StoreError, StoreResult};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -21,7 +21,7 @@ struct SpoolLine {
 }
 
 fn path_of(record: &Path) -> PathBuf {
-    companion(record, ".access")
+    path_with_suffix(record, ".access")
 }
 
 /// Notes an access durably.
@@ -42,14 +42,14 @@ pub fn note(record: &Path, access: &Access) -> StoreResult<()> {
     file.lock().and_then(|()| file.write_all(text.as_bytes())).and_then(|()| file.sync_all()).map_err(failed)
 }
 
-/// The noted accesses, oldest first. While this is held, no command can add any.
+/// The accesses that commands logged, oldest first. While this is held, no command can add any.
 #[derive(Debug)]
 pub struct Spool {
     file: BufReader<File>,
     path: PathBuf,
 }
 
-/// Takes the accesses that were noted next to a record, if any.
+/// Takes the accesses that were logged next to a record, if any.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -75,7 +75,7 @@ impl Spool {
     /// # Errors
     /// If the file cannot be read.
     pub fn more(&mut self) -> StoreResult<Option<Vec<(Access, Tally)>>> {
-        let (mut noted, mut lines) = (Vec::new(), 0);
+        let (mut accesses, mut lines) = (Vec::new(), 0);
         while lines < AT_ONCE {
             let mut line = Vec::new();
             let read = (&mut self.file).take(LONGEST_LINE_BYTES).read_until(b'\n', &mut line);
@@ -84,12 +84,12 @@ impl Spool {
             }
             lines += 1;
             if let Ok(SpoolLine { at, access }) = serde_json::from_slice(&line) {
-                noted.push((access, Tally { first_at: at, last_at: at, times: 1 }));
+                accesses.push((access, Tally { first_at: at, last_at: at, times: 1 }));
             } else {
                 tracing::warn!(file = %self.path.display(), "ignoring a malformed line of the access spool");
             }
         }
-        Ok((lines > 0).then_some(noted))
+        Ok((lines > 0).then_some(accesses))
     }
 
     /// Clears the spool after its accesses were written to the log.
@@ -135,8 +135,8 @@ mod tests {
         garbage();
         let mut spool = take(&record).unwrap().unwrap();
         let mut found = Vec::new();
-        while let Some(noted) = spool.more().unwrap() {
-            found.extend(noted.into_iter().map(|(access, _)| access.object));
+        while let Some(accesses) = spool.more().unwrap() {
+            found.extend(accesses.into_iter().map(|(access, _)| access.object));
         }
         assert_eq!(found.len(), AT_ONCE + 5);
         assert!(found.iter().enumerate().all(|(at, object)| object.starts_with(&format!("study {at},"))));

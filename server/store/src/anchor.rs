@@ -10,7 +10,7 @@ use super::connection::Connection;
 use super::error::{StoreError, StoreResult};
 use super::json_columns;
 use super::lost_files::FileId;
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::time::{Instant, now};
 use serde::{Deserialize, Serialize};
 use sqlx::{AssertSqlSafe, Row};
@@ -33,7 +33,7 @@ pub struct ChainEnd {
 
 /// The last rows of the chains of a record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Ends {
+pub struct ChainEnds {
     /// Of the audit trail.
     pub audit: ChainEnd,
     /// Of the seals.
@@ -47,19 +47,19 @@ struct AnchorPlace {
     turn: u64,
     at: Instant,
     #[serde(flatten)]
-    ends: Ends,
+    ends: ChainEnds,
     /// Hash of the rest, to detect a partial write.
     sha256: String,
 }
 
 impl AnchorPlace {
-    fn new(turn: u64, ends: Ends) -> StoreResult<Self> {
+    fn new(turn: u64, ends: ChainEnds) -> StoreResult<Self> {
         let whole = Self { turn, at: now(), ends, sha256: String::new() };
         Ok(Self { sha256: whole.digest()?, ..whole })
     }
 
     fn digest(&self) -> StoreResult<String> {
-        let Ends { audit, seals } = &self.ends;
+        let ChainEnds { audit, seals } = &self.ends;
         let parts = (self.turn, self.at.to_string(), audit.seq, &audit.hash, seals.seq, &seals.hash);
         Ok(json_columns::sha256(json_columns::to_text("anchor", &parts)?.as_bytes()))
     }
@@ -82,11 +82,11 @@ impl AnchorPlace {
 
 /// The path of the anchor next to a record.
 pub fn path_of(record: &Path) -> PathBuf {
-    companion(record, ".anchor")
+    path_with_suffix(record, ".anchor")
 }
 
 /// Reads the last rows of the chains of an open record.
-pub(super) async fn ends(db: &mut Connection) -> StoreResult<Ends> {
+pub(super) async fn ends(db: &mut Connection) -> StoreResult<ChainEnds> {
     let sql = "select (select seq from audit order by seq desc limit 1), (select hash from audit order by seq desc limit 1), \
                (select seq from seals order by seq desc limit 1), (select hash from seals order by seq desc limit 1)";
     let row = sqlx::query(sql).fetch_one(db).await?;
@@ -94,14 +94,14 @@ pub(super) async fn ends(db: &mut Connection) -> StoreResult<Ends> {
         let (seq, hash): (Option<i64>, Option<String>) = (row.try_get(first)?, row.try_get(first + 1)?);
         Ok::<_, StoreError>(ChainEnd { seq: seq.unwrap_or(0), hash: hash.unwrap_or_else(|| ORIGIN.to_owned()) })
     };
-    Ok(Ends { audit: end(0)?, seals: end(2)? })
+    Ok(ChainEnds { audit: end(0)?, seals: end(2)? })
 }
 
 /// Reads an anchor; `None` if there is no such file.
 ///
 /// # Errors
 /// [`StoreError::Open`], and [`StoreError::Damaged`] if neither place is intact.
-pub fn read(anchor: &Path) -> StoreResult<Option<Ends>> {
+pub fn read(anchor: &Path) -> StoreResult<Option<ChainEnds>> {
     let bytes = match std::fs::read(anchor) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         other => other.map_err(|source| StoreError::Open { path: anchor.to_owned(), source })?,
@@ -115,7 +115,7 @@ pub fn read(anchor: &Path) -> StoreResult<Option<Ends>> {
 ///
 /// # Errors
 /// [`StoreError::CutOff`], [`StoreError::Rewritten`], those of [`read`]; errors of the database.
-pub async fn check(db: &mut Connection, record: &Path, anchor: &Path) -> StoreResult<Option<Ends>> {
+pub async fn check(db: &mut Connection, record: &Path, anchor: &Path) -> StoreResult<Option<ChainEnds>> {
     let Some(ends) = read(anchor)? else { return Ok(None) };
     for (table, end) in [("audit", &ends.audit), ("seals", &ends.seals)] {
         if end.seq == 0 {
@@ -154,7 +154,7 @@ pub(super) fn refuse_wrong(elsewhere: Option<&Path>, record: &Path, backup: Opti
     }
     let wrong = |what| Err(StoreError::WrongAnchor { path: anchor.to_owned(), what });
     let place = resolved(anchor);
-    let is_of = |file: &Path| OWN_FILES.iter().any(|ending| resolved(&companion(file, ending)) == place);
+    let is_of = |file: &Path| OWN_FILES.iter().any(|ending| resolved(&path_with_suffix(file, ending)) == place);
     if is_of(record) {
         return wrong("a file of the record");
     }
@@ -175,7 +175,7 @@ fn resolved(path: &Path) -> PathBuf {
 }
 
 /// Replaces an anchor durably.
-pub(super) fn put(anchor: &Path, ends: &Ends) -> StoreResult<()> {
+pub(super) fn put(anchor: &Path, ends: &ChainEnds) -> StoreResult<()> {
     let place = AnchorPlace::new(1, ends.clone())?.bytes()?;
     make(anchor, &place).map_err(|source| StoreError::Open { path: anchor.to_owned(), source })
 }
@@ -198,7 +198,7 @@ struct Anchor {
     /// The open file and its identity; `None` until the next write creates it.
     file: Option<(File, FileId)>,
     turn: u64,
-    written: Option<Ends>,
+    written: Option<ChainEnds>,
     /// Whether the last write failed, which was logged.
     failing: bool,
 }
@@ -212,7 +212,7 @@ impl Anchors {
 
     /// Writes the last rows of the chains. An anchor that cannot be written lags behind the record, which is logged and
     /// does not prevent changes.
-    pub(super) fn write(&self, ends: &Ends) {
+    pub(super) fn write(&self, ends: &ChainEnds) {
         for anchor in self.0.lock().unwrap_or_else(PoisonError::into_inner).iter_mut() {
             if anchor.written.as_ref() == Some(ends) {
                 continue;
@@ -242,7 +242,7 @@ impl Anchors {
 }
 
 impl Anchor {
-    fn write(&mut self, ends: &Ends) -> StoreResult<()> {
+    fn write(&mut self, ends: &ChainEnds) -> StoreResult<()> {
         let cannot = |source| StoreError::Open { path: self.path.clone(), source };
         self.turn += 1;
         let place = AnchorPlace::new(self.turn, ends.clone())?.bytes()?;
@@ -267,9 +267,9 @@ impl Anchor {
 mod tests {
     use super::*;
 
-    fn ends(seq: i64) -> Ends {
+    fn ends(seq: i64) -> ChainEnds {
         let end = || ChainEnd { seq, hash: ORIGIN.to_owned() };
-        Ends { audit: end(), seals: end() }
+        ChainEnds { audit: end(), seals: end() }
     }
 
     #[test]

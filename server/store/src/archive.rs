@@ -99,7 +99,7 @@ pub async fn read(db: &mut Connection, study: StudyId, rows: &Sender<Read>) -> S
 
 /// How a row of an archive relates to the record.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Known {
+pub enum RowMatch {
     /// The record does not have it.
     New,
     /// The record has an identical row with this identifier.
@@ -114,7 +114,7 @@ pub enum Known {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn known(db: &mut Connection, table: &str, row: &Row) -> StoreResult<Known> {
+pub async fn known(db: &mut Connection, table: &str, row: &Row) -> StoreResult<RowMatch> {
     let id = row.text("id").unwrap_or_default();
     let sql = AssertSqlSafe(format!("select * from {table} where id = ?"));
     if let Some(found) = sqlx::query(sql).bind(id).fetch_optional(&mut *db).await? {
@@ -124,23 +124,23 @@ pub async fn known(db: &mut Connection, table: &str, row: &Row) -> StoreResult<K
             .filter(|(name, cell)| row.get(name).unwrap_or(&Cell::Null) != *cell)
             .map(|(name, _)| name.to_owned())
             .collect();
-        return Ok(if differing.is_empty() { Known::Same(id.to_owned()) } else { Known::Differs(differing) });
+        return Ok(if differing.is_empty() { RowMatch::Same(id.to_owned()) } else { RowMatch::Differs(differing) });
     }
     if let Some(sha256) = row.text("sha256") {
         let sql = AssertSqlSafe(format!("select id from {table} where sha256 = ?"));
         if let Some(found) = sqlx::query_scalar(sql).bind(sha256).fetch_optional(&mut *db).await? {
-            return Ok(Known::Same(found));
+            return Ok(RowMatch::Same(found));
         }
     }
     let name = match table {
         "subjects" => "pseudonym",
         "devices" => "name",
-        _ => return Ok(Known::New),
+        _ => return Ok(RowMatch::New),
     };
     let taken = row.text(name).unwrap_or_default();
     let sql = AssertSqlSafe(format!("select 1 from {table} where lower(trim({name})) = lower(trim(?)) limit 1"));
     let found = sqlx::query(sql).bind(taken).fetch_optional(db).await?;
-    Ok(if found.is_some() { Known::NameTaken(taken.to_owned()) } else { Known::New })
+    Ok(if found.is_some() { RowMatch::NameTaken(taken.to_owned()) } else { RowMatch::New })
 }
 
 /// Writes the rows of one study into a record.

@@ -25,7 +25,7 @@ pub struct AttemptResult {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn keep(
+pub async fn insert(
     db: &mut Connection,
     (trial, attempt): (TrialId, u32),
     worker: &str,

@@ -144,7 +144,7 @@ pub async fn of_object(db: &mut Connection, object: &str) -> StoreResult<Vec<Aud
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ChainCheck {
     /// Every row matches its hash and the previous row.
-    Whole {
+    Intact {
         /// Number of rows.
         rows: u64,
         /// Hash of the last row.
@@ -189,7 +189,7 @@ pub async fn verify(db: &mut Connection) -> StoreResult<ChainCheck> {
     if last_ever(db, "audit").await? != after {
         return Ok(ChainCheck::Broken { seq: after + 1 });
     }
-    Ok(ChainCheck::Whole { rows, last })
+    Ok(ChainCheck::Intact { rows, last })
 }
 
 /// The largest sequence number that a table has ever used, even if the row was deleted.

@@ -33,7 +33,7 @@ pub async fn to_record_folder(store: &Store) -> StoreResult<(PathBuf, u64)> {
 ///
 /// # Errors
 /// [`StoreError::NearlyFull`].
-pub fn room(store: &Store) -> StoreResult<()> {
+pub fn check_free_space(store: &Store) -> StoreResult<()> {
     store.room_for_copy(store.path())
 }
 

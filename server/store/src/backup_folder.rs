@@ -1,8 +1,8 @@
 //! The folder of scheduled backups. It belongs to one record, because the oldest backups in it are removed.
 
 use super::atomic_file::private;
-use super::record_files::companion;
 use super::record_files::free_name;
+use super::record_files::path_with_suffix;
 use super::{Store, StoreError, StoreResult, backup};
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
@@ -33,7 +33,7 @@ impl BackupFolder {
     pub fn claim(store: &Store, folder: &Path) -> StoreResult<Self> {
         let record = store.path();
         let stem = folder.join(record.file_name().unwrap_or_default());
-        let claim = companion(&stem, ".owner");
+        let claim = path_with_suffix(&stem, ".owner");
         let cannot = |source| StoreError::Open { path: claim.clone(), source };
         let own = record.canonicalize().map_err(cannot)?;
         let own = own.to_string_lossy();

@@ -338,7 +338,7 @@ pub async fn of_pair(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreRe
     rows.iter().map(BlindPair::from_row).collect()
 }
 
-/// Every presentation of a study, in the order of the draws.
+/// Every pair of a study, in the order of the draws.
 ///
 /// # Errors
 /// Errors of the database.

@@ -8,39 +8,39 @@ use std::ops::{Deref, DerefMut};
 
 /// A resource that borrows the store until it is dropped, so that [`Store::compute`](super::Store::compute) cannot be called.
 #[derive(Debug)]
-pub struct Lent<'a, T> {
+pub struct Borrowed<'a, T> {
     inner: T,
-    _borrowed: Borrowed<'a>,
+    _borrow: BorrowMarker<'a>,
 }
 
 /// Has a destructor, so that the borrow lasts until the end of the scope instead of the last use.
 #[derive(Debug)]
-struct Borrowed<'a>(PhantomData<&'a ()>);
+struct BorrowMarker<'a>(PhantomData<&'a ()>);
 
-impl Drop for Borrowed<'_> {
+impl Drop for BorrowMarker<'_> {
     fn drop(&mut self) {}
 }
 
 /// A read-only connection, with one consistent state per statement.
-pub type Reader<'a> = Lent<'a, PoolConnection<Sqlite>>;
+pub type Reader<'a> = Borrowed<'a, PoolConnection<Sqlite>>;
 
 /// The only writing connection, within a change.
-pub type LentWriter<'a> = Lent<'a, Writer>;
+pub type BorrowedWriter<'a> = Borrowed<'a, Writer>;
 
-impl<T> Lent<'_, T> {
+impl<T> Borrowed<'_, T> {
     pub(super) fn new(inner: T) -> Self {
-        Self { inner, _borrowed: Borrowed(PhantomData) }
+        Self { inner, _borrow: BorrowMarker(PhantomData) }
     }
 }
 
-impl LentWriter<'_> {
+impl BorrowedWriter<'_> {
     pub(super) fn into_writer(self) -> Writer {
         let Self { inner, .. } = self;
         inner
     }
 }
 
-impl<T> Deref for Lent<'_, T> {
+impl<T> Deref for Borrowed<'_, T> {
     type Target = T;
 
     fn deref(&self) -> &T {
@@ -48,7 +48,7 @@ impl<T> Deref for Lent<'_, T> {
     }
 }
 
-impl<T> DerefMut for Lent<'_, T> {
+impl<T> DerefMut for Borrowed<'_, T> {
     fn deref_mut(&mut self) -> &mut T {
         &mut self.inner
     }

@@ -37,7 +37,7 @@ pub async fn passed(db: &mut Connection, trial: TrialId) -> StoreResult<Option<b
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn keep(db: &mut Connection, trial: TrialId, certificate: &Certificate) -> StoreResult<bool> {
+pub async fn insert(db: &mut Connection, trial: TrialId, certificate: &Certificate) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into certificates (trial_id, format_version, passed, document, created_at) values (?, ?, ?, ?, ?) \
          on conflict do nothing",

@@ -34,7 +34,7 @@ pub struct GaitSimulated {
 
 /// A stored report.
 #[derive(Debug, Clone, PartialEq)]
-pub struct KeptReport {
+pub struct StoredReport {
     /// The payload of its event.
     pub simulated: GaitSimulated,
     /// Time of the event.
@@ -45,7 +45,7 @@ pub struct KeptReport {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<KeptReport>> {
+pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<StoredReport>> {
     let row = sqlx::query(
         "select e.payload, e.created_at from trials t join events e on e.study_id = t.study_id \
          where t.id = ?1 and e.kind = ?2 and json_extract(e.payload, '$.trial_id') = ?1 \
@@ -57,7 +57,7 @@ pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<K
     .fetch_optional(db)
     .await?;
     row.map(|row| {
-        Ok(KeptReport { simulated: json_columns::column(&row, "payload")?, created_at: row.try_get("created_at")? })
+        Ok(StoredReport { simulated: json_columns::column(&row, "payload")?, created_at: row.try_get("created_at")? })
     })
     .transpose()
 }

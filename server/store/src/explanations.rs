@@ -1,7 +1,7 @@
 //! Stored infeasibility explanations, and requests for them.
 
 use super::audit::Actor;
-use super::members::{binds, reached};
+use super::members::{reach_values, reached};
 use super::{Connection, Instant, StoreResult, StudyId, TrialId, json_columns, now};
 use crate::accessible_studies::Reach;
 use gait_optimizer::explanation::Explanation;
@@ -13,7 +13,7 @@ pub const REQUESTED: &str = "trial.ask_explanation";
 
 /// A stored explanation.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Explained {
+pub struct StoredExplanation {
     /// Version of the program that made it.
     pub program: String,
     /// SHA-256 of the trial's `problem.json`.
@@ -28,10 +28,10 @@ pub struct Explained {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Explained>> {
+pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<StoredExplanation>> {
     let row = sqlx::query("select * from explanations where trial_id = ?").bind(trial).fetch_optional(db).await?;
     row.map(|row| {
-        Ok(Explained {
+        Ok(StoredExplanation {
             program: row.try_get("program")?,
             problem_sha256: row.try_get("problem_sha256")?,
             explanation: json_columns::column(&row, "document")?,
@@ -45,7 +45,12 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Exp
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn keep(db: &mut Connection, trial: TrialId, problem: &str, explanation: &Explanation) -> StoreResult<bool> {
+pub async fn insert(
+    db: &mut Connection,
+    trial: TrialId,
+    problem: &str,
+    explanation: &Explanation,
+) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into explanations (trial_id, program, problem_sha256, relaxed_bound, document, created_at) \
          values (?, ?, ?, ?, ?, ?) on conflict do nothing",
@@ -86,7 +91,7 @@ pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bo
 /// # Errors
 /// Errors of the database.
 pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(TrialId, StudyId)>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let rows = sqlx::query(concat!(
         "select r.trial_id, t.study_id from explanation_requests r join trials t on t.id = r.trial_id \
          join studies s on s.id = t.study_id \

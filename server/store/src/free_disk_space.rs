@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Default reserve.
-pub const DEFAULT_RESERVE_BYTES: u64 = 500 << 20;
+pub const DEFAULT_RESERVE_BYTES: u64 = 500_000_000;
 /// An ordinary change takes less.
-const ONE_CHANGE_BYTES: u64 = 1 << 20;
+const ONE_CHANGE_BYTES: u64 = 1_000_000;
 
 /// The disk of the record.
 #[derive(Debug)]
@@ -33,23 +33,23 @@ impl Space {
     }
 
     /// Fails if less space is free than the reserve.
-    pub(super) fn room(&self) -> StoreResult<()> {
-        self.room_for(0)
+    pub(super) fn check_free_space(&self) -> StoreResult<()> {
+        self.check_free_space_for(0)
     }
 
     /// Refuses if less than the reserve would be free after writing this number of bytes.
-    pub(super) fn room_for(&self, bytes: u64) -> StoreResult<()> {
+    pub(super) fn check_free_space_for(&self, bytes: u64) -> StoreResult<()> {
         let reserve = self.reserve.load(Ordering::Relaxed).max(ONE_CHANGE_BYTES);
         match self.free_bytes() {
             Some(free) if free < reserve.saturating_add(bytes) => {
-                Err(StoreError::NearlyFull { free_mb: free >> 20, reserve_mb: reserve >> 20 })
+                Err(StoreError::NearlyFull { free_mb: free / 1_000_000, reserve_mb: reserve / 1_000_000 })
             }
             _ => Ok(()),
         }
     }
 
     /// Whether a change fits. The write-ahead log has room for small writes when the disk has none for an ordinary one.
-    pub(super) fn takes_a_change(&self) -> bool {
+    pub(super) fn has_room_for_change(&self) -> bool {
         can_allocate(&self.folder, ONE_CHANGE_BYTES)
     }
 

@@ -103,7 +103,7 @@ pub async fn is_described(db: &mut Connection, trial: TrialId, gait: &Gait) -> S
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn is_here(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
+pub async fn exists(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
     let row = sqlx::query("select exists(select 1 from gaits where trial_id = ?)").bind(trial).fetch_one(db).await?;
     Ok(row.try_get(0)?)
 }

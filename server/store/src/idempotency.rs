@@ -50,7 +50,7 @@ pub const KEY_UNIQUE: &str = "idempotency_keys.key";
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn keep(db: &mut Connection, actor: &Actor, key: &str, kept: &StoredResponse) -> StoreResult<()> {
+pub async fn insert(db: &mut Connection, actor: &Actor, key: &str, kept: &StoredResponse) -> StoreResult<()> {
     sqlx::query(
         "insert into idempotency_keys (actor, key, request, status, location, body, created_at) \
          values (?, ?, ?, ?, ?, ?, ?)",

@@ -3,7 +3,7 @@
 //! `attempts` is a fencing token: a result counts only if it has the number of the current attempt and the job is still
 //! leased. Late and repeated results are therefore never recorded twice.
 
-use super::members::{binds, reached};
+use super::members::{reach_values, reached};
 use super::{Connection, Instant, JobId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
 use sqlx::Row;
@@ -25,7 +25,7 @@ pub struct Lease {
 
 /// Numbers of failures of a job so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Troubles {
+pub struct FailureCounts {
     /// Number of panics and errors.
     pub failures: u32,
     /// Number of workers that stopped responding.
@@ -58,7 +58,7 @@ pub struct OpenSolve {
 /// # Errors
 /// Errors of the database.
 pub async fn open(db: &mut Connection, reach: Reach) -> StoreResult<Vec<OpenSolve>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let rows = sqlx::query(concat!(
         "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id where j.state <> 'done' and ",
         reached!("t.study_id")
@@ -223,12 +223,12 @@ pub async fn cancel(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn requeue(db: &mut Connection, job: JobId, troubles: Troubles) -> StoreResult<()> {
+pub async fn requeue(db: &mut Connection, job: JobId, failure_counts: FailureCounts) -> StoreResult<()> {
     sqlx::query(
         "update jobs set state = 'queued', worker = null, lease_until = null, failures = ?, losses = ? where id = ?",
     )
-    .bind(troubles.failures)
-    .bind(troubles.losses)
+    .bind(failure_counts.failures)
+    .bind(failure_counts.losses)
     .bind(job)
     .execute(db)
     .await?;
@@ -251,13 +251,13 @@ pub async fn reopen(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
 ///
 /// # Errors
 /// [`StoreError::Missing`]; errors of the database.
-pub async fn troubles(db: &mut Connection, job: JobId) -> StoreResult<Troubles> {
+pub async fn failure_counts(db: &mut Connection, job: JobId) -> StoreResult<FailureCounts> {
     let row = sqlx::query("select failures, losses from jobs where id = ?")
         .bind(job)
         .fetch_optional(db)
         .await?
         .ok_or_else(|| StoreError::Missing { what: "job", id: job.to_string() })?;
-    Ok(Troubles { failures: row.try_get("failures")?, losses: row.try_get("losses")? })
+    Ok(FailureCounts { failures: row.try_get("failures")?, losses: row.try_get("losses")? })
 }
 
 /// Leases that expired before `at`.
@@ -280,7 +280,7 @@ pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn held_up(db: &mut Connection) -> StoreResult<Vec<Lease>> {
+pub async fn unstarted_of_inactive_studies(db: &mut Connection) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
             "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \

@@ -1,9 +1,9 @@
 //! Stored lab sessions and their progress. The order of the gaits is an allocation (`super::allocations`).
 
-use super::allocations::{self, OfSession};
+use super::allocations::{self, SessionAllocation};
 use super::audit::Actor;
 use super::lab_answers::{self, LabAnswer};
-use super::members::{binds, reached};
+use super::members::{reach_values, reached};
 use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
 use sqlx::Row;
@@ -70,7 +70,7 @@ pub struct LabSession {
     /// The trial with gait B.
     pub trial_b: TrialId,
     /// What may be known of its allocation.
-    pub allocation: OfSession,
+    pub allocation: SessionAllocation,
     /// Free text.
     pub notes: String,
     /// Who planned it.
@@ -143,7 +143,7 @@ pub async fn insert(db: &mut Connection, actor: &Actor, new: &UnsavedLabSession<
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn record_step(
+pub async fn add_step(
     db: &mut Connection,
     actor: &Actor,
     id: LabSessionId,
@@ -190,7 +190,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<La
 /// # Errors
 /// Errors of the database.
 pub async fn open_since(db: &mut Connection, reach: Reach, limit: u32, since: Instant) -> StoreResult<Vec<LabSession>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let rows = sqlx::query(concat!(
         "select l.* from lab_sessions l join studies s on s.id = l.study_id \
          where s.subject_id not in (select subject_id from withdrawn_subjects) \

@@ -78,7 +78,7 @@ pub mod verify;
 mod wal_check;
 mod writer;
 
-pub use borrowed_connection::{Lent, LentWriter, Reader};
+pub use borrowed_connection::{Borrowed, BorrowedWriter, Reader};
 pub use compressed_columns::{Packed, PackedText};
 pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
@@ -255,7 +255,7 @@ impl Store {
     /// # Errors
     /// If no connection is available.
     pub async fn read(&self) -> StoreResult<Reader<'_>> {
-        Ok(Lent::new(self.readers.acquire().await?))
+        Ok(Borrowed::new(self.readers.acquire().await?))
     }
 
     /// Runs a long computation on the thread pool. The exclusive borrow ensures that the caller holds no connection of
@@ -280,8 +280,8 @@ impl Store {
     ///
     /// # Errors
     /// If no transaction can be started.
-    pub async fn write(&self) -> StoreResult<LentWriter<'_>> {
-        Ok(Lent::new(self.writing.begin().await?))
+    pub async fn write(&self) -> StoreResult<BorrowedWriter<'_>> {
+        Ok(Borrowed::new(self.writing.begin().await?))
     }
 
     /// Sets the free space below which nothing large is started.
@@ -293,8 +293,8 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::NearlyFull`].
-    pub fn room(&self) -> StoreResult<()> {
-        self.writing.space().room()
+    pub fn check_free_space(&self) -> StoreResult<()> {
+        self.writing.space().check_free_space()
     }
 
     /// Free space on the disk of the record, if the system reports it.
@@ -305,7 +305,7 @@ impl Store {
     /// Refuses a file beside the record, or elsewhere on its disk, that would leave less free than is kept in reserve.
     fn room_for_copy(&self, to: &Path) -> StoreResult<()> {
         let bytes = std::fs::metadata(&self.path).map_or(0, |about| about.len());
-        if self.writing.space().holds(to) { self.writing.space().room_for(bytes) } else { Ok(()) }
+        if self.writing.space().holds(to) { self.writing.space().check_free_space_for(bytes) } else { Ok(()) }
     }
 
     /// Tests whether the record accepts changes, by a durable write without effect. The result is cached for a second.
@@ -320,7 +320,7 @@ impl Store {
             return found.clone();
         }
         let found = match tokio::time::timeout(SLOWEST_PROBE, self.write_nothing()).await {
-            Ok(Ok(())) if !self.writing.space().takes_a_change() => {
+            Ok(Ok(())) if !self.writing.space().has_room_for_change() => {
                 Err("the disk that holds the record is full".to_owned())
             }
             Ok(written) => written.map_err(|error| error.to_string()),
@@ -356,7 +356,7 @@ impl Store {
 ///
 /// # Errors
 /// Errors of the database. The transaction is rolled back then.
-pub async fn commit(mut writer: LentWriter<'_>) -> StoreResult<()> {
+pub async fn commit(mut writer: BorrowedWriter<'_>) -> StoreResult<()> {
     seals::seal(&mut writer).await?;
     writer.into_writer().commit().await
 }

@@ -2,7 +2,7 @@
 //! file, and all acknowledged changes would be lost with the process.
 
 use super::error::{StoreError, StoreResult};
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::wal_check::Log;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ impl FileId {
 
 /// A file and its last known state.
 #[derive(Debug)]
-struct Seen {
+struct TrackedFile {
     what: &'static str,
     path: PathBuf,
     id: FileId,
@@ -40,10 +40,10 @@ struct Seen {
 #[derive(Debug)]
 pub(super) struct RecordFiles {
     path: PathBuf,
-    seen: Mutex<Vec<Seen>>,
+    seen: Mutex<Vec<TrackedFile>>,
     log: Mutex<Log>,
     /// The first problem found. It is permanent, because a file that appears later is a different one.
-    gone: OnceLock<String>,
+    problem: OnceLock<String>,
     /// Whether saving the content of the log was attempted.
     saved: OnceLock<()>,
 }
@@ -55,28 +55,28 @@ impl RecordFiles {
             [("the database file", ""), ("its write-ahead log (-wal)", "-wal"), ("its shared memory (-shm)", "-shm")];
         let mut seen = Vec::new();
         for (what, ending) in files {
-            let path = companion(path, ending);
+            let path = path_with_suffix(path, ending);
             let file = std::fs::metadata(&path).map_err(|source| StoreError::Open { path: path.clone(), source })?;
             let bytes = (ending != "-shm").then_some(file.len());
-            seen.push(Seen { what, path, id: FileId::of(&file), bytes });
+            seen.push(TrackedFile { what, path, id: FileId::of(&file), bytes });
         }
-        let name = companion(path, "-wal");
+        let name = path_with_suffix(path, "-wal");
         let log = Log::open(&name).map_err(|source| StoreError::Open { path: name, source })?;
         Ok(Self {
             path: path.to_owned(),
             seen: Mutex::new(seen),
             log: Mutex::new(log),
-            gone: OnceLock::new(),
+            problem: OnceLock::new(),
             saved: OnceLock::new(),
         })
     }
 
     /// Returns an error if any file was ever found to be deleted, replaced or truncated.
     pub(super) fn check(&self) -> StoreResult<()> {
-        if let Some(what) = self.gone.get() {
+        if let Some(what) = self.problem.get() {
             return Err(self.vanished(what));
         }
-        let found = self.seen.lock().unwrap_or_else(PoisonError::into_inner).iter_mut().find_map(Seen::look);
+        let found = self.seen.lock().unwrap_or_else(PoisonError::into_inner).iter_mut().find_map(TrackedFile::look);
         found.map_or(Ok(()), |found| Err(self.refuse(found)))
     }
 
@@ -100,7 +100,7 @@ impl RecordFiles {
     }
 
     fn refuse(&self, found: String) -> StoreError {
-        let refusal = self.vanished(self.gone.get_or_init(|| found));
+        let refusal = self.vanished(self.problem.get_or_init(|| found));
         tracing::error!("{refusal}");
         refusal
     }
@@ -112,8 +112,9 @@ impl RecordFiles {
             return false;
         }
         let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_there = |seen: &Seen| std::fs::metadata(&seen.path).is_ok_and(|file| FileId::of(&file) == seen.id);
-        let was_cut = |seen: &Seen| std::fs::metadata(&seen.path).is_ok_and(|file| seen.is_cut(&file));
+        let is_there =
+            |seen: &TrackedFile| std::fs::metadata(&seen.path).is_ok_and(|file| FileId::of(&file) == seen.id);
+        let was_cut = |seen: &TrackedFile| std::fs::metadata(&seen.path).is_ok_and(|file| seen.is_cut(&file));
         seen.first().is_some_and(is_there) && !seen.iter().any(was_cut)
     }
 
@@ -122,7 +123,7 @@ impl RecordFiles {
     }
 }
 
-impl Seen {
+impl TrackedFile {
     /// What happened to the file; `None` if it is intact.
     fn look(&mut self) -> Option<String> {
         let what = self.what;

@@ -8,7 +8,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use utoipa::ToSchema;
 
-/// SQL condition that a caller can access the study of a column. `?1`, `?2` and `?3` are the values of [`binds`].
+/// SQL condition that a caller can access the study of a column. `?1`, `?2` and `?3` are the values of [`reach_values`].
 macro_rules! reached {
     ($study:literal) => {
         concat!(
@@ -24,7 +24,7 @@ pub(super) use reached;
 
 /// The first three values of a query with [`reached`]: whether every study is accessible, whether open ones are, and
 /// whose memberships count.
-pub(super) fn binds(reach: Reach) -> (bool, bool, Option<String>) {
+pub(super) fn reach_values(reach: Reach) -> (bool, bool, Option<String>) {
     let principal = reach.principal().map(|principal| match principal {
         Principal::User(id) => id.to_string(),
         Principal::Token(id) => id.to_string(),
@@ -69,7 +69,7 @@ pub const MEMBER_ALREADY: &str = "already a member of this study";
 /// # Errors
 /// Errors of the database.
 pub async fn reaches(db: &mut Connection, reach: Reach, study: StudyId) -> StoreResult<bool> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let found = sqlx::query(concat!("select 1 from studies s where s.id = ?4 and ", reached!("s.id")))
         .bind(every)
         .bind(open)
@@ -85,7 +85,7 @@ pub async fn reaches(db: &mut Connection, reach: Reach, study: StudyId) -> Store
 /// # Errors
 /// Errors of the database.
 pub async fn reaches_any(db: &mut Connection, reach: Reach) -> StoreResult<bool> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let found = sqlx::query(concat!("select 1 from studies s where ", reached!("s.id"), " limit 1"))
         .bind(every)
         .bind(open)

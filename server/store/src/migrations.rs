@@ -1,6 +1,6 @@
 //! Migrates a record at start, in one transaction, after a backup.
 
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::schema_versions::{FILES, SchemaFile, check_version, migrator};
 use super::{StoreError, StoreResult, backup, seals, verify};
 use sqlx::SqlitePool;
@@ -38,7 +38,7 @@ async fn migrate(pool: &SqlitePool, path: &Path, files: &[SchemaFile]) -> StoreR
 
 /// Backs up a file before a migration, as `gaitwright.db.v1`.
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
-    let name = companion(path, &format!(".v{found}"));
+    let name = path_with_suffix(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
     let copy = backup::whole_copy(pool, path, &name, path).await?;
     match free_name(&name, copy.part()).map_err(cannot_write)? {
@@ -59,7 +59,7 @@ fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
             return Ok(None);
         }
         number += 1;
-        candidate = companion(name, &format!("-{number}"));
+        candidate = path_with_suffix(name, &format!("-{number}"));
     }
     Ok(Some(candidate))
 }
@@ -120,7 +120,7 @@ mod tests {
         let (folder, database) = record().await;
         let old = folder.path().join("old.db");
         std::fs::copy(&database, &old).unwrap();
-        let kept = companion(&database, &format!(".v{SCHEMA_VERSION}"));
+        let kept = path_with_suffix(&database, &format!(".v{SCHEMA_VERSION}"));
         for _ in 0..2 {
             let migrated = pool(&database).await;
             migrate(&migrated, &database, &with_next(NEXT)).await.unwrap();
@@ -128,7 +128,7 @@ mod tests {
             let next: String = sqlx::query_scalar("select next from subjects").fetch_one(&mut *db).await.unwrap();
             assert_eq!(next, "x");
             let sealed = seals::verify(&mut db).await.unwrap();
-            assert!(matches!(sealed, seals::SealCheck::Whole { .. }), "{sealed:?}");
+            assert!(matches!(sealed, seals::SealCheck::Intact { .. }), "{sealed:?}");
             drop(db);
             migrated.close().await;
             assert_eq!(versions(&database).await.last(), Some(&(SCHEMA_VERSION + 1)));

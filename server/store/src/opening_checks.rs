@@ -1,7 +1,7 @@
 //! Checks of a file before it is opened as a record: not another program's, not an earlier state, not an empty file in
 //! place of a record.
 
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::{StoreError, StoreResult, anchor, schema_versions};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
@@ -34,7 +34,7 @@ pub(super) fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) 
     if bytes(path) > 0 {
         return Ok(());
     }
-    let log = companion(path, "-wal");
+    let log = path_with_suffix(path, "-wal");
     if bytes(&log) > 0 {
         return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: log });
     }

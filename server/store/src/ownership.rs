@@ -4,7 +4,7 @@
 use super::atomic_file::private;
 use super::error::{StoreError, StoreResult};
 use super::lost_files::FileId;
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ impl Ownership {
     pub(super) fn take(path: &Path) -> StoreResult<Self> {
         refuse_second_name(path)?;
         // Resolve links, so that each file has one lock.
-        let lock = companion(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
+        let lock = path_with_suffix(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
         let made = !lock.exists();
         let open = private().create(true).truncate(false).write(true).open(&lock);
         let file = open.map_err(|source| StoreError::Open { path: path.to_owned(), source })?;

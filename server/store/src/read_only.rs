@@ -1,6 +1,6 @@
 //! Opens and checks a record without changing it.
 
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::{StoreError, StoreResult, quarantine, restore_marker, schema_versions, sqlite_file};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
@@ -34,13 +34,13 @@ pub async fn open(file: &Path) -> StoreResult<SqlitePool> {
     };
     // In a read-only folder SQLite cannot create its shared memory. Without a log it needs none; with one, open a copy
     // of both.
-    let log = companion(file, "-wal");
+    let log = path_with_suffix(file, "-wal");
     if std::fs::metadata(&log).map_or(0, |log| log.len()) == 0 {
         return connect(options.immutable(true), file).await;
     }
     let Ok(folder) = private_folder() else { return Err(refused) };
     let copy = folder.join("record.db");
-    let copied = std::fs::copy(file, &copy).and_then(|_| std::fs::copy(&log, companion(&copy, "-wal")));
+    let copied = std::fs::copy(file, &copy).and_then(|_| std::fs::copy(&log, path_with_suffix(&copy, "-wal")));
     let opened = match copied {
         Ok(_) => connect(SqliteConnectOptions::new().filename(&copy), file).await,
         Err(source) => Err(StoreError::Open { path: file.to_owned(), source }),

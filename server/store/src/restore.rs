@@ -6,8 +6,8 @@
 
 use super::atomic_file::{WholeFile, sync_folder};
 use super::ownership::Ownership;
-use super::record_files::companion;
 use super::record_files::free_name;
+use super::record_files::path_with_suffix;
 use super::restore_marker::{self, Marker, mark, unmark};
 use super::{StoreError, StoreResult, anchor, backup, read_only};
 use sha2::{Digest, Sha256};
@@ -82,9 +82,9 @@ async fn replace(
 fn keep(to: &Path, kept: &Path) -> io::Result<()> {
     let family = to.file_name().unwrap_or_default().to_string_lossy();
     for ending in ["", COMPANIONS[0], ".anchor"] {
-        let present = companion(to, ending);
+        let present = path_with_suffix(to, ending);
         if present.exists() {
-            let target = companion(kept, ending);
+            let target = path_with_suffix(kept, ending);
             let mut whole = WholeFile::begin(&target, &family)?;
             io::copy(&mut File::open(&present)?, whole.file())?;
             whole.keep_as(&target)?;
@@ -113,7 +113,7 @@ pub(super) fn finish_interrupted(record: &Path) -> StoreResult<()> {
 
 /// Removes the log of the old record, which must not be used with the backup, and updates the anchors.
 fn finish(record: &Path, marker: &Marker, reached: &dyn Fn(RestoreStep)) -> StoreResult<()> {
-    let others = COMPANIONS.map(|ending| companion(record, ending));
+    let others = COMPANIONS.map(|ending| path_with_suffix(record, ending));
     for path in others.into_iter().filter(|path| path.exists()) {
         std::fs::remove_file(&path).map_err(|source| StoreError::Open { path, source })?;
     }
@@ -203,7 +203,7 @@ mod tests {
             add(&store, "after").await;
             // As a killed service leaves them: the last change is in the log.
             for ending in ["", "-wal", ".anchor"] {
-                std::fs::copy(companion(&live, ending), companion(&record, ending)).unwrap();
+                std::fs::copy(path_with_suffix(&live, ending), path_with_suffix(&record, ending)).unwrap();
             }
             std::fs::copy(anchor::path_of(&live), &elsewhere).unwrap();
             store.close().await;

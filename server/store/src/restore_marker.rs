@@ -1,8 +1,8 @@
 //! The marker beside a record that a restore has begun to replace.
 
-use super::anchor::Ends;
+use super::anchor::ChainEnds;
 use super::atomic_file::{WholeFile, sync_folder};
-use super::record_files::companion;
+use super::record_files::path_with_suffix;
 use super::{StoreError, StoreResult, json_columns};
 use serde::{Deserialize, Serialize};
 use std::io::{ErrorKind, Write};
@@ -14,14 +14,14 @@ pub(super) struct Marker {
     /// Hash of the backup, which tells whether it has the name of the record.
     pub(super) sha256: String,
     /// The last rows of its chains, for the anchors.
-    pub(super) ends: Ends,
+    pub(super) ends: ChainEnds,
     /// The second anchor.
     pub(super) elsewhere: Option<PathBuf>,
 }
 
 /// The path of the marker beside a record.
 fn marker_of(record: &Path) -> PathBuf {
-    companion(record, ".restoring")
+    path_with_suffix(record, ".restoring")
 }
 
 /// Writes the marker durably.

@@ -111,7 +111,7 @@ pub async fn live(db: &mut Connection, user: Option<UserId>) -> StoreResult<Vec<
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn seen(db: &mut Connection, id: SessionId, at: Instant) -> StoreResult<()> {
+pub async fn record_activity(db: &mut Connection, id: SessionId, at: Instant) -> StoreResult<()> {
     sqlx::query("update sessions set seen_at = ? where id = ? and ended_at is null")
         .bind(at)
         .bind(id)

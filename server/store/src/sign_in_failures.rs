@@ -98,7 +98,8 @@ pub async fn most(db: &mut Connection, limit: u32) -> StoreResult<Vec<NetworkFai
 pub async fn count(db: &mut Connection, network: &str, at: Instant, new_name: bool) -> StoreResult<u32> {
     let row = sqlx::query(
         "insert into sign_in_sources (network, attempts, names, first_at, last_at) values (?1, 1, ?2, ?3, ?3) \
-         on conflict do update set attempts = attempts + 1, names = names + ?2, last_at = ?3 returning attempts",
+         on conflict do update set first_at = iif(attempts = 0, ?3, first_at), attempts = attempts + 1, names = names + ?2, \
+         last_at = ?3 returning attempts",
     )
     .bind(network)
     .bind(new_name)
@@ -112,7 +113,7 @@ pub async fn count(db: &mut Connection, network: &str, at: Instant, new_name: bo
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn uncount(db: &mut Connection, network: &str) -> StoreResult<()> {
+pub async fn remove(db: &mut Connection, network: &str) -> StoreResult<()> {
     let sql = "update sign_in_sources set attempts = max(attempts - 1, 0), names = max(names - 1, 0) where network = ?";
     sqlx::query(sql).bind(network).execute(db).await?;
     Ok(())

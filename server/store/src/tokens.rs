@@ -83,11 +83,11 @@ pub async fn by_hash(db: &mut Connection, hash: &str) -> StoreResult<Option<Toke
     row.as_ref().map(from_row).transpose()
 }
 
-/// The tokens that a user created and that were not revoked.
+/// The tokens of a user that were not revoked. Older rows have only the name of the user.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn created_by(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
+pub async fn created_by_user(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
     let rows = sqlx::query("select * from tokens where revoked_at is null and creator_id = ? order by id").bind(user);
     rows.fetch_all(db).await?.iter().map(from_row).collect()
 }

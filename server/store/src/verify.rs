@@ -1,6 +1,6 @@
 //! Verifies a record: its file, schema, hash chains, every row, and its anchors.
 
-use super::anchor::{self, Ends};
+use super::anchor::{self, ChainEnds};
 use super::{Connection, SCHEMA_VERSION, StoreError, StoreResult, audit, read_only, schema_versions, seals};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row, SqliteConnection, SqlitePool};
@@ -10,13 +10,13 @@ use tokio::sync::OnceCell;
 
 /// The result for an intact record.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Whole {
+pub struct IntactRecord {
     /// Number of rows of the audit trail, and the hash of the last one.
     pub audit: (u64, String),
     /// Number of seals, and the hash of the last one.
     pub seals: (u64, String),
     /// The existing anchors and the rows that they list.
-    pub anchors: Vec<(PathBuf, Ends)>,
+    pub anchors: Vec<(PathBuf, ChainEnds)>,
 }
 
 /// Verifies a record that another process may own.
@@ -24,14 +24,14 @@ pub struct Whole {
 /// # Errors
 /// [`StoreError::Damaged`], [`StoreError::CutOff`] or [`StoreError::Rewritten`] with the first discrepancy; errors of
 /// the database.
-pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
+pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<IntactRecord> {
     let pool = read_only::open(record).await?;
     let found = verify_pool(&pool, record, anchors).await;
     pool.close().await;
     found
 }
 
-async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
+async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<IntactRecord> {
     read_only::check_open(pool).await?;
     let version = schema_versions::check_version(pool, record).await?;
     // One consistent state for all comparisons.
@@ -47,7 +47,7 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
             None => {}
         }
     }
-    Ok(Whole { audit, seals, anchors: seen })
+    Ok(IntactRecord { audit, seals, anchors: seen })
 }
 
 /// Number of links of a chain, and the hash of the last one.
@@ -61,11 +61,11 @@ pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chai
     let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     schema(db, version).await?;
     let audit = match audit::verify(db).await? {
-        audit::ChainCheck::Whole { rows, last } => (rows, last),
+        audit::ChainCheck::Intact { rows, last } => (rows, last),
         audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
     };
     let seals = match seals::verify(db).await? {
-        seals::SealCheck::Whole { seals, last } => (seals, last),
+        seals::SealCheck::Intact { seals, last } => (seals, last),
         seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
         seals::SealCheck::Unsealed { table, key } => return Err(StoreError::Unsealed { table, key }),
         seals::SealCheck::Touched { table, key } => return Err(seals::touched(&table, &key)),

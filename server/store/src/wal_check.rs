@@ -101,8 +101,8 @@ impl Header {
     fn sums_after(&self, before: Sums, frame: &[u8]) -> Option<Sums> {
         let (head, page) = frame.split_at_checked(FRAME_HEADER_BYTES)?;
         let sums = summed(summed(before, head.get(..8)?, self.big_endian), page, self.big_endian);
-        let told = words(head.get(16..)?, true);
-        (head.get(8..16)? == self.salt && told == [sums.0, sums.1]).then_some(sums)
+        let stored = words(head.get(16..)?, true);
+        (head.get(8..16)? == self.salt && stored == [sums.0, sums.1]).then_some(sums)
     }
 }
 

@@ -150,8 +150,8 @@ impl Writer {
     ///
     /// # Errors
     /// [`StoreError::NearlyFull`].
-    pub fn room(&self) -> StoreResult<()> {
-        self.shared.space.room()
+    pub fn check_free_space(&self) -> StoreResult<()> {
+        self.shared.space.check_free_space()
     }
 
     /// Ends the change and waits until it is on the disk.

@@ -189,7 +189,7 @@ async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
     let Trial { id, action, violations, .. } = &trials[2];
     let found = explanation(action, SolveStatus::Infeasible, violations);
     let mut writer = site.service.store.write().await.unwrap();
-    assert!(explanations::keep(&mut writer, *id, "{}", &found).await.unwrap());
+    assert!(explanations::insert(&mut writer, *id, "{}", &found).await.unwrap());
     commit(writer).await.unwrap();
     [trials[0].id, trials[1].id, *id]
 }

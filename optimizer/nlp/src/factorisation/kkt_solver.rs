@@ -64,7 +64,7 @@ pub(crate) trait KktSolver: Send {
     fn factor_entries(&self) -> usize;
     /// Reports that the last factorisation was inaccurate. True if the next factorisation of the same matrix uses
     /// another method.
-    fn distrust(&mut self) -> bool {
+    fn reject_factorisation(&mut self) -> bool {
         false
     }
     /// Number of changes to another method.

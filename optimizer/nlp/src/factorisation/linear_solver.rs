@@ -210,7 +210,7 @@ impl KktSolver for Ladder {
         self.methods.get(self.in_use).map_or(0, |method| method.factor_entries())
     }
 
-    fn distrust(&mut self) -> bool {
+    fn reject_factorisation(&mut self) -> bool {
         if self.in_use + 1 >= self.methods.len() {
             return false;
         }

@@ -77,10 +77,10 @@ impl Drop for ThreadPool {
 
 /// The loop of a member until the [`ThreadPool`] is dropped.
 fn serve(job: &impl SharedWork, signal: &Signal, member: usize) {
-    let (mut heard, mut looks) = (0, 0);
+    let (mut calls_seen, mut looks) = (0, 0);
     while !signal.closed.load(Ordering::Acquire) {
-        if signal.calls.load(Ordering::Acquire) > heard {
-            (heard, looks) = (heard + 1, 0);
+        if signal.calls.load(Ordering::Acquire) > calls_seen {
+            (calls_seen, looks) = (calls_seen + 1, 0);
             if catch_unwind(AssertUnwindSafe(|| job.take_part(member))).is_err() {
                 signal.failed.store(true, Ordering::Release);
             }

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::accessible::Id;
-use crate::idempotent::{IdempotentWith, KeptBody};
+use crate::idempotent::{IdempotentWith, StoredBody};
 use crate::problem_details::Refusal;
 use crate::resources::trials::Trial;
 use axum::extract::State;
@@ -41,7 +41,7 @@ pub(super) async fn ask(
             Ok(writer) => writer,
             Err(before) => return repeat_ask(&app, before).await,
         };
-        if let Some(trial) = lab_script::give_out(&mut writer, &request.caller, script, &suggestion?).await? {
+        if let Some(trial) = lab_script::assign(&mut writer, &request.caller, script, &suggestion?).await? {
             return request.done(&app, writer, &Trial::from(trial)).await;
         }
     }
@@ -54,7 +54,7 @@ async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusa
     struct GivenOut {
         id: TrialId,
     }
-    let KeptBody(body) = before.extensions().get().ok_or_else(|| Error::Internal("nothing was stored".to_owned()))?;
+    let StoredBody(body) = before.extensions().get().ok_or_else(|| Error::Internal("nothing was stored".to_owned()))?;
     let GivenOut { id } = serde_json::from_str(body).map_err(|e| Error::Internal(e.to_string()))?;
     lab_script::not_reported(&mut *app.read().await?, id).await?;
     Ok(before)

@@ -13,8 +13,8 @@ use axum::extract::{Path, State};
 use axum::response::Response;
 use gaitwright_service::access::{Administer, Rate, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::blind::{self, Answered, RaterAnswer, RaterReliability, UnblindedPair};
-use gaitwright_store::{StudyId, allocations, blind_pairs, gaits, studies};
+use gaitwright_service::studies::blind::{self, AnswerReceipt, RaterAnswer, RaterReliability, UnblindedPair};
+use gaitwright_store::{StudyId, gaits, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -107,7 +107,7 @@ pub(super) async fn motion(
     Path((token, side)): Path<(String, PairSide)>,
 ) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
-    let shown = blind::own_to_show(&mut reader, &authorized.caller, &token).await?;
+    let shown = blind::own_showable_pair(&mut reader, &authorized.caller, &token).await?;
     let (first, second) = shown.shown();
     let trial = match side {
         PairSide::First => first,
@@ -136,7 +136,7 @@ pub(super) async fn motion(
     tag = "blind",
     params(("token" = String, Path, description = "Token of the pair")),
     request_body = RaterAnswer,
-    responses((status = 200, description = "Confirmation", body = Answered)),
+    responses((status = 200, description = "Confirmation", body = AnswerReceipt)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
@@ -172,9 +172,7 @@ pub(super) async fn raters(
 ) -> Result<Json<Page<RaterReliability>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let shown = blind_pairs::of_study(&mut reader, id).await?;
-    let sides = allocations::of_unblinded_raters(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(blind::figures(&shown, &sides))?))
+    Ok(Json(paging.cut_by_place(blind::reliability(&mut reader, id).await?)?))
 }
 
 /// Rater to unblind, with the reason.

@@ -27,7 +27,7 @@ const MOST: usize = 20;
 /// Studies to compare.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Which {
+pub(super) struct ComparisonQuery {
     ids: String,
 }
 
@@ -74,7 +74,7 @@ pub(super) struct StudyComparison {
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    paging: Paging<usize, Which>,
+    paging: Paging<usize, ComparisonQuery>,
 ) -> Result<Json<Page<StudyComparison>>, Refusal> {
     let which = &paging.filter;
     let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();

@@ -5,7 +5,7 @@
 //! extended.
 
 use crate::AppState;
-use crate::event_stream::{Gone, Listening, Sender};
+use crate::event_stream::{ListenerGone, Sender, StudyListener};
 use crate::extractors::Params;
 use crate::problem_details::Refusal;
 use crate::resources;
@@ -50,7 +50,7 @@ pub(super) struct From {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    listening: Listening<Read>,
+    listening: StudyListener<Read>,
     State(app): State<AppState>,
     Params(from): Params<From>,
     headers: HeaderMap,
@@ -62,10 +62,10 @@ pub(super) async fn of_study(
     // After a restore, a client may have seen larger numbers than the record has.
     let after = last_seen(&headers)?.or(from.after.map(i64::from)).map_or(last, |seen| seen.min(last));
     drop(reader);
-    let stands = json!({ "state": study.state, "reason": study.state_reason });
-    let stands = Event::default().event("study_state").json_data(stands).map_err(|e| Error::Internal(e.to_string()))?;
+    let state = json!({ "state": study.state, "reason": study.state_reason });
+    let state = Event::default().event("study_state").json_data(state).map_err(|e| Error::Internal(e.to_string()))?;
     Ok(listening.stream(move |mut sender| async move {
-        sender.send(stands).await?;
+        sender.send(state).await?;
         follow(&app, id, after, &mut sender).await
     }))
 }
@@ -77,42 +77,47 @@ fn last_seen(headers: &HeaderMap) -> Result<Option<i64>, Error> {
     text.parse().map(Some).map_err(|_| malformed())
 }
 
-async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sender<Read>) -> Result<(), Gone> {
+async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sender<Read>) -> Result<(), ListenerGone> {
     let mut pulse = app.scheduler.pulse();
-    let mut progress = app.scheduler.board().listen();
+    let mut progress = app.scheduler.running_solves().listen();
     let mut shown: HashMap<TrialId, Instant> = HashMap::new();
     loop {
         after = replay(app, study, after, sender).await?;
         loop {
             tokio::select! {
-                () = sender.closed() => return Err(Gone),
+                () = sender.closed() => return Err(ListenerGone),
                 changed = pulse.changed() => {
-                    changed.map_err(|_| Gone)?;
+                    changed.map_err(|_| ListenerGone)?;
                     break;
                 }
                 iteration = progress.recv() => match iteration {
                     Ok(progress) if progress.study_id == study && is_due(&mut shown, &progress) => {
-                        let event = Event::default().event("progress").json_data(progress).map_err(|_| Gone)?;
+                        let event = Event::default().event("progress").json_data(progress).map_err(|_| ListenerGone)?;
                         sender.send(event).await?;
                     }
                     Ok(_) | Err(RecvError::Lagged(_)) => {}
-                    Err(RecvError::Closed) => return Err(Gone),
+                    Err(RecvError::Closed) => return Err(ListenerGone),
                 },
             }
         }
     }
 }
 
-async fn replay(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sender<Read>) -> Result<i64, Gone> {
+async fn replay(
+    app: &AppState,
+    study: StudyId,
+    mut after: i64,
+    sender: &mut Sender<Read>,
+) -> Result<i64, ListenerGone> {
     loop {
-        let mut reader = app.read().await.map_err(|_| Gone)?;
-        let batch = events::after(&mut reader, study, after, BATCH).await.map_err(|_| Gone)?;
+        let mut reader = app.read().await.map_err(|_| ListenerGone)?;
+        let batch = events::after(&mut reader, study, after, BATCH).await.map_err(|_| ListenerGone)?;
         drop(reader);
         let Some(last) = batch.last() else { return Ok(after) };
         after = last.seq;
         for event in batch {
             let sent = Event::default().event(&event.kind).id(event.seq.to_string());
-            let sent = sent.json_data(resources::events::Event::from(event)).map_err(|_| Gone)?;
+            let sent = sent.json_data(resources::events::Event::from(event)).map_err(|_| ListenerGone)?;
             sender.send(sent).await?;
         }
     }

@@ -13,10 +13,10 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::execution::{self, WalksAsked};
+use gaitwright_service::studies::execution::{self, NewExecutionReport};
 use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::job::JobId;
-use gaitwright_store::execution_reports::{GaitSimulated, KeptReport};
+use gaitwright_store::execution_reports::{GaitSimulated, StoredReport};
 use gaitwright_store::{Instant, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -34,9 +34,9 @@ pub(super) struct TrialExecutionReport {
     created_at: Instant,
 }
 
-impl From<KeptReport> for TrialExecutionReport {
-    fn from(kept: KeptReport) -> Self {
-        let KeptReport { simulated: GaitSimulated { trial_id, program, report, .. }, created_at } = kept;
+impl From<StoredReport> for TrialExecutionReport {
+    fn from(kept: StoredReport) -> Self {
+        let StoredReport { simulated: GaitSimulated { trial_id, program, report, .. }, created_at } = kept;
         Self { trial_id, sentence: report.sentence(), report: report.into(), program, created_at }
     }
 }
@@ -73,7 +73,7 @@ pub(super) async fn get(
     operation_id = "request_execution_report",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
-    request_body = WalksAsked,
+    request_body = NewExecutionReport,
     responses(
         (status = 200, description = "Finished job, if the newest report has this number of walks and this seed", body = Job),
         (status = 202, description = "Job that simulates the walks, with lower priority than solves", body = Job)
@@ -83,7 +83,7 @@ pub(super) async fn get(
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    IdempotentWith(request, asked): IdempotentWith<Run, WalksAsked>,
+    IdempotentWith(request, asked): IdempotentWith<Run, NewExecutionReport>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

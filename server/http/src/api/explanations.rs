@@ -16,7 +16,7 @@ use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::job::JobId;
-use gaitwright_store::explanations::Explained;
+use gaitwright_store::explanations::StoredExplanation;
 use gaitwright_store::{Instant, TrialId, trials};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -50,8 +50,8 @@ pub(super) struct TrialExplanation {
 }
 
 impl TrialExplanation {
-    fn new(trial_id: TrialId, made: Explained) -> Self {
-        let Explained { program, problem_sha256, explanation, created_at } = made;
+    fn new(trial_id: TrialId, made: StoredExplanation) -> Self {
+        let StoredExplanation { program, problem_sha256, explanation, created_at } = made;
         Self {
             trial_id,
             sentences: explanation.sentences(),

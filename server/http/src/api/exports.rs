@@ -25,11 +25,11 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub(super) struct Sampling {
     /// Sampling rate, Hz.
-    #[serde(default = "two_hundred")]
+    #[serde(default = "default_rate_hz")]
     rate_hz: f64,
 }
 
-pub(super) fn two_hundred() -> f64 {
+pub(super) fn default_rate_hz() -> f64 {
     200.0
 }
 

@@ -32,7 +32,7 @@ pub struct Health {
 pub(crate) async fn get(State(app): State<AppState>) -> Result<Json<Health>, Refusal> {
     // The pool returns a connection only after the database has responded.
     drop(app.read().await?);
-    let status = if app.store().room().is_ok() { "healthy" } else { "short_of_space" };
+    let status = if app.store().check_free_space().is_ok() { "healthy" } else { "short_of_space" };
     Ok(Json(Health { status, version: env!("CARGO_PKG_VERSION") }))
 }
 
@@ -44,7 +44,7 @@ pub(crate) async fn ready(State(app): State<AppState>) -> Result<String, Refusal
     readiness::check(&app).await?;
     let mut text = "ready".to_owned();
     // Below the reserve, answers still fit and only large work is refused.
-    if let Err(shortage) = app.store().room() {
+    if let Err(shortage) = app.store().check_free_space() {
         // Writing to a String cannot fail.
         let _ = write!(text, "; {shortage}");
     }

@@ -14,7 +14,7 @@ use axum::response::Response;
 use gaitwright_service::access::{Permission, Read, Run};
 use gaitwright_service::studies::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
-use gaitwright_store::{LentWriter, StudyId, TrialId};
+use gaitwright_store::{BorrowedWriter, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -77,7 +77,7 @@ impl Job {
     pub(super) async fn respond<P: Permission>(
         request: &Idempotent<P>,
         app: &AppState,
-        mut writer: LentWriter<'_>,
+        mut writer: BorrowedWriter<'_>,
         id: JobId,
     ) -> Result<Response, Refusal> {
         let job = Self::from(job_status::find(&mut writer, app.runners(), id).await?);

@@ -102,9 +102,9 @@ pub(super) async fn get(
 
 /// Walk and sampling.
 #[derive(Debug, Deserialize)]
-pub(super) struct OfWalk {
+pub(super) struct WalkQuery {
     walk: u8,
-    #[serde(default = "exports::two_hundred")]
+    #[serde(default = "exports::default_rate_hz")]
     rate_hz: f64,
 }
 
@@ -130,7 +130,7 @@ pub(super) async fn controller(
     authorized: Authorized<Device>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Device>,
-    Params(of): Params<OfWalk>,
+    Params(of): Params<WalkQuery>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
     let session = lab_sessions::get(&mut reader, id).await?;

@@ -82,7 +82,7 @@ pub(super) async fn content(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<MeasurementFileId, Read>,
 ) -> Result<Response, Refusal> {
-    let UploadedFile { recording, format, file } = lab::brought(&mut *app.read().await?, id).await?;
+    let UploadedFile { recording, format, file } = lab::read_upload(&mut *app.read().await?, id).await?;
     let text = app.compute(move |pool| file.text(pool)).await??;
     let (kind, ending) = match format {
         MeasurementFormat::Csv => ("text/csv; charset=utf-8", "csv"),
@@ -155,7 +155,7 @@ async fn keep(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let kept = lab::keep(&mut writer, &request.actor, id, checked).await?;
+    let kept = lab::store_upload(&mut writer, &request.actor, id, checked).await?;
     let location = format!("/api/v1/measurement-files/{}", kept.id);
     request.created(app, writer, location, &MeasurementFile::from(kept)).await
 }

@@ -149,7 +149,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         Error::conflict("The study has no recommendation yet, because it has no gait or no preference.")
     })?;
     let mut reader = app.read().await?;
-    let without_certificate = certified_best::judged(&mut reader, &ranking).await?.without_certificate;
+    let without_certificate = certified_best::of_ranking(&mut reader, &ranking).await?.without_certificate;
     let certifying = without_certificate.is_some_and(|next| app.scheduler.certify_best_of(id, next));
     // Read last, so that it includes every certificate if none is being made.
     let grounds = Grounds::read(&mut reader, id).await?;
@@ -167,18 +167,18 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         };
         return Err(Error::conflict(why).into());
     };
-    let judged = certified_best::judged(&mut reader, &ranking[place..]).await?;
+    let certification = certified_best::of_ranking(&mut reader, &ranking[place..]).await?;
     let execution_report = execution::newest(&mut reader, trial.id).await?.map(|kept| kept.simulated.report);
     drop(reader);
     Ok(Recommendation {
         study_id: id,
         study: snapshot.study.plan.name.clone(),
         best: Recommended::of(&gait, trial),
-        certificate: judged.certificate,
-        failures: judged.failures,
+        certificate: certification.certificate,
+        failures: certification.failures,
         execution_report: execution_report.map(Into::into),
         certifying,
-        passing: judged.passing.and_then(|id| {
+        passing: certification.passing.and_then(|id| {
             let trial = snapshot.trial(id)?;
             Some(Recommended::of(&grounds.admit(trial).ok()?, trial))
         }),

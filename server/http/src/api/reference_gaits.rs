@@ -59,7 +59,7 @@ pub(super) async fn create(
     if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
     }
-    let definition = new.definition_aside(app.store_mut()).await?;
+    let definition = new.definition_on_pool(app.store_mut()).await?;
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),

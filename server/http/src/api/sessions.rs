@@ -10,7 +10,7 @@ use crate::resources::sessions::Session;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gaitwright_service::access::{Anything, Right, sign_in};
+use gaitwright_service::access::{AnyCaller, Right, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_store::{Instant, SessionId, sessions};
 use std::cmp::Reverse;
@@ -27,7 +27,7 @@ use std::cmp::Reverse;
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn list(
-    authorized: Authorized<Anything>,
+    authorized: Authorized<AnyCaller>,
     State(app): State<AppState>,
     paging: Paging<(Reverse<Instant>, SessionId)>,
 ) -> Result<Json<Page<Session>>, Refusal> {
@@ -58,8 +58,8 @@ pub(super) async fn list(
 )]
 pub(super) async fn end(
     State(app): State<AppState>,
-    Id(id, _): Id<SessionId, Anything>,
-    request: Idempotent<Anything>,
+    Id(id, _): Id<SessionId, AnyCaller>,
+    request: Idempotent<AnyCaller>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

@@ -14,11 +14,11 @@ use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::command;
-use gaitwright_service::studies::lifecycle::{StudyTransition, acts_of_people};
+use gaitwright_service::studies::lifecycle::{StudyTransition, transitions_for_people};
 use gaitwright_service::studies::study_change::{self, Change, Extend, Fork};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::studies::{self, StudyFilter, StudyState};
-use gaitwright_store::{Connection, LentWriter, StudyId, SubjectId, trials};
+use gaitwright_store::{BorrowedWriter, Connection, StudyId, SubjectId, trials};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -35,7 +35,7 @@ pub(super) struct StudyView {
 impl StudyView {
     async fn of(db: &mut Connection, study: studies::Study) -> Result<Self, Refusal> {
         let trials = trials::counts(db, study.id).await?;
-        let possible = acts_of_people(study.state).into_iter().map(StudyTransition::as_str).collect();
+        let possible = transitions_for_people(study.state).into_iter().map(StudyTransition::as_str).collect();
         Ok(Self { study: study.into(), trials: trials.into(), possible })
     }
 }
@@ -145,7 +145,7 @@ pub(super) async fn create(
 /// Reason for a command.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct StudyActionReason {
+pub(super) struct TransitionReason {
     /// Reason, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -159,7 +159,7 @@ pub(super) struct StudyActionReason {
     operation_id = "start_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: why"),
     responses((status = 200, description = "Started study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -167,9 +167,9 @@ pub(super) async fn start(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, StudyTransition::Start, &why).await
+    transition(&app, id, expected, &request, StudyTransition::Start, &why).await
 }
 
 /// Pause a study
@@ -181,7 +181,7 @@ pub(super) async fn start(
     operation_id = "pause_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: why"),
     responses((status = 200, description = "Paused study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -189,9 +189,9 @@ pub(super) async fn pause(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, StudyTransition::Pause, &why).await
+    transition(&app, id, expected, &request, StudyTransition::Pause, &why).await
 }
 
 /// Resume a study
@@ -201,7 +201,7 @@ pub(super) async fn pause(
     operation_id = "resume_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: why"),
     responses((status = 200, description = "Resumed study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -209,9 +209,9 @@ pub(super) async fn resume(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, StudyTransition::Resume, &why).await
+    transition(&app, id, expected, &request, StudyTransition::Resume, &why).await
 }
 
 /// Stop a study
@@ -223,7 +223,7 @@ pub(super) async fn resume(
     operation_id = "stop_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = StudyActionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: why"),
     responses((status = 200, description = "Stopped study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -231,25 +231,25 @@ pub(super) async fn stop(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, StudyActionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
 ) -> Result<Response, Refusal> {
-    act(&app, id, expected, &request, StudyTransition::Stop, &why).await
+    transition(&app, id, expected, &request, StudyTransition::Stop, &why).await
 }
 
-async fn act(
+async fn transition(
     app: &AppState,
     id: StudyId,
     expected: IfMatch,
     request: &Idempotent<Run>,
-    act: StudyTransition,
-    why: &StudyActionReason,
+    transition: StudyTransition,
+    why: &TransitionReason,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let done = command::act(&mut writer, &request.actor, id, act, &why.reason).await?;
+    let done = command::transition(&mut writer, &request.actor, id, transition, &why.reason).await?;
     let revision = done.study.revision;
     let view = StudyView::of(&mut writer, done.study).await?;
     let answer = request.done(app, writer, &view).await?;
@@ -290,7 +290,7 @@ pub(super) async fn patch(
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
-/// Raise the trial budget of a study
+/// Raise the number of trials of a study
 ///
 /// If the study has ended, it resumes.
 #[utoipa::path(
@@ -349,7 +349,7 @@ pub(super) async fn fork(
 async fn made(
     app: &AppState,
     request: &Idempotent<Run>,
-    mut writer: LentWriter<'_>,
+    mut writer: BorrowedWriter<'_>,
     study: studies::Study,
 ) -> Result<Response, Refusal> {
     let (location, revision) = (format!("/api/v1/studies/{}", study.id), study.revision);

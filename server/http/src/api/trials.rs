@@ -197,7 +197,7 @@ pub(super) async fn iterations(
     Visible(id, _): Visible<TrialId, Read>,
     paging: Paging<usize>,
 ) -> Result<Json<Page<Iteration>>, Refusal> {
-    let records = if let Some(track) = app.scheduler.board().track(id) {
+    let records = if let Some(track) = app.scheduler.running_solves().track(id) {
         track.records
     } else {
         let iterations = gaits::iterations(&mut *app.read().await?, id).await?;

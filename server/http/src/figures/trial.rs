@@ -14,7 +14,7 @@ use gaitwright_store::{TrialId, gaits, reference_gaits, studies, trials};
 /// # Errors
 /// [`Error::NotFound`]; errors of the database.
 pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figure>, Error> {
-    if let Some(running) = app.scheduler.board().track(id) {
+    if let Some(running) = app.scheduler.running_solves().track(id) {
         return Ok(gait_charts::solve(&running.records).into_iter().collect());
     }
     let mut reader = app.read().await?;

@@ -13,12 +13,12 @@ pub(crate) const DRAWN: usize = 100;
 
 /// What makes one trial better than another: Gait RMSE if it answers the comparisons, otherwise the mean utility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OutcomeShown {
+pub(crate) enum TrialMeasure {
     GaitRmse,
     Utility,
 }
 
-impl OutcomeShown {
+impl TrialMeasure {
     pub(crate) fn of(snapshot: &StudySnapshot) -> Self {
         match snapshot.study.plan.feedback_mode {
             FeedbackMode::Automatic => Self::GaitRmse,
@@ -59,7 +59,7 @@ struct DrawnTrial<'a> {
 
 /// The newest results.
 fn drawn<'a>(snapshot: &'a StudySnapshot, belief: &Belief) -> Result<Vec<DrawnTrial<'a>>, LearnerError> {
-    let shown = OutcomeShown::of(snapshot);
+    let shown = TrialMeasure::of(snapshot);
     let results = snapshot.trials.iter().rev().filter(|trial| trial.state.is_result()).take(DRAWN);
     let draw = |trial: &'a Trial| {
         let outcome = shown.value(trial, belief)?;
@@ -75,7 +75,7 @@ fn drawn<'a>(snapshot: &'a StudySnapshot, belief: &Belief) -> Result<Vec<DrawnTr
 /// # Errors
 /// Errors of the learner.
 pub(crate) fn parallel(snapshot: &StudySnapshot, belief: &Belief) -> Result<Option<Figure>, LearnerError> {
-    let (space, shown) = (belief.posterior.space(), OutcomeShown::of(snapshot));
+    let (space, shown) = (belief.posterior.space(), TrialMeasure::of(snapshot));
     let axes = space.dimensions().iter().map(|dimension| ParallelAxis {
         name: dimension.name.clone(),
         meaning: meaning(&dimension.name).to_owned(),
@@ -91,7 +91,7 @@ pub(crate) fn parallel(snapshot: &StudySnapshot, belief: &Belief) -> Result<Opti
             title: "Bounds and outcome of each trial".to_owned(),
             axes: axes.collect(),
             outcome: shown.label().to_owned(),
-            low_is_good: shown == OutcomeShown::GaitRmse,
+            low_is_good: shown == TrialMeasure::GaitRmse,
             lines,
         })
     }))
@@ -106,7 +106,7 @@ pub(crate) fn by_bound(
     belief: &Belief,
     dimension: usize,
 ) -> Result<Option<Figure>, LearnerError> {
-    let (space, shown) = (belief.posterior.space(), OutcomeShown::of(snapshot));
+    let (space, shown) = (belief.posterior.space(), TrialMeasure::of(snapshot));
     let Some(bound) = space.dimensions().get(dimension) else { return Ok(None) };
     let mut points = Vec::new();
     for drawn in drawn(snapshot, belief)? {

@@ -19,8 +19,8 @@ use gait_learner::{Agreement, Prediction};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Belief, Surprise};
-use gaitwright_service::studies::gait_beliefs::{GaitBelief, is_told};
+use gaitwright_service::studies::belief::{Belief, UnexpectedAnswer};
+use gaitwright_service::studies::gait_beliefs::{GaitBelief, is_distinguishable};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::{FeedbackMode, Study};
@@ -61,8 +61,8 @@ struct ShownBelief {
     parallel: Option<PageChart>,
     /// Whether some trials are not drawn.
     newest_only: bool,
-    surprises: Vec<SurpriseRow>,
-    more_surprises: usize,
+    unexpected_answers: Vec<UnexpectedAnswerRow>,
+    more_unexpected_answers: usize,
 }
 
 /// A gait, which one or several trials have.
@@ -85,10 +85,10 @@ struct BoundEffect {
     effect: String,
     best: f64,
     worst: f64,
-    is_told: bool,
+    is_distinguishable: bool,
 }
 
-struct SurpriseRow {
+struct UnexpectedAnswerRow {
     text: String,
     source: &'static str,
     percent: String,
@@ -147,8 +147,13 @@ fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisCho
         by_bound: by_bound.iter().flatten().map(drawn).collect(),
         parallel: parallel.as_ref().map(drawn),
         newest_only: results > DRAWN,
-        surprises: belief.surprises.iter().take(LISTED).filter_map(|s| surprise_row(s, snapshot)).collect(),
-        more_surprises: belief.surprises.len().saturating_sub(LISTED),
+        unexpected_answers: belief
+            .unexpected_answers
+            .iter()
+            .take(LISTED)
+            .filter_map(|s| unexpected_answer_row(s, snapshot))
+            .collect(),
+        more_unexpected_answers: belief.unexpected_answers.len().saturating_sub(LISTED),
     })
 }
 
@@ -181,7 +186,7 @@ fn worse(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Option
 
 fn believed_worse(behind: &Prediction) -> String {
     let percent = percent(behind.probability_above_zero());
-    if is_told(behind) {
+    if is_distinguishable(behind) {
         format!("yes ({percent} sure)")
     } else {
         format!("too few comparisons to tell ({percent} sure)")
@@ -203,19 +208,19 @@ fn bounds(belief: &Belief) -> Vec<BoundEffect> {
             effect: format!("{:.2} ± {:.2}", effect.difference.mean, effect.difference.standard_deviation),
             best: effect.best,
             worst: effect.worst,
-            is_told: is_told(&effect.difference),
+            is_distinguishable: is_distinguishable(&effect.difference),
         }
     };
     ranked.into_iter().filter(|place| dimensions[*place].values.len() > 1).map(row).collect()
 }
 
-fn surprise_row(surprise: &Surprise, snapshot: &StudySnapshot) -> Option<SurpriseRow> {
-    let text = match surprise.given.content {
+fn unexpected_answer_row(unexpected: &UnexpectedAnswer, snapshot: &StudySnapshot) -> Option<UnexpectedAnswerRow> {
+    let text = match unexpected.answer.content {
         FeedbackContent::Suggestion { over, .. } => {
             format!("the suggested bounds are better than those of trial {}", snapshot.trial(over)?.number)
         }
-        _ => answer_in_words(&surprise.given, snapshot)?,
+        _ => answer_in_words(&unexpected.answer, snapshot)?,
     };
-    let percent = surprise.probability.map_or_else(|| "–".to_owned(), percent);
-    Some(SurpriseRow { text, source: format::source(&surprise.given), percent })
+    let percent = unexpected.probability.map_or_else(|| "–".to_owned(), percent);
+    Some(UnexpectedAnswerRow { text, source: format::source(&unexpected.answer), percent })
 }

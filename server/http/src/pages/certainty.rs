@@ -2,7 +2,7 @@
 
 use crate::format::{figure, percent};
 use gaitwright_service::studies::belief::Belief;
-use gaitwright_service::studies::gait_beliefs::is_told;
+use gaitwright_service::studies::gait_beliefs::is_distinguishable;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::FeedbackMode;
 use gaitwright_store::trials::Trial;
@@ -51,7 +51,7 @@ fn believed(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
     // Without a line break before the sign.
     let sure = percent(difference.probability_above_zero()).replace(' ', "\u{a0}");
     let gaits = belief.gaits.len();
-    Some(if is_told(&difference) {
+    Some(if is_distinguishable(&difference) {
         format!(
             "After {comparisons}, the learner is {sure} sure that this gait is better than that of trial {number}, the \
              next best of {gaits} different gaits."

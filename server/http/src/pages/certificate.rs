@@ -21,7 +21,7 @@ pub(super) struct InWords {
     /// Figures of the closed loop: label and value.
     pub(super) figures: Vec<(&'static str, String)>,
     /// Every check.
-    pub(super) checks: Vec<CheckInWords>,
+    pub(super) checks: Vec<FormattedCheck>,
 }
 
 impl InWords {
@@ -63,27 +63,27 @@ impl InWords {
             );
             figures.push(("Pushes at the hip from which the walker recovers", words));
         }
-        let checks = certificate.checks.into_iter().map(CheckInWords::new).collect();
+        let checks = certificate.checks.into_iter().map(FormattedCheck::new).collect();
         Self { passed: certificate.passed, failures: certificate.failures, figures, checks }
     }
 }
 
 /// A check with formatted figures.
-pub(super) struct CheckInWords {
+pub(super) struct FormattedCheck {
     pub(super) name: String,
     pub(super) value: String,
     pub(super) limit: String,
     pub(super) place: String,
 }
 
-impl CheckInWords {
+impl FormattedCheck {
     fn new(check: Check) -> Self {
         let in_unit = |value: Option<f64>, otherwise: &str| {
             value.map_or_else(|| otherwise.to_owned(), |value| format!("{} {}", format::number(value), check.unit))
         };
         Self {
             value: in_unit(check.value, "not determined"),
-            limit: in_unit(check.limit, "no limit (reported only)"),
+            limit: in_unit(check.limit, "no limit; reported only"),
             name: check.name,
             place: check.place,
         }

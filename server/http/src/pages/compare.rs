@@ -1,6 +1,6 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::compare_answer::{AnswerForm, Given, LABELS, Recorded, give};
+use super::compare_answer::{AnswerForm, AnswerOutcome, LABELS, Recorded, give};
 use super::page_chart::{PageChart, shared_legend};
 use super::study::{answer_in_words, assessment_in_words};
 use super::undo::undo_seconds;
@@ -319,15 +319,15 @@ pub(super) async fn post(
     Form(form): Form<AnswerForm>,
 ) -> Result<Response, PageError> {
     let (saved, status, why) = match give(&app, &authorized.caller, id, &form).await {
-        Ok(Given::Saved(saved)) => {
+        Ok(AnswerOutcome::Saved(saved)) => {
             return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")).into_response());
         }
-        Ok(Given::Before(saved)) => {
+        Ok(AnswerOutcome::SameForm(saved)) => {
             let why = "This form was already sent with another answer, shown above. That answer counts; this one was not \
                        saved. To change the answer, retract the first one and save again.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
-        Ok(Given::Elsewhere(saved)) => {
+        Ok(AnswerOutcome::AnsweredBefore(saved)) => {
             let why = "You have already answered this comparison, perhaps in another tab or window. Your first answer, shown \
                        above, counts; this one was not saved. To change the answer, retract the first one and save \
                        again.";

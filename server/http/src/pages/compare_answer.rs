@@ -133,13 +133,13 @@ fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
 }
 
 /// The outcome of a submitted form.
-pub(super) enum Given {
+pub(super) enum AnswerOutcome {
     /// The answer is recorded, now or before.
     Saved(Recorded),
     /// The same form was sent before with another answer, which is the recorded one.
-    Before(Recorded),
+    SameForm(Recorded),
     /// The same author answered this comparison before; that answer is the recorded one.
-    Elsewhere(Recorded),
+    AnsweredBefore(Recorded),
 }
 
 /// The labels of the form.
@@ -153,7 +153,12 @@ pub(super) const LABELS: [(&str, &str); 6] = [
 ];
 
 /// Records the answer of a form.
-pub(super) async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &AnswerForm) -> Result<Given, Error> {
+pub(super) async fn give(
+    app: &AppState,
+    caller: &Caller,
+    id: StudyId,
+    form: &AnswerForm,
+) -> Result<AnswerOutcome, Error> {
     let (judgement, key) = form.read()?;
     let mut writer = app.write().await?;
     // The key of the form makes a repeated form (double click, reload, two tabs) count once.
@@ -166,13 +171,13 @@ pub(super) async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &An
     if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;
         let recorded = Recorded::try_from(before.body)?;
-        return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
+        return Ok(if same { AnswerOutcome::Saved(recorded) } else { AnswerOutcome::SameForm(recorded) });
     }
     // A second answer is refused, and the page shows the first one. A safety report is always accepted.
     if !judgement.is_about_safety()
         && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
     {
-        return Ok(Given::Elsewhere(saved));
+        return Ok(AnswerOutcome::AnsweredBefore(saved));
     }
     let saved = match judgement {
         GivenAnswer::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
@@ -180,11 +185,11 @@ pub(super) async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &An
     };
     if !is_reviewed {
         let kept = StoredResponse { request, status: 303, location: None, body: saved.to_string() };
-        idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
+        idempotency::insert(&mut writer, &caller.actor, &key, &kept).await?;
     }
     commit(writer).await?;
     app.scheduler.changed();
-    Ok(Given::Saved(saved))
+    Ok(AnswerOutcome::Saved(saved))
 }
 
 /// The current answer of the same author to the same comparison, given in another tab or elsewhere.

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extractors::Form;
+use crate::extractors::{Form, FormFields};
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
@@ -18,7 +18,6 @@ use gaitwright_service::studies::device;
 use gaitwright_store::devices::{self, Device};
 use gaitwright_store::{DeviceId, commit};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
 
 #[derive(Template)]
 #[template(path = "devices.html")]
@@ -30,9 +29,6 @@ struct DevicesPage {
 pub(super) async fn list(_: Authorized<Read>, State(app): State<AppState>) -> PageResult {
     page(&DevicesPage { devices: devices::all(&mut *app.read().await?).await? })
 }
-
-/// The entries by field name.
-type Typed = BTreeMap<String, String>;
 
 #[derive(Template)]
 #[template(path = "device.html")]
@@ -70,12 +66,12 @@ impl DevicePage {
     }
 
     /// The entries of a refused form.
-    fn refusing(mut self, typed: &Typed, refused: FieldError) -> Self {
+    fn refusing(mut self, fields: &FormFields, refused: FieldError) -> Self {
         for row in &mut self.rows {
-            row.value = typed.get(row.field.name).cloned().unwrap_or_default();
+            row.value = fields.get(row.field.name).cloned().unwrap_or_default();
         }
-        self.name = typed.get("name").cloned().unwrap_or_default();
-        self.carried_limb = typed.contains_key("carried_limb");
+        self.name = fields.get("name").cloned().unwrap_or_default();
+        self.carried_limb = fields.contains_key("carried_limb");
         let name = refused.field.trim_start_matches("device.");
         let label = Definition::FIELDS.iter().find(|field| field.name == name).map(|field| field.meaning);
         let message = match label {
@@ -106,11 +102,11 @@ pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<DeviceId, Run>,
-    Form(typed): Form<Typed>,
+    Form(fields): Form<FormFields>,
 ) -> Result<Response, PageError> {
     let before = devices::get(&mut *app.read().await?, id).await?;
     let mut writer = app.write().await?;
-    let added = match changed(&before.definition, &typed) {
+    let added = match changed(&before.definition, &fields) {
         Ok(definition) => device::add(&mut writer, &authorized.caller.actor, &definition).await,
         Err(error) => Err(error),
     };
@@ -120,7 +116,7 @@ pub(super) async fn post(
             Ok(Redirect::to(&format!("/devices/{}", added.id)).into_response())
         }
         Err(Error::Invalid(refused)) => {
-            let form = page(&DevicePage::of(before, true).refusing(&typed, *refused))?;
+            let form = page(&DevicePage::of(before, true).refusing(&fields, *refused))?;
             Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
         }
         Err(other) => Err(other.into()),
@@ -128,17 +124,17 @@ pub(super) async fn post(
 }
 
 /// The device with the entries. A changed value loses its source, which belongs to the old value.
-fn changed(before: &Definition, typed: &Typed) -> Result<Definition, Error> {
+fn changed(before: &Definition, fields: &FormFields) -> Result<Definition, Error> {
     let known = |name: &str| Definition::FIELDS.iter().any(|field| field.name == name);
     if let Some((name, value)) =
-        typed.iter().find(|(name, _)| !known(name) && !matches!(name.as_str(), "name" | "carried_limb"))
+        fields.iter().find(|(name, _)| !known(name) && !matches!(name.as_str(), "name" | "carried_limb"))
     {
         return Err(Error::invalid(name, value.as_str(), "a field of this form"));
     }
-    let mut fields = Map::new();
+    let mut values = Map::new();
     let mut sources = before.sources.clone();
     for field in &Definition::FIELDS {
-        let text = typed.get(field.name).map_or("", String::as_str).trim();
+        let text = fields.get(field.name).map_or("", String::as_str).trim();
         let allowed = || format!("{} to {}", field.minimum, field.maximum);
         let value: f64 = text.parse().map_err(|_| Error::invalid(field.name, text, &allowed()))?;
         if !(field.minimum..=field.maximum).contains(&value) {
@@ -147,10 +143,10 @@ fn changed(before: &Definition, typed: &Typed) -> Result<Definition, Error> {
         if value.to_bits() != (field.value)(before).to_bits() {
             sources.remove(field.name);
         }
-        fields.insert(field.name.to_owned(), json!(value));
+        values.insert(field.name.to_owned(), json!(value));
     }
-    fields.insert("name".to_owned(), json!(typed.get("name").map_or("", String::as_str).trim()));
-    fields.insert("carried_limb".to_owned(), json!(typed.contains_key("carried_limb")));
-    fields.insert("sources".to_owned(), json!(sources));
-    serde_json::from_value(Value::Object(fields)).map_err(|e| Error::Internal(e.to_string()))
+    values.insert("name".to_owned(), json!(fields.get("name").map_or("", String::as_str).trim()));
+    values.insert("carried_limb".to_owned(), json!(fields.contains_key("carried_limb")));
+    values.insert("sources".to_owned(), json!(sources));
+    serde_json::from_value(Value::Object(values)).map_err(|e| Error::Internal(e.to_string()))
 }

@@ -16,7 +16,7 @@ const CONTENT: &str = "<main id=\"content\">";
 pub(super) async fn show(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let response = next.run(request).await;
     let kind = response.headers().get(header::CONTENT_TYPE).and_then(|kind| kind.to_str().ok());
-    let Err(shortage) = app.store().room() else { return response };
+    let Err(shortage) = app.store().check_free_space() else { return response };
     if !kind.is_some_and(|kind| kind.starts_with("text/html")) {
         return response;
     }

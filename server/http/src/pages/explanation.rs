@@ -31,7 +31,7 @@ pub(super) struct NoGait {
     /// How long the explanation has been running.
     pub(super) elapsed: Option<Elapsed>,
     /// The relaxations that give a gait.
-    pub(super) ways: Vec<WayOut>,
+    pub(super) relaxations: Vec<FeasibleRelaxation>,
     /// The last event of the study so far; the page loads the explanation when a later one announces it.
     pub(super) last_event: i64,
 }
@@ -41,12 +41,12 @@ impl NoGait {
     pub(super) fn new(
         trial: &Trial,
         state: ExplanationState,
-        ways: Vec<WayOut>,
+        relaxations: Vec<FeasibleRelaxation>,
         effort: &ExplanationEffort,
         last_event: i64,
     ) -> Option<Self> {
         let elapsed = if let ExplanationEffort::Running(elapsed) = effort { Some(*elapsed) } else { None };
-        Some(Self { outcome: trial.status.and_then(status_in_words)?, state, elapsed, ways, last_event })
+        Some(Self { outcome: trial.status.and_then(status_in_words)?, state, elapsed, relaxations, last_event })
     }
 
     /// The progress of a running explanation, as a sentence.
@@ -60,7 +60,7 @@ impl NoGait {
         format!("Running for {}. {usual}", time(elapsed.seconds))
     }
 
-    pub(super) fn is_coming(&self) -> bool {
+    pub(super) fn is_pending(&self) -> bool {
         matches!(self.state, ExplanationState::BeingMade | ExplanationState::Waiting)
     }
 
@@ -74,17 +74,17 @@ impl NoGait {
 }
 
 /// A relaxation that gives a gait.
-pub(super) struct WayOut {
+pub(super) struct FeasibleRelaxation {
     /// `a7 = 20° (hip angle)`.
     pub(super) label: String,
     /// The bounds and their values as a parameter of the form for a new study: `a5=0.03,a7=20`.
     pub(super) relax: String,
     /// The trial that the study can try.
-    pub(super) attempt: Result<Attempt, NoRelaxedTrial>,
+    pub(super) trial: Result<RelaxedTrialOffer, NoRelaxedTrial>,
 }
 
 /// A trial that tries a relaxation in the same study.
-pub(super) struct Attempt {
+pub(super) struct RelaxedTrialOffer {
     /// The bounds with their values in the search space: `a7 = 35°`.
     pub(super) bounds: String,
     /// Whether these values are looser than those of the relaxation.
@@ -93,7 +93,7 @@ pub(super) struct Attempt {
     pub(super) extends: bool,
 }
 
-impl WayOut {
+impl FeasibleRelaxation {
     /// The relaxations of an explanation.
     pub(super) async fn all(
         db: &mut Connection,
@@ -101,18 +101,18 @@ impl WayOut {
         trial: &Trial,
         explanation: &Explanation,
     ) -> Result<Vec<Self>, Error> {
-        let mut ways = Vec::new();
+        let mut relaxations = Vec::new();
         for relaxation in relaxed_trial::relaxations(explanation) {
-            let possible = relaxed_trial::possible(db, study, trial, &relaxation).await?;
-            ways.push(Self::of(&relaxation, possible));
+            let possible = relaxed_trial::of(db, study, trial, &relaxation).await?;
+            relaxations.push(Self::of(&relaxation, possible));
         }
-        Ok(ways)
+        Ok(relaxations)
     }
 
     fn of(relaxation: &Relaxation, possible: Result<RelaxedTrial, NoRelaxedTrial>) -> Self {
         let label = |(bound, value): &(String, f64)| quantity(bound, format::meaning(bound), *value);
         let relax = |(bound, value): &(String, f64)| format!("{bound}={value}");
-        let attempt = |trial: RelaxedTrial| Attempt {
+        let offer = |trial: RelaxedTrial| RelaxedTrialOffer {
             bounds: trial
                 .bounds
                 .iter()
@@ -125,7 +125,7 @@ impl WayOut {
         Self {
             label: relaxation.iter().map(label).collect::<Vec<_>>().join(" and "),
             relax: relaxation.iter().map(relax).collect::<Vec<_>>().join(","),
-            attempt: possible.map(attempt),
+            trial: possible.map(offer),
         }
     }
 }
@@ -191,10 +191,10 @@ mod tests {
     }
 
     #[test]
-    fn way_out_names_each_bound_with_its_unit() {
-        let relaxation = vec![("a5".to_owned(), 0.03), ("a7".to_owned(), 20.0)];
-        let way = WayOut::of(&relaxation, Err(NoRelaxedTrial::NotTuned("a7".to_owned())));
-        assert_eq!(way.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20° (hip angle)");
-        assert_eq!(way.relax, "a5=0.03,a7=20");
+    fn relaxation_names_each_bound_with_its_unit() {
+        let bounds = vec![("a5".to_owned(), 0.03), ("a7".to_owned(), 20.0)];
+        let relaxation = FeasibleRelaxation::of(&bounds, Err(NoRelaxedTrial::NotTuned("a7".to_owned())));
+        assert_eq!(relaxation.label, "a5 = 0.03 m (swing-foot clearance) and a7 = 20° (hip angle)");
+        assert_eq!(relaxation.relax, "a5=0.03,a7=20");
     }
 }

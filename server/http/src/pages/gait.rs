@@ -1,7 +1,7 @@
 //! The page of a trial and its gait.
 
 use super::certificate;
-use super::explanation::{NoGait, WayOut};
+use super::explanation::{FeasibleRelaxation, NoGait};
 use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
 use super::page_chart::{PageChart, shared_legend};
@@ -136,7 +136,7 @@ pub(super) async fn get(
     let effort = app.scheduler.explaining(id);
     let explained = explanation::state(&mut reader, &trial, effort.clone()).await?;
     let ways = match &explained {
-        ExplanationState::Made(made) => WayOut::all(&mut reader, &study, &trial, &made.explanation).await?,
+        ExplanationState::Made(made) => FeasibleRelaxation::all(&mut reader, &study, &trial, &made.explanation).await?,
         _ => Vec::new(),
     };
     let may_run = authorized.caller.may(Run::NEEDED);

@@ -55,7 +55,7 @@ impl WalkPage {
 /// The form of a walk.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Walked {
+pub(super) struct WalkForm {
     walk: u8,
     #[serde(default)]
     note: String,
@@ -104,7 +104,7 @@ pub(super) async fn record(
     authorized: Authorized<Rate>,
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
-    Form(Walked { walk, note, complete }): Form<Walked>,
+    Form(WalkForm { walk, note, complete }): Form<WalkForm>,
 ) -> Result<Response, PageError> {
     let walked = RecordedWalk { walk, note };
     let recorded = async {

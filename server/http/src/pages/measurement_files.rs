@@ -80,7 +80,7 @@ async fn keep(
     checked: CheckedFile,
 ) -> Result<(), Error> {
     let mut writer = app.write().await?;
-    session::keep(&mut writer, &authorized.caller.actor, id, &checked).await?;
+    session::store_upload(&mut writer, &authorized.caller.actor, id, &checked).await?;
     Ok(commit(writer).await?)
 }
 

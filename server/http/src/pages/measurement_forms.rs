@@ -38,7 +38,7 @@ pub(super) struct EmgFields {
     pub(super) rejected_strides: String,
     pub(super) file_name: String,
     /// `preview`, or else an upload.
-    pub(super) act: String,
+    pub(super) button: String,
 }
 
 impl Default for EmgFields {
@@ -58,7 +58,7 @@ impl Default for EmgFields {
             column_bf_r: String::new(),
             rejected_strides: String::new(),
             file_name: String::new(),
-            act: String::new(),
+            button: String::new(),
             heel_strikes_s: String::new(),
             heel_strike_column: String::new(),
             heel_strike_threshold: reading.heel_strike_threshold.to_string(),
@@ -118,7 +118,7 @@ impl EmgFields {
 
     /// Whether the form asks for a preview only.
     pub(super) fn previews(&self) -> bool {
-        self.act == "preview"
+        self.button == "preview"
     }
 }
 

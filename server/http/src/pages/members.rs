@@ -1,4 +1,4 @@
-//! The access page of a study: its members, and the forms that add and remove them.
+//! The access page of a study: its members, the forms that add and remove them, and the reliability of its raters.
 
 use super::users::origin;
 use crate::AppState;
@@ -17,6 +17,7 @@ use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::blind::{self, RaterReliability, Share};
 use gaitwright_service::studies::membership::{self, NewMember, StudyAccess};
 use gaitwright_store::members::{Member, MemberKind};
 use gaitwright_store::studies::Study;
@@ -30,6 +31,8 @@ struct MembersPage {
     access: StudyAccess,
     /// Users and tokens that can be added: value and label.
     candidates: Vec<(String, String)>,
+    /// Everyone who compared gaits blind. Empty if the subject withdrew consent.
+    raters: Vec<RaterReliability>,
     may_run: bool,
     may_administer: bool,
     /// Whether the subject withdrew consent, so that members can only be removed.
@@ -44,6 +47,21 @@ struct MembersPage {
 impl MembersPage {
     fn role(member: &Member) -> &'static str {
         member.role.as_ref().map_or("token", format::role)
+    }
+
+    /// Whether the caller may unblind raters, and one of them is blind.
+    fn may_unblind(&self) -> bool {
+        self.may_administer && self.raters.iter().any(|rater| rater.first_preferred.is_none())
+    }
+
+    /// `6 of 8 (41 % to 93 %)`, the interval with a confidence of 95 %.
+    fn share(share: &Share) -> String {
+        match (share.low, share.high) {
+            (Some(low), Some(high)) => {
+                format!("{} of {} ({} to {})", share.count, share.of, format::percent(low), format::percent(high))
+            }
+            _ => "–".to_owned(),
+        }
     }
 }
 
@@ -72,6 +90,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
     let withdrawn = consents::is_withdrawn(&mut reader, id).await?;
     let candidates =
         if may_run && !withdrawn { membership::candidates(&mut reader, &access.members).await? } else { Vec::new() };
+    let raters = if withdrawn { Vec::new() } else { blind::reliability(&mut reader, id).await? };
     let candidates = candidates.into_iter().map(|(kind, name, what)| {
         let kind = if kind == MemberKind::User { "user" } else { "token" };
         (format!("{kind} {name}"), format!("{name} ({what})"))
@@ -80,6 +99,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
         study,
         access,
         candidates: candidates.collect(),
+        raters,
         may_run,
         may_administer: caller.may(Administer::NEEDED),
         withdrawn,
@@ -92,7 +112,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
 /// The fields of every form of the page.
 #[derive(Debug, Deserialize)]
 pub(super) struct MembersForm {
-    act: String,
+    button: String,
     /// `user R1` or `token rig`.
     #[serde(default)]
     who: String,
@@ -102,6 +122,12 @@ pub(super) struct MembersForm {
     /// The name of a rater to invite.
     #[serde(default)]
     name: String,
+    /// The rater to unblind.
+    #[serde(default)]
+    rater: String,
+    /// Why the rater is unblinded.
+    #[serde(default)]
+    reason: String,
 }
 
 /// `POST /studies/{id}/members`. Answers with the page instead of a redirect, because a link is not stored and can be shown
@@ -112,10 +138,10 @@ pub(super) async fn post(
     DespiteWithdrawal(id, _): DespiteWithdrawal<StudyId, Run>,
     secure: Secure,
     headers: HeaderMap,
-    Form(asked): Form<MembersForm>,
+    Form(form): Form<MembersForm>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
-    match act(&mut writer, &authorized.caller, id, &asked).await {
+    match apply(&mut writer, &authorized.caller, id, &form).await {
         Ok(invited) => {
             commit(writer).await?;
             app.scheduler.changed();
@@ -130,7 +156,7 @@ pub(super) async fn post(
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
             drop(writer);
-            let shown = AfterAction { refused: Some(form_errors::in_words(&error)), typed: asked.name, link: None };
+            let shown = AfterAction { refused: Some(form_errors::in_words(&error)), typed: form.name, link: None };
             Ok((Problem::from(&error).status(), show(&app, &authorized.caller, id, shown).await?).into_response())
         }
         Err(error) => Err(error.into()),
@@ -138,19 +164,19 @@ pub(super) async fn post(
 }
 
 /// Performs the action; returns name and secret of a sign-in link, if it created one.
-async fn act(
+async fn apply(
     writer: &mut Writer,
     caller: &Caller,
     study: StudyId,
-    asked: &MembersForm,
+    form: &MembersForm,
 ) -> Result<Option<(String, String)>, Error> {
-    if asked.act != "remove" {
+    if form.button != "remove" {
         consents::may_be_shown(writer, study).await?;
     }
-    match asked.act.as_str() {
+    match form.button.as_str() {
         "add" => {
-            let unknown = || Error::invalid("who", asked.who.as_str(), "a user or token from the list");
-            let (kind, name) = asked.who.split_once(' ').ok_or_else(unknown)?;
+            let unknown = || Error::invalid("who", form.who.as_str(), "a user or token from the list");
+            let (kind, name) = form.who.split_once(' ').ok_or_else(unknown)?;
             let kind = match kind {
                 "user" => MemberKind::User,
                 "token" => MemberKind::Token,
@@ -160,21 +186,26 @@ async fn act(
             Ok(None)
         }
         "remove" => {
-            let unknown = |_| Error::invalid("member", asked.member.as_str(), "a member listed on this page");
-            let member: Named<MemberId> = asked.member.parse().map_err(unknown)?;
+            let unknown = |_| Error::invalid("member", form.member.as_str(), "a member listed on this page");
+            let member: Named<MemberId> = form.member.parse().map_err(unknown)?;
             let member = member.accessible(writer, caller.reach()).await?;
             membership::end(writer, &caller.actor, member).await?;
             Ok(None)
         }
         "restrict" | "open" => {
-            membership::restrict(writer, caller, study, asked.act == "restrict").await?;
+            membership::restrict(writer, caller, study, form.button == "restrict").await?;
             Ok(None)
         }
         "invite" if caller.may(Administer::NEEDED) => {
-            let (user, _, secret) = membership::invite(writer, &caller.actor, study, &asked.name).await?;
+            let (user, _, secret) = membership::invite(writer, &caller.actor, study, &form.name).await?;
             Ok(Some((user.name, secret)))
         }
         "invite" => Err(Error::Forbidden("Only administrators can create sign-in links.".to_owned())),
-        other => Err(Error::invalid("act", other, "add, remove, restrict, open or invite")),
+        "unblind" if caller.may(Administer::NEEDED) => {
+            blind::unblind(writer, caller, study, &form.rater, &form.reason).await?;
+            Ok(None)
+        }
+        "unblind" => Err(Error::Forbidden("Only administrators can unblind raters.".to_owned())),
+        other => Err(Error::invalid("button", other, "add, remove, restrict, open, invite or unblind")),
     }
 }

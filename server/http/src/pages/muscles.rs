@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extractors::Form;
+use crate::extractors::{Form, FormFields};
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
@@ -19,7 +19,6 @@ use gaitwright_service::studies::subject;
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::{SubjectId, commit};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
 
 /// Names of the muscles.
 const KINDS: [(&str, &str); 7] = [
@@ -31,9 +30,6 @@ const KINDS: [(&str, &str); 7] = [
     ("sol", "soleus"),
     ("ta", "tibialis anterior"),
 ];
-
-/// The entries by field name.
-type Typed = BTreeMap<String, String>;
 
 #[derive(Template)]
 #[template(path = "muscles.html")]
@@ -56,7 +52,7 @@ struct ParameterCell {
     /// `sol_max_force_n`.
     field: String,
     label: String,
-    typed: String,
+    entry: String,
     /// The value of an empty field; `None` if the muscle does not span that joint.
     otherwise: Option<String>,
     refused: bool,
@@ -67,10 +63,10 @@ fn shown(
     subject: Subject,
     muscles: &MuscleParameters,
     may_run: bool,
-    refusal: Option<(&Typed, FieldError)>,
+    refusal: Option<(&FormFields, FieldError)>,
 ) -> MusclesPage {
-    let (typed, refused) = refusal.map_or((None, None), |(typed, refused)| (Some(typed), Some(refused)));
-    let scaled_to_body = typed.map_or(muscles.scaled_to_body, |typed| typed.contains_key("scaled_to_body"));
+    let (fields, refused) = refusal.map_or((None, None), |(fields, refused)| (Some(fields), Some(refused)));
+    let scaled_to_body = fields.map_or(muscles.scaled_to_body, |fields| fields.contains_key("scaled_to_body"));
     let unchanged = MuscleParameters { scaled_to_body, ..MuscleParameters::default() };
     let body = subject.body();
     let row = |&(kind, name): &(&str, &'static str)| {
@@ -81,7 +77,7 @@ fn shown(
             let kept = given.as_ref().and_then(column.given).map(|value| value.to_string());
             ParameterCell {
                 label: format!("{name}: {}", column.meaning),
-                typed: typed.map_or(kept, |typed| typed.get(&field).cloned()).unwrap_or_default(),
+                entry: fields.map_or(kept, |fields| fields.get(&field).cloned()).unwrap_or_default(),
                 otherwise: otherwise.as_ref().and_then(column.value).map(format::number),
                 refused: refused.as_ref().is_some_and(|refused| is_of(&refused.field, &field)),
                 field,
@@ -119,12 +115,12 @@ pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Run>,
-    Form(typed): Form<Typed>,
+    Form(fields): Form<FormFields>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
     let subject = subjects::get(&mut writer, id).await?;
     let before = subjects::muscles(&mut writer, id).await?;
-    let set = match read(&typed) {
+    let set = match read(&fields) {
         Ok(muscles) => subject::set_muscles(&mut writer, &authorized.caller.actor, id, &muscles).await,
         Err(error) => Err(error),
     };
@@ -135,7 +131,7 @@ pub(super) async fn post(
         }
         Err(Error::Invalid(refused)) => {
             let status = Problem::from(&Error::Invalid(refused.clone())).status();
-            let form = page(&shown(subject, &before, true, Some((&typed, *refused))))?;
+            let form = page(&shown(subject, &before, true, Some((&fields, *refused))))?;
             Ok((status, form).into_response())
         }
         Err(other) => Err(other.into()),
@@ -143,9 +139,9 @@ pub(super) async fn post(
 }
 
 /// The entries as a document, without empty fields.
-fn read(typed: &Typed) -> Result<MuscleParameters, Error> {
+fn read(fields: &FormFields) -> Result<MuscleParameters, Error> {
     let mut document = Map::new();
-    for (field, text) in typed.iter().filter(|(_, text)| !text.trim().is_empty()) {
+    for (field, text) in fields.iter().filter(|(_, text)| !text.trim().is_empty()) {
         if field == "scaled_to_body" {
             document.insert(field.clone(), json!(true));
             continue;

@@ -17,7 +17,7 @@ use gaitwright_charts::gait_tiles;
 use gaitwright_service::access::{Caller, Rate, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
-use gaitwright_store::allocations::Sided;
+use gaitwright_store::allocations::PairWithSides;
 use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
 use gaitwright_store::studies::{FeedbackMode, StudyFilter};
 use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
@@ -154,7 +154,7 @@ pub(super) async fn list(
         None => newest(&mut reader, &authorized.caller).await?,
     };
     let reach = authorized.caller.reach();
-    let studies: Vec<_> = studies::asking_raters(&mut reader, reach)
+    let studies: Vec<_> = studies::awaiting_raters(&mut reader, reach)
         .await?
         .into_iter()
         // Names of studies can reveal what is tuned, so raters see the end of the identifier.
@@ -168,7 +168,7 @@ pub(super) async fn list(
     let next = next.filter(|next| studies.iter().any(|(study, _)| study == next));
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
     let assigned = members::reaches_any(&mut reader, reach).await?;
-    let not_blind = blind::sees_or_saw_gaits(&mut reader, &authorized.caller).await?;
+    let not_blind = blind::is_never_blind(&mut reader, &authorized.caller).await?;
     page(&RatePage {
         studies,
         next,
@@ -201,7 +201,7 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlin
     Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_retracted))
 }
 
-async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<SavedBlindAnswer>, Error> {
+async fn read_back(db: &mut Connection, shown: PairWithSides) -> Result<Option<SavedBlindAnswer>, Error> {
     let can_be_retracted = blind::can_be_retracted(db, &shown.pair).await?;
     Ok(shown.answer().zip(shown.pair.answered_at).map(|(judgement, at)| SavedBlindAnswer {
         study: shown.pair.study_id,
@@ -246,7 +246,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
         let saved = read_back(&mut reader, shown).await?;
         return page(&PairPage { token, number, not_blind, saved, refused, strides: None });
     }
-    blind::own_to_show(&mut reader, caller, &token).await?;
+    blind::own_showable_pair(&mut reader, caller, &token).await?;
     let mut pair = Vec::new();
     let (first, second) = shown.shown();
     for trial in [first, second] {

@@ -41,7 +41,7 @@ pub(super) struct ReferenceGaitFields {
     height_m: String,
     body_mass_kg: String,
     /// `preview`, or else an import.
-    act: String,
+    button: String,
 }
 
 impl ReferenceGaitFields {
@@ -173,7 +173,7 @@ pub(super) async fn import(
     units: Units,
     Submitted(fields): Submitted<ReferenceGaitFields>,
 ) -> Result<Response, PageError> {
-    if fields.act == "preview" {
+    if fields.button == "preview" {
         let preview = match fields.read() {
             Ok(new) => app.compute(move |_| JointAnglePreview::of(&new)).await.map_err(Error::from)?,
             Err(error) => Err(error),
@@ -190,7 +190,7 @@ pub(super) async fn import(
         return Ok((status, form).into_response());
     }
     let definition = match fields.read() {
-        Ok(new) => new.definition_aside(app.store_mut()).await,
+        Ok(new) => new.definition_on_pool(app.store_mut()).await,
         Err(error) => Err(error),
     };
     let definition = match definition {

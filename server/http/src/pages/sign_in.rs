@@ -18,7 +18,7 @@ use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::sessions::{Session, SignInOrigin};
 use gaitwright_store::users::User;
-use gaitwright_store::{Connection, Instant, LentWriter, UserId, Writer, commit, sessions, users};
+use gaitwright_store::{BorrowedWriter, Connection, Instant, UserId, Writer, commit, sessions, users};
 use serde::Deserialize;
 use std::time::Duration;
 
@@ -39,7 +39,7 @@ struct AccountPage {
     role: Role,
     shortest: usize,
     /// Whether the form asks for the current password.
-    must_say_password: bool,
+    must_confirm_password: bool,
     /// The sessions of the user, and whether each is the current one.
     sessions: Vec<(Session, bool)>,
     refused: Option<String>,
@@ -103,7 +103,7 @@ async fn compare<'a>(
     name: &str,
     user: Option<&User>,
     password: String,
-) -> Result<Result<Option<(LentWriter<'a>, PasswordAttempt)>, Duration>, Error> {
+) -> Result<Result<Option<(BorrowedWriter<'a>, PasswordAttempt)>, Duration>, Error> {
     let (mut writer, now) = app.write_access().await?;
     let origin = visit.origin(&mut writer, user).await?;
     let network = origin.network.clone();
@@ -115,7 +115,7 @@ async fn compare<'a>(
     };
     let stored = user.and_then(|user| user.password.clone());
     let compared = move || secret::is_password(&password, stored.as_deref());
-    let right = app.access.turns.aside(&network, compared).await?;
+    let right = app.access.password_checks.run(&network, compared).await?;
     let (mut writer, now) = app.write_access().await?;
     if right {
         return Ok(Ok(Some((writer, attempt))));
@@ -236,7 +236,7 @@ async fn account_of(
         name: user.name.clone(),
         role: user.role,
         shortest: password::SHORTEST,
-        must_say_password: sign_in::must_say_password(&mut reader, &user, session_of(headers)).await?,
+        must_confirm_password: sign_in::must_confirm_password(&mut reader, &user, session_of(headers)).await?,
         sessions: own_sessions(&mut reader, app, user.id, session_of(headers), now).await?,
         refused: None,
         saved: false,
@@ -262,7 +262,7 @@ pub(super) async fn set_password(
 ) -> Result<Response, PageError> {
     let (mut shown, user, actor) = account_of(&app, caller.as_ref(), &headers).await?;
     let visit = Visit::of(address, &headers);
-    if shown.must_say_password {
+    if shown.must_confirm_password {
         // Wrong passwords count as failed sign-ins.
         let right = compare(&app, &visit, &user.name, Some(&user), form.present).await?.map_err(too_many)?;
         let Some((mut writer, attempt)) = right else {
@@ -273,7 +273,7 @@ pub(super) async fn set_password(
         commit(writer).await?;
     }
     let name = user.name.clone();
-    let hashed = match secret::aside(move || secret::hash_password_of(&name, &form.password)).await? {
+    let hashed = match secret::on_blocking_thread(move || secret::hash_password_of(&name, &form.password)).await? {
         Err(Error::Invalid(field)) => {
             shown.refused = Some(form_errors::with_label(*field).message);
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
@@ -286,7 +286,7 @@ pub(super) async fn set_password(
     let session = sign_in::renewed(&mut writer, &user, &from).await?;
     shown.sessions = own_sessions(&mut writer, &app, user.id, Some(&session), now).await?;
     commit(writer).await?;
-    (shown.saved, shown.must_say_password) = (true, true);
+    (shown.saved, shown.must_confirm_password) = (true, true);
     Ok((cookies(&app, &session, &kept)?, page(&shown)?).into_response())
 }
 

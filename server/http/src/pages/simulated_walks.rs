@@ -11,10 +11,10 @@ use axum::response::Redirect;
 use gait_optimizer::execution::{ExecutionReport, WalksOnGround};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::execution::{MOST_WALKS, Simulation, WalksAsked};
+use gaitwright_service::studies::execution::{MOST_WALKS, NewExecutionReport, Simulation};
 use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
-use gaitwright_store::execution_reports::{GaitSimulated, KeptReport};
+use gaitwright_store::execution_reports::{GaitSimulated, StoredReport};
 use gaitwright_store::{Instant, TrialId, commit};
 use serde::Deserialize;
 
@@ -23,7 +23,7 @@ pub(super) struct SimulatedWalks {
     pub(super) state: Simulation,
     pub(super) shown: Option<ShownReport>,
     /// What the form suggests.
-    pub(super) suggested: WalksAsked,
+    pub(super) suggested: NewExecutionReport,
 }
 
 /// An execution report in words.
@@ -48,12 +48,12 @@ pub(super) struct GroundRow {
 }
 
 impl SimulatedWalks {
-    pub(super) fn new(state: Simulation, kept: Option<KeptReport>) -> Self {
-        Self { state, shown: kept.map(ShownReport::new), suggested: WalksAsked::default() }
+    pub(super) fn new(state: Simulation, kept: Option<StoredReport>) -> Self {
+        Self { state, shown: kept.map(ShownReport::new), suggested: NewExecutionReport::default() }
     }
 
     /// Whether a report is queued or running.
-    pub(super) fn is_coming(&self) -> bool {
+    pub(super) fn is_pending(&self) -> bool {
         self.state.open().is_some()
     }
 
@@ -67,8 +67,8 @@ impl SimulatedWalks {
 }
 
 impl ShownReport {
-    fn new(kept: KeptReport) -> Self {
-        let KeptReport { simulated: GaitSimulated { walks, seed, program, report, .. }, created_at } = kept;
+    fn new(kept: StoredReport) -> Self {
+        let StoredReport { simulated: GaitSimulated { walks, seed, program, report, .. }, created_at } = kept;
         let of_strides = |strides: u32| format!("{strides} of {}", report.strides);
         let by_yield = report.strides_by_yield.iter();
         let by_yield: Vec<String> = by_yield
@@ -129,10 +129,10 @@ pub(super) struct WalksFields {
 }
 
 impl WalksFields {
-    fn asked(&self) -> Result<WalksAsked, Error> {
+    fn request(&self) -> Result<NewExecutionReport, Error> {
         let walks = self.walks.trim().parse();
         let seed = self.seed.trim().parse();
-        Ok(WalksAsked {
+        Ok(NewExecutionReport {
             walks: walks.map_err(|_| Error::invalid("walks", self.walks.as_str(), &format!("1 to {MOST_WALKS}")))?,
             seed: seed.map_err(|_| Error::invalid("seed", self.seed.as_str(), &format!("0 to {LARGEST_SEED}")))?,
         })
@@ -146,7 +146,7 @@ pub(super) async fn post(
     Id(id, _): Id<TrialId, Run>,
     Form(fields): Form<WalksFields>,
 ) -> Result<Redirect, PageError> {
-    let asked = fields.asked()?;
+    let asked = fields.request()?;
     let mut writer = app.write().await?;
     execution_request::ask(&mut writer, &app.scheduler, &authorized.caller.actor, id, asked).await?;
     commit(writer).await?;

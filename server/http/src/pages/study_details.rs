@@ -42,7 +42,7 @@ impl DetailsPage {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StudyDetailsFields {
-    act: String,
+    button: String,
     #[serde(default)]
     name: String,
     /// Separated by commas.
@@ -55,7 +55,7 @@ pub(super) struct StudyDetailsFields {
 impl StudyDetailsFields {
     fn of(study: &Study) -> Self {
         Self {
-            act: String::new(),
+            button: String::new(),
             name: study.plan.name.clone(),
             tags: study.tags.join(", "),
             notes: study.notes.clone(),
@@ -64,7 +64,7 @@ impl StudyDetailsFields {
 
     fn change(&self) -> Result<Change, Error> {
         let tags = self.tags.split(',').map(str::trim).filter(|tag| !tag.is_empty()).map(str::to_owned);
-        Ok(match self.act.as_str() {
+        Ok(match self.button.as_str() {
             "save" => Change {
                 name: Some(self.name.clone()),
                 tags: Some(tags.collect()),
@@ -74,7 +74,7 @@ impl StudyDetailsFields {
             },
             "archive" => Change { archived: Some(true), ..Change::default() },
             "restore" => Change { archived: Some(false), ..Change::default() },
-            other => return Err(Error::invalid("act", other, "save, archive or restore")),
+            other => return Err(Error::invalid("button", other, "save, archive or restore")),
         })
     }
 }
@@ -112,14 +112,14 @@ pub(super) async fn post(
         Ok(()) => {
             commit(writer).await?;
             app.scheduler.changed();
-            let to = if fields.act == "archive" { "/".to_owned() } else { format!("/studies/{id}") };
+            let to = if fields.button == "archive" { "/".to_owned() } else { format!("/studies/{id}") };
             Ok(Redirect::to(&to).into_response())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
             drop(writer);
             let status = Problem::from(&error).status();
             let refused = Some(form_errors::of_form(&error, LABELS));
-            let typed = Some(fields).filter(|fields| fields.act == "save");
+            let typed = Some(fields).filter(|fields| fields.button == "save");
             Ok((status, show(&app, &authorized.caller, id, typed, refused).await?).into_response())
         }
         Err(error) => Err(error.into()),

@@ -258,7 +258,7 @@ async fn end(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, why: &
 
 /// Corrected height and mass, as typed.
 #[derive(Debug, Deserialize)]
-pub(super) struct Corrected {
+pub(super) struct CorrectionForm {
     height_m: String,
     body_mass_kg: String,
     reason: String,
@@ -271,7 +271,7 @@ pub(super) async fn correct(
     State(app): State<AppState>,
     units: Units,
     Id(id, _): Id<SubjectId, Run>,
-    Form(form): Form<Corrected>,
+    Form(form): Form<CorrectionForm>,
 ) -> Result<Response, PageError> {
     let typed = Correcting {
         height_m: form.height_m.clone(),
@@ -283,7 +283,12 @@ pub(super) async fn correct(
     answer(&app, units, id, &authorized.caller, done, RefusedForm::Correction(typed)).await
 }
 
-async fn set_right(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
+async fn set_right(
+    app: &AppState,
+    authorized: &Authorized<Run>,
+    id: SubjectId,
+    form: CorrectionForm,
+) -> Result<(), Error> {
     let (height_m, body_mass_kg) = body_measures::height_and_mass(&form.height_m, &form.body_mass_kg)?;
     let new = NewCorrection { height_m, body_mass_kg, reason: form.reason };
     let mut writer = app.write().await?;

@@ -22,7 +22,7 @@ use std::time::Duration;
 #[template(path = "system.html")]
 struct SystemPage {
     /// Why the service cannot do its work, if it cannot.
-    trouble: Option<String>,
+    problem: Option<String>,
     version: &'static str,
     /// Version of the database schema.
     schema_version: i64,
@@ -126,7 +126,7 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
     let measured = [trials::measured(&mut reader, true).await?, trials::measured(&mut reader, false).await?];
     let scheduled = app.backups.scheduled().filter(|_| may_administer).map(Scheduled::of);
     page(&SystemPage {
-        trouble: readiness::check(app).await.err().map(|error| error.to_string()),
+        problem: readiness::check(app).await.err().map(|error| error.to_string()),
         scheduled,
         version: env!("CARGO_PKG_VERSION"),
         schema_version: SCHEMA_VERSION,

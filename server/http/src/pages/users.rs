@@ -53,13 +53,13 @@ struct UsersPage {
     outcome: ActionOutcome,
     refused: Option<RefusedEntry>,
     /// The entries of a refused form. None of them is secret.
-    typed: UsersForm,
+    entries: UsersForm,
 }
 
 /// Why a form was refused.
 struct RefusedEntry {
     /// Which form.
-    act: String,
+    button: String,
     /// The refused field; `None` if no single field is at fault.
     field: Option<&'static str>,
     message: String,
@@ -75,8 +75,8 @@ const FIELDS: [(&str, &str, &str); 5] = [
 ];
 
 impl RefusedEntry {
-    fn of(error: &Error, act: &str) -> Self {
-        let find = |name: &str| FIELDS.iter().find(|(field, form, _)| *field == name && *form == act);
+    fn of(error: &Error, button: &str) -> Self {
+        let find = |name: &str| FIELDS.iter().find(|(field, form, _)| *field == name && *form == button);
         let (field, message) = match error {
             Error::Invalid(fault) => match find(&fault.field) {
                 Some((field, _, label)) => (Some(*field), form_errors::of_field(label, fault)),
@@ -86,20 +86,20 @@ impl RefusedEntry {
             Error::Conflict(reason) => (find("name").map(|(field, _, _)| *field), reason.clone()),
             _ => (None, error.to_string()),
         };
-        Self { act: act.to_owned(), field, message }
+        Self { button: button.to_owned(), field, message }
     }
 }
 
 impl UsersPage {
     /// Why this field of this form was refused.
-    fn fault(&self, act: &str, field: &str) -> Option<&str> {
+    fn fault(&self, button: &str, field: &str) -> Option<&str> {
         let refused = self.refused.as_ref()?;
-        (refused.act == act && refused.field == Some(field)).then_some(refused.message.as_str())
+        (refused.button == button && refused.field == Some(field)).then_some(refused.message.as_str())
     }
 
     /// The attributes of a refused field.
-    fn invalid(&self, act: &str, field: &str) -> &'static str {
-        if self.fault(act, field).is_some() {
+    fn invalid(&self, button: &str, field: &str) -> &'static str {
+        if self.fault(button, field).is_some() {
             " aria-invalid=\"true\" aria-describedby=\"fault\" autofocus"
         } else {
             ""
@@ -107,19 +107,19 @@ impl UsersPage {
     }
 
     /// The entry of a field, if its form was the refused one.
-    fn typed<'a>(&self, act: &str, text: &'a str) -> &'a str {
-        if self.typed.act == act { text } else { "" }
+    fn entry<'a>(&self, button: &str, text: &'a str) -> &'a str {
+        if self.entries.button == button { text } else { "" }
     }
 
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn is_role(&self, role: &Role) -> bool {
-        let chosen = self.typed("add_user", &self.typed.role);
+        let chosen = self.entry("add_user", &self.entries.role);
         role.as_str() == if chosen.is_empty() { "rater" } else { chosen }
     }
 
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn is_scope(&self, right: &Right) -> bool {
-        if self.typed.act == "make_token" { self.typed.scopes().contains(right) } else { *right == Right::Read }
+        if self.entries.button == "make_token" { self.entries.scopes().contains(right) } else { *right == Right::Read }
     }
 
     fn scopes_of(token: &Token) -> String {
@@ -138,7 +138,7 @@ struct ActionOutcome {
 /// The fields of every form of the page.
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct UsersForm {
-    act: String,
+    button: String,
     #[serde(default)]
     id: String,
     #[serde(default)]
@@ -175,13 +175,13 @@ pub(super) async fn get(_: Authorized<Administer>, State(app): State<AppState>) 
     show(&app, ActionOutcome::default(), None, UsersForm::default()).await
 }
 
-async fn show(app: &AppState, outcome: ActionOutcome, refused: Option<RefusedEntry>, typed: UsersForm) -> PageResult {
+async fn show(app: &AppState, outcome: ActionOutcome, refused: Option<RefusedEntry>, entries: UsersForm) -> PageResult {
     let mut reader = app.read().await?;
     let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
     let now = app.access.clock.now(&mut reader).await?;
     let sessions = sign_in::live(&mut reader, None, app.access.limits, now).await?;
     let failures = sign_in_failures::most(&mut reader, MOST_SOURCES).await?;
-    page(&UsersPage { users, tokens, sessions, failures, roles: Role::ALL, scopes: SCOPES, outcome, refused, typed })
+    page(&UsersPage { users, tokens, sessions, failures, roles: Role::ALL, scopes: SCOPES, outcome, refused, entries })
 }
 
 /// `POST /users`. Answers with the page instead of a redirect, because a link or token is not stored and can be shown only
@@ -191,11 +191,11 @@ pub(super) async fn post(
     State(app): State<AppState>,
     secure: Secure,
     headers: HeaderMap,
-    Form(asked): Form<UsersForm>,
+    Form(form): Form<UsersForm>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
     let origin = origin(secure, &headers);
-    match act(&mut writer, &authorized.caller, &origin, &asked).await {
+    match apply(&mut writer, &authorized.caller, &origin, &form).await {
         Ok(outcome) => {
             commit(writer).await?;
             // Event streams check again whether their user still has access.
@@ -205,8 +205,8 @@ pub(super) async fn post(
         Err(error) if error.is_input() => {
             drop(writer);
             let status = StatusCode::from_u16(Problem::from(&error).status).unwrap_or(StatusCode::BAD_REQUEST);
-            let refused = RefusedEntry::of(&error, &asked.act);
-            Ok((status, show(&app, ActionOutcome::default(), Some(refused), asked).await?).into_response())
+            let refused = RefusedEntry::of(&error, &form.button);
+            Ok((status, show(&app, ActionOutcome::default(), Some(refused), form).await?).into_response())
         }
         Err(error) => Err(error.into()),
     }
@@ -220,53 +220,53 @@ pub(super) fn origin(secure: Secure, headers: &HeaderMap) -> String {
     if host.is_empty() { String::new() } else { format!("{scheme}://{host}") }
 }
 
-async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &UsersForm) -> Result<ActionOutcome, Error> {
+async fn apply(writer: &mut Writer, caller: &Caller, origin: &str, form: &UsersForm) -> Result<ActionOutcome, Error> {
     let actor = &caller.actor;
     let done = |text: String| ActionOutcome { done: Some(text), secret: None };
-    match asked.act.as_str() {
+    match form.button.as_str() {
         "add_user" => {
             let user =
-                user_administration::add(writer, actor, &NewUser { name: asked.name.clone(), role: asked.role()? })
+                user_administration::add(writer, actor, &NewUser { name: form.name.clone(), role: form.role()? })
                     .await?;
             let secret = user_administration::link(writer, actor, user.id).await?;
             Ok(link(&user, origin, &secret))
         }
         "link" => {
-            let id: UserId = asked.id()?;
+            let id: UserId = form.id()?;
             let secret = user_administration::link(writer, actor, id).await?;
             Ok(link(&users::get(writer, id).await?, origin, &secret))
         }
         "disable" | "enable" => {
-            let disabled = asked.act == "disable";
-            let user = user_administration::set_disabled(writer, actor, asked.id()?, disabled).await?;
+            let disabled = form.button == "disable";
+            let user = user_administration::set_disabled(writer, actor, form.id()?, disabled).await?;
             Ok(done(format!("{} is {}.", user.name, if disabled { "disabled" } else { "enabled again" })))
         }
         "role" => {
-            let user = user_administration::set_role(writer, actor, asked.id()?, asked.role()?).await?;
+            let user = user_administration::set_role(writer, actor, form.id()?, form.role()?).await?;
             Ok(done(format!("{} now has the role {}.", user.name, format::role(&user.role))))
         }
         "end_session" => {
-            let id: SessionId = asked.id()?;
+            let id: SessionId = form.id()?;
             let missing = || Error::NotFound { what: "session".to_owned(), id: id.to_string() };
             let session = sessions::get(writer, id).await?.ok_or_else(missing)?;
             sign_in::end(writer, actor, &session).await?;
             Ok(done(format!("Ended a session of {}.", session.user_name)))
         }
         "make_token" => {
-            let days = match asked.days.trim() {
+            let days = match form.days.trim() {
                 "" => None,
                 text => Some(text.parse().map_err(|_| Error::invalid("days", text, "1 to 3660, or empty"))?),
             };
-            let new = NewToken { name: asked.name.clone(), scopes: asked.scopes(), days };
+            let new = NewToken { name: form.name.clone(), scopes: form.scopes(), days };
             let (token, secret) = making::make(writer, actor, &new).await?;
             Ok(ActionOutcome { done: Some(format!("Created token {}.", token.name)), secret: Some(("Token", secret)) })
         }
         "revoke" => {
-            let token = making::revoke(writer, actor, asked.id::<TokenId>()?).await?;
+            let token = making::revoke(writer, actor, form.id::<TokenId>()?).await?;
             Ok(done(format!("Revoked token {}.", token.name)))
         }
         other => Err(Error::invalid(
-            "act",
+            "button",
             other,
             "add_user, link, disable, enable, role, end_session, make_token or revoke",
         )),

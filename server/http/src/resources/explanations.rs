@@ -27,7 +27,7 @@ impl From<explanation::BoundAtLimit> for BoundAtLimit {
 
 /// A tuned bound with its given value.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct GivenBound {
+pub(crate) struct BoundValue {
     /// Name of the bound.
     bound: String,
     /// What it limits, with its unit.
@@ -36,9 +36,9 @@ pub(crate) struct GivenBound {
     value: f64,
 }
 
-impl From<explanation::GivenBound> for GivenBound {
-    fn from(bound: explanation::GivenBound) -> Self {
-        let explanation::GivenBound { bound, meaning, value } = bound;
+impl From<explanation::BoundValue> for BoundValue {
+    fn from(bound: explanation::BoundValue) -> Self {
+        let explanation::BoundValue { bound, meaning, value } = bound;
         Self { bound, meaning, value }
     }
 }
@@ -48,7 +48,7 @@ impl From<explanation::GivenBound> for GivenBound {
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Conflict {
     /// The bounds. Empty if the fixed constraints conflict with each other.
-    bounds: Vec<GivenBound>,
+    bounds: Vec<BoundValue>,
     /// Bounds of other conflicts that were relaxed when this conflict was found.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(value_type = Option<Vec<String>>)]

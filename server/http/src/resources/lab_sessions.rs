@@ -53,13 +53,13 @@ pub(crate) struct WalkView {
     /// Who recorded the walk, and when.
     recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
-    after_unblinding: bool,
+    recorded_after_unblinding: bool,
 }
 
 impl From<lab::WalkView> for WalkView {
     fn from(walk: lab::WalkView) -> Self {
-        let lab::WalkView { number, condition, recorded, after_unblinding } = walk;
-        Self { number, condition, recorded: recorded.map(Into::into), after_unblinding }
+        let lab::WalkView { number, condition, recorded, recorded_after_unblinding } = walk;
+        Self { number, condition, recorded: recorded.map(Into::into), recorded_after_unblinding }
     }
 }
 

@@ -213,7 +213,7 @@ pub(crate) struct SolveAttempt {
     reason: String,
     /// Number of the local optimum in which it ended, counted from 1; null if it did not converge.
     #[schema(value_type = Option<u64>)]
-    basin: Option<usize>,
+    local_optimum: Option<usize>,
     /// Whether its gait is the result of the solve.
     chosen: bool,
 }
@@ -228,10 +228,20 @@ impl From<gait_optimizer::SolveAttempt> for SolveAttempt {
             objective,
             gait_rmse_rad,
             reason,
-            basin,
+            local_optimum,
             chosen,
         } = attempt;
-        Self { strategy, status: status.into(), iterations, seconds, objective, gait_rmse_rad, reason, basin, chosen }
+        Self {
+            strategy,
+            status: status.into(),
+            iterations,
+            seconds,
+            objective,
+            gait_rmse_rad,
+            reason,
+            local_optimum,
+            chosen,
+        }
     }
 }
 

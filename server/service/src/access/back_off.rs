@@ -131,7 +131,7 @@ impl PasswordAttempt {
         for count in self.counts.iter().filter(|count| count.name != OTHER_NAMES) {
             failures::forget(writer, &count.name, &count.source).await?;
         }
-        Ok(failures::uncount(writer, &self.origin.network).await?)
+        Ok(failures::remove(writer, &self.origin.network).await?)
     }
 }
 
@@ -172,7 +172,7 @@ fn normal(name: &str) -> String {
 /// Writes a row of the audit trail for the first attempts of a network, then for the 10th, 20th, 50th, 100th and so on,
 /// so that thousands of attempts do not fill the trail.
 async fn note(writer: &mut Writer, action: &str, name: &str, origin: &Origin, attempts: u32) -> Result<(), Error> {
-    if !is_noted(attempts) {
+    if !is_recorded(attempts) {
         return Ok(());
     }
     let detail = json!({ "name": name, "network": origin.network, "failed_attempts_of_network": attempts });
@@ -193,7 +193,7 @@ async fn prune(writer: &mut Writer, now: Instant) -> Result<(), Error> {
     Ok(())
 }
 
-fn is_noted(attempts: u32) -> bool {
+fn is_recorded(attempts: u32) -> bool {
     let mut leading = attempts;
     while leading >= 10 && leading.is_multiple_of(10) {
         leading /= 10;
@@ -216,8 +216,8 @@ mod tests {
 
     #[test]
     fn thirty_thousand_attempts_leave_few_rows_with_their_number() {
-        let noted: Vec<u32> = (1..=30_000).filter(|attempts| is_noted(*attempts)).collect();
-        assert_eq!(noted.len(), 16);
-        assert_eq!(noted.last(), Some(&20_000));
+        let recorded: Vec<u32> = (1..=30_000).filter(|attempts| is_recorded(*attempts)).collect();
+        assert_eq!(recorded.len(), 16);
+        assert_eq!(recorded.last(), Some(&20_000));
     }
 }

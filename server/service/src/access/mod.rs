@@ -18,4 +18,4 @@ pub use caller::Caller;
 pub use gaitwright_store::accessible_studies::{Principal, Reach};
 pub use gaitwright_store::rights::{Right, Rights, Role};
 pub use monotonic_clock::Clock;
-pub use permission::{Administer, Answer, Anything, Device, Permission, Rate, Read, Run};
+pub use permission::{Administer, Answer, AnyCaller, Device, Permission, Rate, Read, Run};

@@ -22,9 +22,9 @@ macro_rules! permission {
 
 /// Asks for no right: any signed-in user and any token qualify.
 #[derive(Debug, Clone, Copy)]
-pub struct Anything;
+pub struct AnyCaller;
 
-impl Permission for Anything {
+impl Permission for AnyCaller {
     const NEEDED: Option<Right> = None;
 }
 

@@ -31,21 +31,21 @@ static AT_ONCE: Semaphore = Semaphore::const_new(2);
 
 /// Queues of password checks, one for each network, so that many attempts from one network do not delay others.
 #[derive(Debug, Default)]
-pub struct Turns(Mutex<HashMap<String, Arc<Semaphore>>>);
+pub struct PasswordCheckQueues(Mutex<HashMap<String, Arc<Semaphore>>>);
 
-impl Turns {
-    /// Runs [`aside`] after earlier checks of the same network.
+impl PasswordCheckQueues {
+    /// Runs [`on_blocking_thread`] after earlier checks of the same network.
     ///
     /// # Errors
     /// If the work panics.
-    pub async fn aside<T: Send + 'static>(
+    pub async fn run<T: Send + 'static>(
         &self,
         network: &str,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Error> {
         let line = Arc::clone(self.networks().entry(network.to_owned()).or_insert_with(|| Semaphore::new(1).into()));
         let turn = Arc::clone(&line).acquire_owned().await.map_err(|e| Error::Internal(e.to_string()))?;
-        let done = aside(move || {
+        let done = on_blocking_thread(move || {
             let _turn = turn;
             work()
         })
@@ -66,7 +66,7 @@ impl Turns {
 ///
 /// # Errors
 /// If the work panics.
-pub async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
+pub async fn on_blocking_thread<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
     let failed = |reason: String| Error::Internal(format!("password hashing failed: {reason}"));
     let turn = AT_ONCE.acquire().await.map_err(|e| failed(e.to_string()))?;
     // The permit ends with the work, even if the caller disconnects earlier.
@@ -80,7 +80,7 @@ pub async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static)
     done.await.map_err(|e| failed(e.to_string()))
 }
 
-/// The stored hash of a user's password. Takes tens of milliseconds on purpose, so call it in [`aside`].
+/// The stored hash of a user's password. Takes tens of milliseconds on purpose, so call it in [`on_blocking_thread`].
 ///
 /// # Errors
 /// [`Error::Invalid`] for a password that is too short, too long or easily guessed.

@@ -111,7 +111,7 @@ async fn renew(writer: &mut Writer, user: &User, by_link: bool, from: &SignInOri
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn must_say_password(db: &mut Connection, user: &User, session: Option<&str>) -> Result<bool, Error> {
+pub async fn must_confirm_password(db: &mut Connection, user: &User, session: Option<&str>) -> Result<bool, Error> {
     if !user.has_password {
         return Ok(false);
     }
@@ -174,7 +174,7 @@ pub async fn live(
 
 /// The result of looking up a secret.
 #[derive(Debug)]
-pub enum Recognised {
+pub enum SignInLookup {
     /// The secret is unknown, or was ended.
     Nobody,
     /// The session or token has expired, which must be recorded with [`note_ended`].
@@ -197,46 +197,46 @@ pub async fn of_session(
     session: &str,
     limits: SessionLimits,
     now: Instant,
-) -> Result<Recognised, Error> {
-    let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(Recognised::Nobody) };
+) -> Result<SignInLookup, Error> {
+    let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(SignInLookup::Nobody) };
     if limits.has_ended(&found, now) {
-        return Ok(Recognised::Ended(Some(found.id)));
+        return Ok(SignInLookup::Ended(Some(found.id)));
     }
     let user = users::get(db, found.user_id).await?;
     if user.disabled_at.is_some() {
-        return Ok(Recognised::Nobody);
+        return Ok(SignInLookup::Nobody);
     }
     let due = now.seconds_since(found.seen_at) > SEEN_EVERY_SECONDS.min(limits.idle_seconds / 4.0);
-    Ok(Recognised::Known { caller: Caller::person(user.id, &user.name, user.role), seen: due.then_some(found.id) })
+    Ok(SignInLookup::Known { caller: Caller::person(user.id, &user.name, user.role), seen: due.then_some(found.id) })
 }
 
 /// Looks up the secret of a token.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<Recognised, Error> {
-    let Some(found) = tokens::by_hash(db, &secret::hash(token)).await? else { return Ok(Recognised::Nobody) };
+pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<SignInLookup, Error> {
+    let Some(found) = tokens::by_hash(db, &secret::hash(token)).await? else { return Ok(SignInLookup::Nobody) };
     if let Some(expires_at) = found.expires_at.filter(|expires_at| *expires_at <= now) {
-        let noted = gaitwright_store::access_clock::latest(db).await?.is_some_and(|latest| latest >= expires_at);
-        return Ok(if noted { Recognised::Nobody } else { Recognised::Ended(None) });
+        let is_recorded = gaitwright_store::access_clock::latest(db).await?.is_some_and(|latest| latest >= expires_at);
+        return Ok(if is_recorded { SignInLookup::Nobody } else { SignInLookup::Ended(None) });
     }
-    Ok(Recognised::Known { caller: Caller::token(found.id, &found.name, &found.scopes), seen: None })
+    Ok(SignInLookup::Known { caller: Caller::token(found.id, &found.name, &found.scopes), seen: None })
 }
 
 /// Records the last activity of a session.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn seen(writer: &mut Writer, session: SessionId, now: Instant) -> Result<(), Error> {
+pub async fn record_activity(writer: &mut Writer, session: SessionId, now: Instant) -> Result<(), Error> {
     gaitwright_store::access_clock::reach(writer, now).await?;
-    Ok(sessions::seen(writer, session, now).await?)
+    Ok(sessions::record_activity(writer, session, now).await?)
 }
 
 /// Records that a session or token has expired, so that it stays expired when the machine's clock is set back.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn note_ended(writer: &mut Writer, session: Option<SessionId>, now: Instant) -> Result<(), Error> {
+pub async fn record_expiry(writer: &mut Writer, session: Option<SessionId>, now: Instant) -> Result<(), Error> {
     gaitwright_store::access_clock::reach(writer, now).await?;
     if let Some(session) = session {
         sessions::end(writer, session, now).await?;

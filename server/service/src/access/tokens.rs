@@ -75,7 +75,7 @@ pub async fn revoke(writer: &mut Writer, actor: &Actor, id: TokenId) -> Result<T
 /// # Errors
 /// Errors of the database.
 pub(super) async fn revoke_all_of(writer: &mut Writer, actor: &Actor, user: UserId) -> Result<(), Error> {
-    for token in tokens::created_by(writer, user).await? {
+    for token in tokens::created_by_user(writer, user).await? {
         revoke(writer, actor, token.id).await?;
     }
     Ok(())

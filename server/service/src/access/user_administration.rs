@@ -49,7 +49,7 @@ pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewUser) -> Result<Us
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn way_in(writer: &mut Writer) -> Result<User, Error> {
+pub async fn operator_administrator(writer: &mut Writer) -> Result<User, Error> {
     let all = users::all(writer).await?;
     let mut admins: Vec<&User> =
         all.iter().filter(|user| user.role == Role::Admin && user.disabled_at.is_none()).collect();
@@ -149,7 +149,7 @@ enum WayIn {
 async fn keep_an_administrator(db: &mut Connection, lost: UserId) -> Result<(), Error> {
     let (mut own, mut others) = (WayIn::Never, None);
     for user in users::all(db).await?.iter().filter(|user| user.role == Role::Admin && user.disabled_at.is_none()) {
-        let way_in = if user.has_password {
+        let operator_administrator = if user.has_password {
             WayIn::Password
         } else if sessions::live(db, Some(user.id)).await?.is_empty() {
             WayIn::Never
@@ -157,9 +157,9 @@ async fn keep_an_administrator(db: &mut Connection, lost: UserId) -> Result<(), 
             WayIn::Session
         };
         if user.id == lost {
-            own = way_in;
+            own = operator_administrator;
         } else {
-            others = others.max(Some(way_in));
+            others = others.max(Some(operator_administrator));
         }
     }
     if others >= Some(own) {

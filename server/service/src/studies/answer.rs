@@ -3,7 +3,7 @@
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
 use crate::studies::walkable;
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::Judgement;
@@ -76,10 +76,16 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
         PairAnswer::NoDifference => Judgement::NoDifference,
     };
     let fields = ("trial_a", "trial_b");
-    let statement =
-        GivenJudgement { study: study.id, pair: (a, b), fields, judgement, attribution, again: Again::Refused };
-    let heard = preference::record(writer, statement).await?;
-    let id = heard.ok_or_else(|| Error::Internal("a preference did not reach the learner".to_owned()))?;
+    let statement = AttributedJudgement {
+        study: study.id,
+        pair: (a, b),
+        fields,
+        judgement,
+        attribution,
+        second_answer: SecondAnswer::Refused,
+    };
+    let feedback_id = preference::record(writer, statement).await?;
+    let id = feedback_id.ok_or_else(|| Error::Internal("a preference did not reach the learner".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail =
         json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": attribution.author });

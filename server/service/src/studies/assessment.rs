@@ -2,7 +2,7 @@
 //! unsafe).
 
 use super::answer::attribution;
-use super::preference::{self, Again, GivenJudgement};
+use super::preference::{self, AttributedJudgement, SecondAnswer};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -49,13 +49,13 @@ pub async fn give(
 ) -> Result<AssessmentId, Error> {
     let study = studies::get(writer, study).await?;
     let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
-    let statement = GivenJudgement {
+    let statement = AttributedJudgement {
         study: study.id,
         pair: (new.trial_a, new.trial_b),
         fields: ("trial_a", "trial_b"),
         judgement: new.answer.into(),
         attribution,
-        again: Again::Refused,
+        second_answer: SecondAnswer::Refused,
     };
     let id = write(writer, statement).await?;
     let (trial_a, trial_b, author) = (new.trial_a, new.trial_b, attribution.author);
@@ -69,15 +69,22 @@ pub async fn give(
 ///
 /// # Errors
 /// As [`preference::record`].
-pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<AssessmentId, Error> {
-    let heard = preference::record(writer, statement).await?;
-    let GivenJudgement { study, pair, judgement, attribution, .. } = statement;
+pub(super) async fn write(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<AssessmentId, Error> {
+    let feedback_id = preference::record(writer, statement).await?;
+    let AttributedJudgement { study, pair, judgement, attribution, .. } = statement;
     let id = assessments::insert(
         writer,
-        &assessments::UnsavedAssessment { study, pair, answer: judgement.try_into()?, attribution, feedback: heard },
+        &assessments::UnsavedAssessment {
+            study,
+            pair,
+            answer: judgement.try_into()?,
+            attribution,
+            feedback: feedback_id,
+        },
     )
     .await?;
-    events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "assessment_id": id })).await?;
+    events::append(writer, study, "feedback_given", &json!({ "feedback_id": feedback_id, "assessment_id": id }))
+        .await?;
     Ok(id)
 }
 
@@ -108,9 +115,9 @@ pub async fn retract(
     if !assessments::retract(writer, id, author, reason).await? {
         return Err(Error::conflict("This assessment was already retracted."));
     }
-    if let Some(heard) = assessment.feedback_id {
-        let heard = feedback::get(writer, heard).await?;
-        feedback::retract(writer, &heard, author, reason).await?;
+    if let Some(feedback_id) = assessment.feedback_id {
+        let row = feedback::get(writer, feedback_id).await?;
+        feedback::retract(writer, &row, author, reason).await?;
     }
     events::append(writer, assessment.study_id, "feedback_retracted", &json!({ "assessment_id": id })).await?;
     let detail = json!({ "study": assessment.study_id, "author": author, "reason": reason });

@@ -34,14 +34,14 @@ pub struct Belief {
     /// How many answers the posterior agrees with.
     pub agreement: Agreement,
     /// The answers that it does not agree with, the most surprising first.
-    pub surprises: Vec<Surprise>,
+    pub unexpected_answers: Vec<UnexpectedAnswer>,
 }
 
 /// An answer that the posterior does not agree with.
 #[derive(Debug)]
-pub struct Surprise {
+pub struct UnexpectedAnswer {
     /// The answer.
-    pub given: FeedbackRow,
+    pub answer: FeedbackRow,
     /// For a preference or suggestion, the probability that its order of utilities is right; `None` for a tie.
     pub probability: Option<f64>,
 }
@@ -58,17 +58,17 @@ impl Belief {
             main_effects: main_effects.collect::<Result<_, _>>()?,
             gaits: gait_beliefs(snapshot, &posterior)?,
             agreement: posterior.agreement(),
-            surprises: surprises(snapshot, &posterior)?,
+            unexpected_answers: unexpected_answers(snapshot, &posterior)?,
             posterior,
         })
     }
 }
 
 /// The comparisons that the posterior does not agree with, the most surprising first; ties last.
-fn surprises(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<Surprise>, LearnerError> {
-    let mut surprises = Vec::new();
+fn unexpected_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<UnexpectedAnswer>, LearnerError> {
+    let mut unexpected_answers = Vec::new();
     for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
-        let Some(feedback) = snapshot.heard(&row.content) else { continue };
+        let Some(feedback) = snapshot.feedback_for_learner(&row.content) else { continue };
         let order = match feedback {
             Feedback::Label { .. } => continue,
             Feedback::Preference { winner, loser } => Some((winner, loser)),
@@ -82,10 +82,10 @@ fn surprises(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<Surp
             Some((winner, loser)) => Some(posterior.difference(winner, loser)?.probability_above_zero()),
             None => None,
         };
-        surprises.push(Surprise { given: row.clone(), probability });
+        unexpected_answers.push(UnexpectedAnswer { answer: row.clone(), probability });
     }
-    surprises.sort_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
-    Ok(surprises)
+    unexpected_answers.sort_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
+    Ok(unexpected_answers)
 }
 
 /// What is kept of the studies used last, the one used last at the end.

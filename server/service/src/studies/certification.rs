@@ -5,7 +5,7 @@ use crate::workers::Certify;
 use gait_optimizer::Gait;
 use gait_optimizer::certificate::{Certificate, certify};
 use gaitwright_compute::OnPool;
-use gaitwright_compute::priority::behind_solves;
+use gaitwright_compute::priority::run_below_solves;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{
@@ -82,18 +82,13 @@ pub async fn certificate(store: &mut Store, certification: Certification) -> Res
 ///
 /// # Errors
 /// As [`begin`] and [`certificate`].
-pub async fn aside(
-    store: &mut Store,
-    actor: &Actor,
-    trial: TrialId,
-    certifier: &Arc<dyn Certify>,
-) -> Result<(), Error> {
+pub async fn run(store: &mut Store, actor: &Actor, trial: TrialId, certifier: &Arc<dyn Certify>) -> Result<(), Error> {
     let Certification::Ahead(gait) = begin(&mut *store.read().await?, trial).await? else { return Ok(()) };
     let gait = store.compute(move |pool| gait.unpack(pool)).await??;
     let certifier = Arc::clone(certifier);
-    let told = behind_solves("certifier", move || certifier.certify(&gait))
+    let result = run_below_solves("certifier", move || certifier.certify(&gait))
         .map_err(|e| Error::Internal(format!("cannot start a thread for a certification: {e}")))?;
-    let found = match told.await {
+    let found = match result.await {
         Ok(Ok(certificate)) => certificate,
         Ok(Err(reason)) => Certificate::failed_because(&reason.to_string()),
         Err(_) => Certificate::failed_because("The certification was aborted."),
@@ -113,7 +108,7 @@ pub async fn record(
     trial: TrialId,
     certificate: &Certificate,
 ) -> Result<(), Error> {
-    if certificates::keep(writer, trial, certificate).await? {
+    if certificates::insert(writer, trial, certificate).await? {
         let study = trials::get(writer, trial).await?.study_id;
         let payload = json!({ "trial_id": trial, "passed": certificate.passed });
         events::append(writer, study, "gait_certified", &payload).await?;

@@ -47,7 +47,7 @@ impl CertificateState {
 
 /// The certificate of the best gait of a study, and an alternative if it failed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Judged {
+pub struct BestCertification {
     /// State of the certificate of the best gait.
     pub certificate: CertificateState,
     /// Reasons if the certificate failed.
@@ -60,7 +60,7 @@ pub struct Judged {
     pub certifying: bool,
 }
 
-impl Judged {
+impl BestCertification {
     /// Sets whether the service is certifying the best gait without a certificate.
     pub fn certified_by_service(&mut self, certifying: bool) {
         self.certifying = certifying;
@@ -74,8 +74,8 @@ impl Judged {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Judged> {
-    let mut judged = Judged::default();
+pub async fn of_ranking(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<BestCertification> {
+    let mut certification = BestCertification::default();
     for (place, &trial) in ranking.iter().enumerate() {
         let certificate = match certificates::passed(db, trial).await? {
             Some(true) => CertificateState::Passed,
@@ -83,24 +83,24 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
             None => CertificateState::NotCertified,
         };
         if place == 0 {
-            judged.certificate = certificate;
+            certification.certificate = certificate;
         }
         match certificate {
             CertificateState::Passed => {
-                judged.passing = Some(trial).filter(|_| place > 0);
+                certification.passing = Some(trial).filter(|_| place > 0);
                 break;
             }
             CertificateState::Failed => {}
-            _ if place < MOST_CERTIFIED && gaits::is_here(db, trial).await? => {
-                judged.without_certificate.get_or_insert(trial);
+            _ if place < MOST_CERTIFIED && gaits::exists(db, trial).await? => {
+                certification.without_certificate.get_or_insert(trial);
             }
             _ => {}
         }
     }
-    if let Some(&best) = ranking.first().filter(|_| judged.certificate == CertificateState::Failed) {
-        judged.failures = certificates::find(db, best).await?.map(|found| found.failures).unwrap_or_default();
+    if let Some(&best) = ranking.first().filter(|_| certification.certificate == CertificateState::Failed) {
+        certification.failures = certificates::find(db, best).await?.map(|found| found.failures).unwrap_or_default();
     }
-    Ok(judged)
+    Ok(certification)
 }
 
 /// The next gait to certify. `None` if one has passed, or if the first [`MOST_CERTIFIED`] failed. Skips the gaits in
@@ -116,7 +116,7 @@ pub async fn next_to_certify(
     for &trial in ranking.iter().take(MOST_CERTIFIED) {
         match certificates::passed(db, trial).await? {
             Some(true) => return Ok(None),
-            None if !refused.contains(&trial) && gaits::is_here(db, trial).await? => return Ok(Some(trial)),
+            None if !refused.contains(&trial) && gaits::exists(db, trial).await? => return Ok(Some(trial)),
             Some(false) | None => {}
         }
     }
@@ -153,7 +153,7 @@ pub async fn certify(
     actor: &Actor,
     snapshot: StudySnapshot,
     beliefs: Arc<Beliefs>,
-) -> Result<Judged, Error> {
+) -> Result<BestCertification, Error> {
     let rank = move |pool: &OnPool| trial_choice::ranking_to_show(pool, &snapshot, &beliefs);
     let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
     let mut refused = BTreeSet::new();
@@ -174,5 +174,5 @@ pub async fn certify(
         certification::record(&mut writer, actor, trial, &certificate).await?;
         commit(writer).await?;
     }
-    Ok(judged(&mut *store.read().await?, &ranking).await?)
+    Ok(of_ranking(&mut *store.read().await?, &ranking).await?)
 }

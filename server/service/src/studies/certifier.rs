@@ -21,13 +21,13 @@ pub(super) struct Certifier {
     certify: Arc<dyn Certify>,
     beliefs: Arc<Beliefs>,
     /// The last event that was searched for ended studies.
-    heard: AtomicI64,
+    newest_event: AtomicI64,
 }
 
 impl Certifier {
     /// For the gaits of a record.
     pub(super) fn new(store: Store, certify: Arc<dyn Certify>, beliefs: Arc<Beliefs>) -> Self {
-        Self { store, certify, beliefs, heard: AtomicI64::new(0) }
+        Self { store, certify, beliefs, newest_event: AtomicI64::new(0) }
     }
 }
 
@@ -47,9 +47,9 @@ impl TrialJob for Certifier {
     }
 
     async fn ended(&self) -> StoreResult<Vec<StudyId>> {
-        let heard = self.heard.load(Ordering::Relaxed);
-        let (ended, newest) = events::of_ended_studies(&mut *self.store.read().await?, heard).await?;
-        self.heard.store(newest, Ordering::Relaxed);
+        let newest_event = self.newest_event.load(Ordering::Relaxed);
+        let (ended, newest) = events::of_ended_studies(&mut *self.store.read().await?, newest_event).await?;
+        self.newest_event.store(newest, Ordering::Relaxed);
         Ok(ended)
     }
 
@@ -75,6 +75,6 @@ impl TrialJob for Certifier {
 
     /// A malformed gait gets a failed certificate that says why.
     async fn carry_out(&self, trial: TrialId, (): ()) -> Result<(), Error> {
-        certification::aside(&mut self.store.clone(), &Actor::program(), trial, &self.certify).await
+        certification::run(&mut self.store.clone(), &Actor::program(), trial, &self.certify).await
     }
 }

@@ -25,24 +25,24 @@ pub struct Done {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long or does not print, [`Error::Conflict`] with the possible
 /// commands.
-pub async fn act(
+pub async fn transition(
     writer: &mut Writer,
     actor: &Actor,
     id: StudyId,
-    act: StudyTransition,
+    transition: StudyTransition,
     reason: &str,
 ) -> Result<Done, Error> {
     printable::note("reason", reason, 2000)?;
     let study = studies::get(writer, id).await?;
-    let cancelled = if act == StudyTransition::Stop {
+    let cancelled = if transition == StudyTransition::Stop {
         stop(writer, &study, reason).await?
     } else {
-        move_on(writer, &study, act, reason).await?;
+        change_state(writer, &study, transition, reason).await?;
         Vec::new()
     };
     let changed = studies::get(writer, id).await?;
     let detail = json!({ "from": study.state, "to": changed.state, "reason": reason });
-    audit::append(writer, actor, &format!("study.{}", act.as_str()), &format!("study {id}"), &detail).await?;
+    audit::append(writer, actor, &format!("study.{}", transition.as_str()), &format!("study {id}"), &detail).await?;
     Ok(Done { study: changed, cancelled })
 }
 
@@ -56,12 +56,17 @@ pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Re
         trial_result::cancelled(writer, trial.id, "The study was stopped.").await?;
         cancelled.push(trial.id);
     }
-    move_on(writer, study, StudyTransition::Stop, reason).await?;
+    change_state(writer, study, StudyTransition::Stop, reason).await?;
     Ok(cancelled)
 }
 
-async fn move_on(writer: &mut Writer, study: &Study, act: StudyTransition, reason: &str) -> Result<(), Error> {
-    let state = lifecycle::after(study.state, act)?;
+async fn change_state(
+    writer: &mut Writer,
+    study: &Study,
+    transition: StudyTransition,
+    reason: &str,
+) -> Result<(), Error> {
+    let state = lifecycle::after(study.state, transition)?;
     if !studies::set_state(writer, study, state, reason).await? {
         return Err(has_changed());
     }

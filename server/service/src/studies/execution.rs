@@ -20,7 +20,7 @@ pub const MOST_WALKS: u32 = 1000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schema(as = NewExecutionReport)]
-pub struct WalksAsked {
+pub struct NewExecutionReport {
     /// Number of simulated walks on each kind of ground, 1 to 1000.
     #[schema(minimum = 1, maximum = 1000)]
     pub walks: u32,
@@ -28,14 +28,14 @@ pub struct WalksAsked {
     pub seed: u64,
 }
 
-impl Default for WalksAsked {
+impl Default for NewExecutionReport {
     fn default() -> Self {
         let ExecutionOptions { walks, seed, .. } = ExecutionOptions::default();
         Self { walks, seed }
     }
 }
 
-impl WalksAsked {
+impl NewExecutionReport {
     /// The options of the simulation.
     ///
     /// # Errors
@@ -58,11 +58,11 @@ pub enum Simulation {
     /// This process has nothing to say of it.
     None,
     /// Queued.
-    Queued(WalksAsked),
+    Queued(NewExecutionReport),
     /// The walks are being simulated.
     Running {
         /// The request.
-        asked: WalksAsked,
+        asked: NewExecutionReport,
         /// Number of simulated walks so far.
         done: u32,
         /// Number of walks, over all grounds.
@@ -76,7 +76,7 @@ pub enum Simulation {
 
 impl Simulation {
     /// The request that is queued or running.
-    pub fn open(&self) -> Option<WalksAsked> {
+    pub fn open(&self) -> Option<NewExecutionReport> {
         match self {
             Self::Queued(asked) | Self::Running { asked, .. } => Some(*asked),
             Self::None | Self::Cancelled | Self::Failed(_) => None,
@@ -116,13 +116,13 @@ fn why_not(trial: &Trial) -> Option<String> {
 pub(super) async fn record(
     store: &Store,
     id: TrialId,
-    asked: WalksAsked,
+    asked: NewExecutionReport,
     report: ExecutionReport,
 ) -> Result<(), Error> {
     let mut writer = store.write().await?;
     let trial = trials::get(&mut writer, id).await?;
     consents::may_be_shown(&mut writer, trial.study_id).await?;
-    let WalksAsked { walks, seed } = asked;
+    let NewExecutionReport { walks, seed } = asked;
     let actor = Actor::program();
     let program = actor.as_str().to_owned();
     let simulated = GaitSimulated { trial_id: id, number: trial.number, walks, seed, program, report };

@@ -1,10 +1,10 @@
 //! Requests for the execution report of one trial's gait.
 
-use super::execution::{WalksAsked, gait_of, newest};
+use super::execution::{NewExecutionReport, gait_of, newest};
 use super::scheduler::Scheduler;
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::execution_reports::{self, KeptReport};
+use gaitwright_store::execution_reports::{self, StoredReport};
 use gaitwright_store::{TrialId, Writer, consents, trials};
 use serde_json::json;
 
@@ -19,18 +19,18 @@ pub async fn ask(
     scheduler: &Scheduler,
     actor: &Actor,
     id: TrialId,
-    asked: WalksAsked,
+    asked: NewExecutionReport,
 ) -> Result<(), Error> {
     asked.options()?;
     let open = scheduler.simulating(id).open();
-    if let Some(WalksAsked { walks, seed }) = open.filter(|open| *open != asked) {
+    if let Some(NewExecutionReport { walks, seed }) = open.filter(|open| *open != asked) {
         return Err(Error::conflict(format!(
             "{walks} walks with seed {seed} are already queued or running for this gait. Wait for them, or cancel the job execution_report-{id}."
         )));
     }
     let study = trials::get(writer, id).await?.study_id;
     consents::may_be_shown(writer, study).await?;
-    let newest = newest(writer, id).await?.map(|KeptReport { simulated, .. }| simulated);
+    let newest = newest(writer, id).await?.map(|StoredReport { simulated, .. }| simulated);
     let exists = newest.is_some_and(|newest| (newest.walks, newest.seed) == (asked.walks, asked.seed));
     if !exists {
         gait_of(writer, id).await?;

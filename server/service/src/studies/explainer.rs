@@ -2,7 +2,7 @@
 //! certified.
 
 use super::explanation::{self, Elapsed, ExplanationEffort};
-use super::trial_jobs::{TrialJob, behind};
+use super::trial_jobs::{TrialJob, run_cancellable};
 use super::trial_queue::TrialJobState;
 use crate::error::Error;
 use crate::workers::Explain;
@@ -89,7 +89,7 @@ impl TrialJob for Explainer {
         let packed = explanation::unexplained(&mut *store.read().await?, trial).await?;
         let (solve, problem) = store.compute(move |pool| packed.unpack(pool)).await??;
         let explain = Arc::clone(&self.explain);
-        let found = behind("explainer", move |cancel| explain.explain(&solve, cancel)).await??;
+        let found = run_cancellable("explainer", move |cancel| explain.explain(&solve, cancel)).await??;
         let nothing = || Error::Internal("the explanation ended without a result".to_owned());
         explanation::record(&self.store, trial, &problem, &found.ok_or_else(nothing)?).await?;
         self.durations.lock().unwrap_or_else(PoisonError::into_inner).add(since.elapsed().as_secs());

@@ -2,12 +2,12 @@
 
 use super::solve_input::{PackedInput, SolveInput};
 use crate::error::Error;
-use crate::workers::Unexplained;
+use crate::workers::SolveToExplain;
 use gait_optimizer::explanation::Explanation;
 use gait_optimizer::{SolveStatus, Violation, WarmStart};
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::explanations::{self, Explained};
+use gaitwright_store::explanations::{self, StoredExplanation};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, Packed, Store, TrialId, Writer, commit, consents, events, gaits, studies, trials};
 use serde_json::json;
@@ -16,7 +16,7 @@ use serde_json::json;
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExplanationState {
     /// The explanation is on record.
-    Made(Box<Explained>),
+    Made(Box<StoredExplanation>),
     /// The explanation is being computed or was requested.
     BeingMade,
     /// The explanation follows those of other trials of the study. A request moves it ahead.
@@ -118,12 +118,12 @@ impl PackedSolve {
     ///
     /// # Errors
     /// [`Error::Store`] if the stored outcome is damaged.
-    pub(super) fn unpack(self, pool: &OnPool) -> Result<(Unexplained, String), Error> {
+    pub(super) fn unpack(self, pool: &OnPool) -> Result<(SolveToExplain, String), Error> {
         let Self { status, violations, last, input } = self;
         let input = input.unpack(pool)?;
         let file = input.to_json()?;
         let SolveInput { problem, options, .. } = input;
-        Ok((Unexplained { problem, options, status, violations, last: last.unpack(pool)? }, file))
+        Ok((SolveToExplain { problem, options, status, violations, last: last.unpack(pool)? }, file))
     }
 }
 
@@ -145,7 +145,7 @@ pub(super) async fn unexplained(db: &mut Connection, id: TrialId) -> Result<Pack
 /// [`Error::Conflict`] if the subject withdrew consent; errors of the database.
 pub(super) async fn record(store: &Store, id: TrialId, problem: &str, explanation: &Explanation) -> Result<(), Error> {
     let mut writer = store.write().await?;
-    if explanations::keep(&mut writer, id, problem, explanation).await? {
+    if explanations::insert(&mut writer, id, problem, explanation).await? {
         let trial = trials::get(&mut writer, id).await?;
         let relaxed_bound = explanation.relief().map(|relaxation| &relaxation.bound);
         let payload = json!({ "trial_id": id, "number": trial.number, "relaxed_bound": relaxed_bound });
@@ -170,7 +170,7 @@ async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, 
             "Trial {number} is {state}. Only a trial that did not converge can be explained."
         )));
     };
-    if !gaits::is_here(db, trial.id).await? {
+    if !gaits::exists(db, trial.id).await? {
         return Err(Error::conflict(format!("The last iterate of trial {number} was not kept.")));
     }
     Ok(status)

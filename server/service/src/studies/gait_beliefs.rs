@@ -20,7 +20,7 @@ pub struct GaitBelief {
 
 /// Whether a difference of utilities, the larger less the smaller, can be told from none: it is larger than its standard
 /// deviation, so that the order is right with a probability of at least 84 %.
-pub fn is_told(difference: &Prediction) -> bool {
+pub fn is_distinguishable(difference: &Prediction) -> bool {
     difference.mean > difference.standard_deviation
 }
 
@@ -59,7 +59,11 @@ mod tests {
     #[test]
     fn difference_below_its_standard_deviation_is_not_told() {
         let difference = |mean| Prediction { mean, standard_deviation: 0.5 };
-        assert!(is_told(&difference(0.51)) && !is_told(&difference(0.5)) && !is_told(&difference(0.0)));
+        assert!(
+            is_distinguishable(&difference(0.51))
+                && !is_distinguishable(&difference(0.5))
+                && !is_distinguishable(&difference(0.0))
+        );
         assert!(difference(0.51).probability_above_zero() > 0.84 && difference(0.49).probability_above_zero() < 0.84);
     }
 }

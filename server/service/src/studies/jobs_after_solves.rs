@@ -2,7 +2,7 @@
 
 use super::belief::Beliefs;
 use super::certifier::Certifier;
-use super::execution::{Simulation, WalksAsked};
+use super::execution::{NewExecutionReport, Simulation};
 use super::explainer::Explainer;
 use super::explanation::ExplanationEffort;
 use super::job::{JobId, JobState};
@@ -37,7 +37,7 @@ impl JobsAfterSolves {
     pub(super) fn certify_best_of(&self, study: StudyId, next: TrialId) -> bool {
         let certifiable = self.may_be_certified(next);
         if certifiable {
-            self.certificates.take_up(study);
+            self.certificates.queue_ended(study);
         }
         certifiable
     }
@@ -52,8 +52,8 @@ impl JobsAfterSolves {
     }
 
     /// Requests the execution report of one gait; `None` if it exists already.
-    pub(super) fn simulate(&self, trial: TrialId, asked: Option<WalksAsked>) {
-        self.simulations.again(trial);
+    pub(super) fn simulate(&self, trial: TrialId, asked: Option<NewExecutionReport>) {
+        self.simulations.forget_end(trial);
         if let Some(asked) = asked {
             self.simulations.ask(trial, asked.into());
         }

@@ -80,8 +80,8 @@ pub async fn suggest(
     }
     if snapshot.open() >= plan.parallel_trials as usize {
         return Err(Error::conflict(match snapshot.open() {
-            1 => "A trial is open. Report its outcome first.".to_owned(),
-            open => format!("{open} trials are open. Report their outcomes first."),
+            1 => "A trial is open, and its script has not reported the outcome yet.".to_owned(),
+            open => format!("{open} trials are open, and their scripts have not reported the outcomes yet."),
         }));
     }
     let choose = move |pool: &OnPool| {
@@ -118,7 +118,7 @@ pub async fn not_reported(db: &mut Connection, trial: TrialId) -> Result<(), Err
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn give_out(
+pub async fn assign(
     writer: &mut Writer,
     caller: &Caller,
     script: &str,
@@ -139,7 +139,7 @@ pub async fn give_out(
         return Ok(None);
     }
     let Some(id) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
-    trials::give_to(writer, id, script).await?;
+    trials::assign(writer, id, script).await?;
     let payload = json!({ "trial_id": id, "number": new.number, "state": TrialState::Running });
     events::append(writer, study, "trial_started", &payload).await?;
     let detail = json!({ "study": study, "script": script, "number": new.number });

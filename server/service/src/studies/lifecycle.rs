@@ -53,12 +53,12 @@ impl StudyTransition {
 
 /// The transition is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("Cannot {} a study that is {}. Possible now: {}.", act.as_str(), in_words(*state), possible(*state))]
+#[error("Cannot {} a study that is {}. Possible now: {}.", transition.as_str(), in_words(*state), possible(*state))]
 pub struct NotPossible {
     /// The state of the study.
     pub state: StudyState,
     /// The requested transition.
-    pub act: StudyTransition,
+    pub transition: StudyTransition,
 }
 
 impl From<NotPossible> for Error {
@@ -76,9 +76,9 @@ pub fn in_words(state: StudyState) -> &'static str {
 ///
 /// # Errors
 /// [`NotPossible`] if the state does not allow the transition.
-pub fn after(state: StudyState, act: StudyTransition) -> Result<StudyState, NotPossible> {
+pub fn after(state: StudyState, transition: StudyTransition) -> Result<StudyState, NotPossible> {
     use StudyState::{Draft, Finished, Paused, Running, Stopped, Waiting};
-    match (state, act) {
+    match (state, transition) {
         (Draft, StudyTransition::Start)
         | (Waiting, StudyTransition::Answered)
         | (Paused, StudyTransition::Resume)
@@ -87,12 +87,12 @@ pub fn after(state: StudyState, act: StudyTransition) -> Result<StudyState, NotP
         (Running | Waiting, StudyTransition::Pause) => Ok(Paused),
         (Running | Waiting, StudyTransition::Finish) => Ok(Finished),
         (Draft | Running | Waiting | Paused, StudyTransition::Stop) => Ok(Stopped),
-        _ => Err(NotPossible { state, act }),
+        _ => Err(NotPossible { state, transition }),
     }
 }
 
 /// The transitions that people can request in this state.
-pub fn acts_of_people(state: StudyState) -> Vec<StudyTransition> {
+pub fn transitions_for_people(state: StudyState) -> Vec<StudyTransition> {
     [
         StudyTransition::Start,
         StudyTransition::Pause,
@@ -101,12 +101,12 @@ pub fn acts_of_people(state: StudyState) -> Vec<StudyTransition> {
         StudyTransition::Extend,
     ]
     .into_iter()
-    .filter(|act| after(state, *act).is_ok())
+    .filter(|transition| after(state, *transition).is_ok())
     .collect()
 }
 
 fn possible(state: StudyState) -> String {
-    acts_of_people(state).into_iter().map(StudyTransition::as_str).collect::<Vec<_>>().join(", ")
+    transitions_for_people(state).into_iter().map(StudyTransition::as_str).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -114,26 +114,26 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn any_act() -> impl Strategy<Value = StudyTransition> {
+    fn any_transition() -> impl Strategy<Value = StudyTransition> {
         (0..StudyTransition::ALL.len()).prop_map(|i| StudyTransition::ALL[i])
     }
 
     proptest! {
         #[test]
-        fn ended_study_resumes_only_when_extended(acts in proptest::collection::vec(any_act(), 0..40)) {
+        fn ended_study_resumes_only_when_extended(transitions in proptest::collection::vec(any_transition(), 0..40)) {
             let mut state = StudyState::Draft;
-            for act in acts {
+            for transition in transitions {
                 let before = state;
-                match after(state, act) {
+                match after(state, transition) {
                     Ok(next) => {
                         prop_assert_ne!(next, before);
                         prop_assert_ne!(next, StudyState::Draft);
                         if matches!(before, StudyState::Finished | StudyState::Stopped) {
-                            prop_assert_eq!(act, StudyTransition::Extend);
+                            prop_assert_eq!(transition, StudyTransition::Extend);
                         }
                         state = next;
                     }
-                    Err(refused) => prop_assert_eq!(refused, NotPossible { state: before, act }),
+                    Err(refused) => prop_assert_eq!(refused, NotPossible { state: before, transition }),
                 }
             }
         }
@@ -149,7 +149,7 @@ mod tests {
             StudyState::Finished,
             StudyState::Stopped,
         ] {
-            assert!(!acts_of_people(state).is_empty(), "{state:?}");
+            assert!(!transitions_for_people(state).is_empty(), "{state:?}");
         }
     }
 }

@@ -96,13 +96,13 @@ pub async fn restrict(writer: &mut Writer, caller: &Caller, study: StudyId, rest
         members::set_restricted(writer, study, restricted, caller.actor.as_str()).await?;
         let detail = json!({ "restricted": restricted });
         audit::append(writer, &caller.actor, "study.restrict", &format!("study {study}"), &detail).await?;
-        keep_in(writer, caller, study).await?;
+        ensure_caller_is_member(writer, caller, study).await?;
     }
     Ok(())
 }
 
 /// Makes the caller a member if the study would otherwise become inaccessible to the caller.
-pub(super) async fn keep_in(writer: &mut Writer, caller: &Caller, study: StudyId) -> Result<(), Error> {
+pub(super) async fn ensure_caller_is_member(writer: &mut Writer, caller: &Caller, study: StudyId) -> Result<(), Error> {
     if let Reach::Open(who) | Reach::Assigned(who) = caller.reach()
         && !members::reaches(writer, caller.reach(), study).await?
     {

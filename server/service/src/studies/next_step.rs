@@ -20,7 +20,7 @@ const FAILURES_IN_A_ROW: usize = 3;
 /// What a study needs next.
 pub(super) enum PlanningStep {
     Nothing,
-    Act(StudyTransition, String),
+    Transition(StudyTransition, String),
     Try(NewTrial),
 }
 
@@ -30,10 +30,10 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     if study.plan.feedback_mode == FeedbackMode::Human {
         match (study.state, comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
             (StudyState::Running, Question::Pair(_)) => {
-                return Ok(PlanningStep::Act(StudyTransition::Ask, "A comparison needs an answer.".into()));
+                return Ok(PlanningStep::Transition(StudyTransition::Ask, "A comparison needs an answer.".into()));
             }
             (StudyState::Waiting, Question::None) => {
-                return Ok(PlanningStep::Act(StudyTransition::Answered, String::new()));
+                return Ok(PlanningStep::Transition(StudyTransition::Answered, String::new()));
             }
             // The comparison follows as soon as the gait is certified. No trial is proposed before.
             (_, Question::AfterCertificate(_)) => return Ok(PlanningStep::Nothing),
@@ -48,7 +48,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     if failed == FAILURES_IN_A_ROW {
         let message = snapshot.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
         let reason = format!("{failed} trials in a row failed. The last one: {}", message.unwrap_or_default());
-        return Ok(PlanningStep::Act(StudyTransition::Pause, reason));
+        return Ok(PlanningStep::Transition(StudyTransition::Pause, reason));
     }
     let open = snapshot.open();
     let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
@@ -57,11 +57,15 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
             1 => "The only trial is done.".to_owned(),
             all => format!("All {all} trials are done."),
         };
-        let finished = PlanningStep::Act(StudyTransition::Finish, reason);
+        let finished = PlanningStep::Transition(StudyTransition::Finish, reason);
         return Ok(if open == 0 { finished } else { PlanningStep::Nothing });
     }
     if let Some(reason) = snapshot.is_enough() {
-        return Ok(if open == 0 { PlanningStep::Act(StudyTransition::Finish, reason) } else { PlanningStep::Nothing });
+        return Ok(if open == 0 {
+            PlanningStep::Transition(StudyTransition::Finish, reason)
+        } else {
+            PlanningStep::Nothing
+        });
     }
     if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
         return Ok(PlanningStep::Nothing);
@@ -69,7 +73,9 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;
     match trial_choice::next_trial(pool, snapshot, &belief) {
         Ok(new) => Ok(PlanningStep::Try(new)),
-        Err(e) if e.is_exhausted() && open == 0 => Ok(PlanningStep::Act(StudyTransition::Finish, all_known(snapshot))),
+        Err(e) if e.is_exhausted() && open == 0 => {
+            Ok(PlanningStep::Transition(StudyTransition::Finish, all_known(snapshot)))
+        }
         Err(e) if e.is_exhausted() => Ok(PlanningStep::Nothing),
         Err(trial_choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
         Err(trial_choice::ChoiceError::Bounds(e)) => Err(e.into()),

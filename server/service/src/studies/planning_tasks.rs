@@ -62,7 +62,7 @@ impl Plans {
 
     /// When to dispatch jobs that have been queued since `since`. Dispatch waits for tasks in progress, so that a study
     /// with a higher priority comes first even if its planning takes longer, but at most for [`PATIENCE`].
-    pub(super) fn hand_out_at(&self, since: Instant) -> Instant {
+    pub(super) fn dispatch_at(&self, since: Instant) -> Instant {
         let newest = self.under_way.values().map(|(_, begun)| *begun + PATIENCE).max();
         newest.map_or(since, |patient| patient.min(since + PATIENCE))
     }

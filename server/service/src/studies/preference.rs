@@ -17,16 +17,16 @@ pub(super) const PROGRAM: &str = concat!("gaitwright ", env!("CARGO_PKG_VERSION"
 
 /// Whether a person may answer the same comparison twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Again {
+pub enum SecondAnswer {
     /// A second answer is refused until the first one is retracted.
     Refused,
     /// The study repeated the comparison on purpose.
-    Meant,
+    Allowed,
 }
 
 /// A judgement of two gaits.
 #[derive(Debug, Clone, Copy)]
-pub struct GivenJudgement<'a> {
+pub struct AttributedJudgement<'a> {
     /// The study.
     pub study: StudyId,
     /// The two gaits, in the order in which they were shown or walked.
@@ -38,7 +38,7 @@ pub struct GivenJudgement<'a> {
     /// The author.
     pub attribution: Attribution<'a>,
     /// Whether the author may have answered before.
-    pub again: Again,
+    pub second_answer: SecondAnswer,
 }
 
 /// Checks a judgement and passes it to the learner. Returns `None` if it states no preference.
@@ -50,8 +50,8 @@ pub struct GivenJudgement<'a> {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a
 /// second answer.
-pub async fn record(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let GivenJudgement { study, pair, fields, judgement, attribution, again } = statement;
+pub async fn record(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
+    let AttributedJudgement { study, pair, fields, judgement, attribution, second_answer } = statement;
     if !matches!(attribution.source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician or script"));
     }
@@ -63,7 +63,7 @@ pub async fn record(writer: &mut Writer, statement: GivenJudgement<'_>) -> Resul
         return report_unsafe(writer, statement).await;
     }
     let pair = walkable::admit_pair(writer, study, fields, pair).await?;
-    if again == Again::Refused {
+    if second_answer == SecondAnswer::Refused {
         let before = current_answer(writer, study, pair.trials(), attribution.author).await?;
         before.map_or(Ok(()), |_| Err(answered_before(attribution.author)))?;
     }
@@ -74,8 +74,8 @@ pub async fn record(writer: &mut Writer, statement: GivenJudgement<'_>) -> Resul
 }
 
 /// Handles a safety report. A gait that was already reported does not lose again in the learner's log.
-async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let GivenJudgement { study, pair, fields, judgement, attribution, .. } = statement;
+async fn report_unsafe(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
+    let AttributedJudgement { study, pair, fields, judgement, attribution, .. } = statement;
     let first = converged(writer, study, fields.0, pair.0).await?;
     let second = converged(writer, study, fields.1, pair.1).await?;
     let grounds = Grounds::read_for(writer, study, &[first.id, second.id]).await?;
@@ -83,8 +83,8 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
         return Err(NotWalkable::Withdrawn.into());
     }
     let neither_is_reported = [&first, &second].iter().all(|trial| !grounds.safety_reports.forbids(trial));
-    let heard = judgement.feedback(pair).filter(|_| neither_is_reported && !is_same_gait(&first, &second));
-    match heard {
+    let preference = judgement.feedback(pair).filter(|_| neither_is_reported && !is_same_gait(&first, &second));
+    match preference {
         Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),
     }
@@ -129,17 +129,17 @@ pub async fn current_answer(
         return Ok(None);
     }
     let of_pair = |pair: (TrialId, TrialId)| pair == (a, b) || pair == (b, a);
-    let noted = assessments::of_study(db, study).await?;
-    let noted = noted.iter().rfind(|r| r.retraction.is_none() && is_own(&r.author) && of_pair(r.pair()));
-    if let Some(noted) = noted {
-        return Ok(Some(CurrentAnswer::Assessment(noted.id)));
+    let assessments = assessments::of_study(db, study).await?;
+    let assessment = assessments.iter().rfind(|r| r.retraction.is_none() && is_own(&r.author) && of_pair(r.pair()));
+    if let Some(assessment) = assessment {
+        return Ok(Some(CurrentAnswer::Assessment(assessment.id)));
     }
     let given = feedback::authors_of_pair(db, (a, b)).await?;
     if let Some((id, _)) = given.into_iter().find(|(_, other)| is_own(other)) {
         return Ok(Some(CurrentAnswer::Preference(id)));
     }
     for shown in blind_pairs::of_pair(db, (a, b)).await? {
-        if is_own(&shown.rater) && stands(db, &shown).await? {
+        if is_own(&shown.rater) && is_current(db, &shown).await? {
             return Ok(Some(CurrentAnswer::Blind(shown.id)));
         }
     }
@@ -148,12 +148,12 @@ pub async fn current_answer(
 }
 
 /// Whether a rater's answer counts: staff can retract the preference derived from it.
-async fn stands(db: &mut Connection, shown: &BlindPair) -> Result<bool, Error> {
+async fn is_current(db: &mut Connection, shown: &BlindPair) -> Result<bool, Error> {
     if shown.answer.is_none_or(|judgement| judgement == Judgement::Retracted) {
         return Ok(false);
     }
     Ok(match blind_pairs::feedback_of(db, shown.id).await? {
-        Some(heard) => feedback::get(db, heard).await?.retraction.is_none(),
+        Some(feedback_id) => feedback::get(db, feedback_id).await?.retraction.is_none(),
         None => true,
     })
 }

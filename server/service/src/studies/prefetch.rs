@@ -6,7 +6,7 @@
 use super::next_step::likely_next;
 use super::snapshot::StudySnapshot;
 use crate::error::Error;
-use crate::workers::{Assignment, Attempt, Finding, News, Receipt};
+use crate::workers::{Assignment, AssignmentResult, Attempt, EngineMessage, Receipt};
 use gaitwright_store::feedback::LogVersion;
 use gaitwright_store::trials::NewTrial;
 use gaitwright_store::{Store, StudyId, TrialId};
@@ -25,7 +25,7 @@ struct Prefetch {
     study: StudyId,
     assignment: Assignment,
     /// The result, or `None` while the solve runs. A failed solve is repeated only when a trial claims it.
-    finding: Option<Finding>,
+    result: Option<AssignmentResult>,
     /// The attempt that claimed the running solve.
     promised_to: Option<Attempt>,
 }
@@ -38,7 +38,7 @@ pub(super) enum Prepared {
     /// The solve is running, and continues as that of the attempt.
     Running,
     /// The solve is done.
-    Done(Finding),
+    Done(AssignmentResult),
 }
 
 impl Prefetches {
@@ -48,14 +48,14 @@ impl Prefetches {
         if all.values().any(|one| same_solve(&one.assignment, assignment)) {
             return false;
         }
-        let one = Prefetch { study, assignment: assignment.clone(), finding: None, promised_to: None };
+        let one = Prefetch { study, assignment: assignment.clone(), result: None, promised_to: None };
         all.insert(assignment.attempt.trial, one);
         true
     }
 
     /// The number of running solves that no attempt has claimed.
     pub(super) fn running(&self) -> usize {
-        self.all().values().filter(|one| one.finding.is_none() && one.promised_to.is_none()).count()
+        self.all().values().filter(|one| one.result.is_none() && one.promised_to.is_none()).count()
     }
 
     /// Hands the solve of the same problem, if there is one, to an attempt.
@@ -64,16 +64,16 @@ impl Prefetches {
         let found =
             all.iter_mut().find(|(_, one)| one.promised_to.is_none() && same_solve(&one.assignment, assignment));
         let Some((&name, one)) = found else { return Prepared::Nothing };
-        match one.finding.take() {
+        match one.result.take() {
             None => {
                 one.promised_to = Some(assignment.attempt);
                 Prepared::Running
             }
-            Some(finding) => {
+            Some(result) => {
                 all.remove(&name);
-                match finding {
-                    Finding::Ended { .. } => Prepared::Done(finding),
-                    Finding::Broke(_) => Prepared::Nothing,
+                match result {
+                    AssignmentResult::Ended { .. } => Prepared::Done(result),
+                    AssignmentResult::Broke(_) => Prepared::Nothing,
                 }
             }
         }
@@ -86,14 +86,14 @@ impl Prefetches {
 
     /// Drops unclaimed running solves and returns them; the caller must cancel them.
     pub(super) fn forget_running(&self) -> Vec<TrialId> {
-        self.remove(|one| one.finding.is_none())
+        self.remove(|one| one.result.is_none())
     }
 
     fn remove(&self, goes: impl Fn(&Prefetch) -> bool) -> Vec<TrialId> {
         let mut running = Vec::new();
         self.all().retain(|name, one| {
             let stays = one.promised_to.is_some() || !goes(one);
-            if !stays && one.finding.is_none() {
+            if !stays && one.result.is_none() {
                 running.push(*name);
             }
             stays
@@ -110,26 +110,26 @@ impl Prefetches {
 
     /// Translates a worker's message to the attempt that claimed the solve. For an unclaimed solve, keeps the result
     /// and returns the receipt to acknowledge.
-    pub(super) fn hear(&self, news: News) -> Result<News, Receipt> {
+    pub(super) fn receive(&self, message: EngineMessage) -> Result<EngineMessage, Receipt> {
         let mut all = self.all();
-        let name = match &news {
-            News::Started { attempt, .. } | News::Iterated { attempt, .. } | News::Ended { attempt, .. } => {
-                attempt.trial
-            }
+        let name = match &message {
+            EngineMessage::Started { attempt, .. }
+            | EngineMessage::Iterated { attempt, .. }
+            | EngineMessage::Ended { attempt, .. } => attempt.trial,
         };
-        let Some(one) = all.get_mut(&name) else { return Ok(news) };
-        match (news, one.promised_to) {
-            (News::Started { worker, .. }, Some(attempt)) => Ok(News::Started { attempt, worker }),
-            (News::Iterated { record, .. }, Some(attempt)) => Ok(News::Iterated { attempt, record }),
-            (News::Ended { worker, finding, receipt, .. }, Some(attempt)) => {
+        let Some(one) = all.get_mut(&name) else { return Ok(message) };
+        match (message, one.promised_to) {
+            (EngineMessage::Started { worker, .. }, Some(attempt)) => Ok(EngineMessage::Started { attempt, worker }),
+            (EngineMessage::Iterated { record, .. }, Some(attempt)) => Ok(EngineMessage::Iterated { attempt, record }),
+            (EngineMessage::Ended { worker, result, receipt, .. }, Some(attempt)) => {
                 all.remove(&name);
-                Ok(News::Ended { attempt, worker, finding, receipt })
+                Ok(EngineMessage::Ended { attempt, worker, result, receipt })
             }
-            (News::Ended { finding, receipt, .. }, None) => {
-                one.finding = Some(finding);
+            (EngineMessage::Ended { result, receipt, .. }, None) => {
+                one.result = Some(result);
                 Err(receipt)
             }
-            (News::Started { .. } | News::Iterated { .. }, None) => Err(Receipt::not_needed()),
+            (EngineMessage::Started { .. } | EngineMessage::Iterated { .. }, None) => Err(Receipt::not_needed()),
         }
     }
 
@@ -151,7 +151,7 @@ impl LikelyNext {
 
     /// Whether the cache is current for this snapshot.
     pub(super) fn knows(&self, snapshot: &StudySnapshot) -> bool {
-        self.0.get(&snapshot.study.id).is_some_and(|(heard, _)| *heard == snapshot.version)
+        self.0.get(&snapshot.study.id).is_some_and(|(version, _)| *version == snapshot.version)
     }
 
     /// The trials that a study would propose next, one for each possible answer.

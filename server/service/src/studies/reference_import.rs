@@ -175,7 +175,7 @@ impl NewReferenceGait {
     ///
     /// # Errors
     /// As [`Self::definition`].
-    pub async fn definition_aside(self, store: &mut Store) -> Result<Definition, Error> {
+    pub async fn definition_on_pool(self, store: &mut Store) -> Result<Definition, Error> {
         store.compute(move |_| self.definition(RECORDING, FORCES)).await?
     }
 }
@@ -198,7 +198,7 @@ pub(super) fn check(definition: &Definition) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Invalid`] for a name that does not print; errors of the database.
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(ReferenceGait, bool), Error> {
-    writer.room()?;
+    writer.check_free_space()?;
     check(definition)?;
     let (reference, added) = reference_gaits::ensure(writer, definition).await?;
     if added {

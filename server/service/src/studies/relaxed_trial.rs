@@ -74,7 +74,7 @@ impl From<NoRelaxedTrial> for Error {
 pub struct RelaxedTrial {
     /// The relaxed bounds with their values in the search space.
     pub bounds: Relaxation,
-    /// Whether the study needs a larger trial budget for it.
+    /// Whether the study needs a larger number of trials for it.
     pub extends: bool,
     action: ActionIndex,
 }
@@ -83,7 +83,7 @@ pub struct RelaxedTrial {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn possible(
+pub async fn of(
     db: &mut Connection,
     study: &Study,
     trial: &Trial,
@@ -174,7 +174,7 @@ pub async fn choose(
     let relaxation = known.get(place).ok_or_else(|| {
         Error::invalid("relaxation", place, "the index of a relaxation in the explanation of the trial, counted from 0")
     })?;
-    let RelaxedTrial { bounds, action, .. } = possible(&mut db, &study, &trial, relaxation).await??;
+    let RelaxedTrial { bounds, action, .. } = of(&mut db, &study, &trial, relaxation).await??;
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let beliefs = Arc::clone(beliefs);
@@ -204,11 +204,11 @@ fn names(bounds: &Relaxation) -> String {
     bounds.iter().map(|(bound, _)| bound.as_str()).collect::<Vec<_>>().join(" and ")
 }
 
-/// Queues the trial. A finished study goes on, with a larger trial budget if it has used its own. Returns `None` if the study
-/// has changed, and the caller must choose again.
+/// Queues the trial. A finished study goes on, with a larger number of trials if it has made all of them. Returns `None` if
+/// the study has changed, and the caller must choose again.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the trial budget cannot grow; errors of the database.
+/// [`Error::Invalid`] if the number of trials cannot grow; errors of the database.
 pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> Result<Option<TrialId>, Error> {
     let ChosenTrial { snapshot, new, from, bounds } = chosen;
     if !snapshot.is_unchanged(writer).await? {

@@ -16,7 +16,7 @@ const DAY_S: i64 = 86_400;
 
 /// How much a round deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Dropped {
+pub struct DeletedCounts {
     /// Stored responses to requests with an Idempotency-Key.
     pub answers: u64,
     /// Sessions.
@@ -29,11 +29,11 @@ pub struct Dropped {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn drop_expired(store: &Store) -> Result<Dropped, Error> {
+pub async fn delete_expired(store: &Store) -> Result<DeletedCounts, Error> {
     let present = now();
     let long_ago = present.plus_seconds(-SESSION_DAYS * DAY_S);
     let mut writer = store.write().await?;
-    let dropped = Dropped {
+    let dropped = DeletedCounts {
         answers: idempotency::drop_before(&mut writer, present.plus_seconds(-IDEMPOTENCY_KEY_DAYS * DAY_S)).await?,
         sessions: sessions::drop_before(&mut writer, long_ago).await?,
         links: sessions::drop_links_before(&mut writer, long_ago).await?,
@@ -46,12 +46,12 @@ pub async fn drop_expired(store: &Store) -> Result<Dropped, Error> {
 ///
 /// # Errors
 /// None: failures are logged.
-pub async fn keep_dropping(store: Store, task: Task) -> Result<(), Error> {
+pub async fn delete_expired_hourly(store: Store, task: Task) -> Result<(), Error> {
     loop {
         task.works();
-        match drop_expired(&store).await {
-            Ok(Dropped { answers: 0, sessions: 0, links: 0 }) => {}
-            Ok(Dropped { answers, sessions, links }) => {
+        match delete_expired(&store).await {
+            Ok(DeletedCounts { answers: 0, sessions: 0, links: 0 }) => {}
+            Ok(DeletedCounts { answers, sessions, links }) => {
                 tracing::info!(answers, sessions, links, "deleted expired data");
             }
             Err(error) => tracing::warn!(%error, "cannot delete expired data"),

@@ -22,18 +22,18 @@ pub const TABLE_I: [(&[f64], f64); TunedBounds::COUNT] = [
 /// A search space as a request states it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GivenSpace {
+pub struct RequestedSearchSpace {
     /// One dimension for each tuned bound.
     pub dimensions: Vec<Dimension>,
 }
 
-impl From<SearchSpace> for GivenSpace {
+impl From<SearchSpace> for RequestedSearchSpace {
     fn from(space: SearchSpace) -> Self {
         Self { dimensions: space.dimensions().to_vec() }
     }
 }
 
-impl GivenSpace {
+impl RequestedSearchSpace {
     /// The search space.
     ///
     /// # Errors
@@ -155,7 +155,7 @@ mod tests {
     fn refused_dimensions_are_named_with_what_is_allowed() {
         let dimension =
             |name: &str, values: &[f64]| Dimension { name: name.to_owned(), values: values.to_vec(), lengthscale: 1.0 };
-        let refused = |dimensions: Vec<Dimension>| match (GivenSpace { dimensions }).checked() {
+        let refused = |dimensions: Vec<Dimension>| match (RequestedSearchSpace { dimensions }).checked() {
             Err(Error::Invalid(field)) => (field.field, field.message),
             other => panic!("{other:?}"),
         };

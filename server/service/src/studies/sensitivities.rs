@@ -55,7 +55,7 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
         let state = trial.state.as_str().replace('_', " ");
         return Err(Error::conflict(format!("Trial {number} is {state}. Only a converged gait has sensitivities.")));
     }
-    if !gaits::is_here(db, trial.id).await? {
+    if !gaits::exists(db, trial.id).await? {
         return Err(Error::conflict(format!(
             "The solution of trial {number} was deleted to save space, so its sensitivities can no longer be computed."
         )));

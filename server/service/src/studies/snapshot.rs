@@ -126,7 +126,7 @@ impl StudySnapshot {
         self.trials.iter().filter(|trial| trial.state.is_open()).count()
     }
 
-    /// The stopping rule that applies before the trial budget is used up: the time limit, or an unchanged best action.
+    /// The stopping rule that applies before the trials are used up: the time limit, or an unchanged best action.
     pub fn is_enough(&self) -> Option<String> {
         let plan = &self.study.plan;
         let spent: f64 = self.trials.iter().filter_map(|trial| trial.seconds_total).sum();
@@ -179,15 +179,15 @@ impl StudySnapshot {
                 log.visited.push(trial.action_index);
             }
             if row.retraction.is_none() {
-                log.feedback.extend(heard(&row.content, action));
+                log.feedback.extend(in_terms_of_actions(&row.content, action));
             }
         }
         log
     }
 
-    /// What the learner hears of an entry of the log. `None` if both trials have the same action.
-    pub fn heard(&self, content: &FeedbackContent) -> Option<Feedback> {
-        heard(content, |id| self.trial(id).map(|trial| trial.action_index))
+    /// What the learner observes of an entry of the log. `None` if both trials have the same action.
+    pub fn feedback_for_learner(&self, content: &FeedbackContent) -> Option<Feedback> {
+        in_terms_of_actions(content, |id| self.trial(id).map(|trial| trial.action_index))
     }
 
     /// Actions that must not be proposed although the study has no result of them: being solved, failed, or, in a study
@@ -209,7 +209,7 @@ pub(super) fn is_answer_of_a_person(row: &FeedbackRow) -> bool {
 }
 
 /// Converts an answer about trials to one about actions. `None` if both trials have the same action.
-fn heard(content: &FeedbackContent, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
+fn in_terms_of_actions(content: &FeedbackContent, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
     let feedback = match *content {
         FeedbackContent::Label { trial, category } => {
             Feedback::Label { action: action(trial)?, category: usize::try_from(category).ok()? }

@@ -1,4 +1,4 @@
-//! Changes a study: its name, tags, notes and limits, its trial budget, or a fork of it. For pages and REST.
+//! Changes a study: its name, tags, notes and limits, its number of trials, or a fork of it. For pages and REST.
 
 use super::lifecycle::{self, StudyTransition};
 use super::snapshot::has_changed;
@@ -131,7 +131,7 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
     changed(writer, actor, "study.change", &study, study.state, &detail).await
 }
 
-/// A larger trial budget.
+/// A larger number of trials.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Extend {
@@ -140,7 +140,7 @@ pub struct Extend {
     pub trial_budget: u32,
 }
 
-/// Raises the trial budget of a study. If the study has ended, it resumes.
+/// Raises the number of trials of a study. If the study has ended, it resumes.
 ///
 /// # Errors
 /// [`Error::Invalid`] if the budget would not increase, [`Error::NotFound`].
@@ -157,7 +157,7 @@ pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Exte
     changed(writer, actor, "study.extend", &study, state, &detail).await
 }
 
-/// Sets the trial budget of a study, and the state in which it goes on. The caller writes event and audit trail.
+/// Sets the number of trials of a study, and the state in which it goes on. The caller writes event and audit trail.
 ///
 /// # Errors
 /// [`Error::Invalid`] for too many trials, [`Error::Conflict`] if the study has changed; errors of the database.

@@ -1,6 +1,6 @@
 //! Checks and creates a study, for pages, REST and the command line.
 
-use super::search_space::{self, GivenSpace};
+use super::search_space::{self, RequestedSearchSpace};
 use super::subject::{self, NewSubject};
 use super::{built_in_entries, membership, study_plan_schemas};
 use crate::access::{Caller, Reach};
@@ -52,7 +52,7 @@ pub struct NewStudy {
     /// Tuned bounds and their values. Table I of the paper by default.
     #[serde(default)]
     #[schema(value_type = Option<study_plan_schemas::SearchSpace>)]
-    pub search_space: Option<GivenSpace>,
+    pub search_space: Option<RequestedSearchSpace>,
     /// Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
     #[serde(default)]
     #[schema(value_type = study_plan_schemas::LearnerSettings)]
@@ -192,7 +192,7 @@ pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result
 /// As [`create`].
 pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> Result<Study, Error> {
     let study = create(writer, &caller.actor, new).await?;
-    membership::keep_in(writer, caller, study.id).await?;
+    membership::ensure_caller_is_member(writer, caller, study.id).await?;
     Ok(study)
 }
 
@@ -227,7 +227,7 @@ pub(super) async fn create_from(
     new: NewStudy,
     forked_from: Option<StudyId>,
 ) -> Result<Study, Error> {
-    writer.room()?;
+    writer.check_free_space()?;
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
     // A fork copies the set-up of its parent, muscle values included.
     let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };

@@ -1,6 +1,6 @@
 //! The summary of a study as one document, as `tune --json` prints it for scripts.
 
-use super::certified_best::{CertificateState, Judged};
+use super::certified_best::{BestCertification, CertificateState};
 use super::snapshot::StudySnapshot;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use gaitwright_store::studies::StudyState;
@@ -61,7 +61,7 @@ pub struct TrialSummary {
 }
 
 /// The summary of a study with its best trial and the certificates.
-pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, judged: Judged) -> Summary {
+pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, certification: BestCertification) -> Summary {
     let best = best.and_then(|id| snapshot.trial(id));
     Summary {
         study_id: snapshot.study.id,
@@ -70,9 +70,9 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, judged: Judged) -> Su
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        best_certificate: judged.certificate,
-        best_failures: judged.failures,
-        passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| line(trial, &snapshot.trials)),
+        best_certificate: certification.certificate,
+        best_failures: certification.failures,
+        passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| line(trial, &snapshot.trials)),
         trials: snapshot.trials.iter().map(|trial| line(trial, &snapshot.trials)).collect(),
     }
 }

@@ -41,7 +41,7 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> R
     let log = snapshot.log();
     let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
     let barred = snapshot.barred_without_result();
-    let proposal = if plan.tries_new_gaits_only() {
+    let proposal = if plan.excludes_known_gaits() {
         let known = equal_actions(snapshot)?;
         propose_outside(&plan.search_space, &log, &barred, &known, &plan.learner, seed)?
     } else {

@@ -7,7 +7,7 @@ use super::job::JobState;
 use super::trial_queue::{RequestOrder, RunningJob, TrialJobState, TrialQueue};
 use crate::error::Error;
 use gait_optimizer::CancelToken;
-use gaitwright_compute::priority::behind_solves;
+use gaitwright_compute::priority::run_below_solves;
 use gaitwright_store::{Store, StoreResult, StudyId, TrialId, consents, trials};
 use std::collections::BTreeSet;
 use std::fmt;
@@ -84,14 +84,14 @@ impl<J: TrialJob> TrialJobs<J> {
     }
 
     /// Forgets that the job of a trial was cancelled or failed.
-    pub(super) fn again(&self, trial: TrialId) {
+    pub(super) fn forget_end(&self, trial: TrialId) {
         self.queue().forget(trial);
         self.wake.notify_one();
     }
 
     /// Queues an ended study behind requested trials.
-    pub(super) fn take_up(&self, study: StudyId) {
-        self.queue().take_up([study]);
+    pub(super) fn queue_ended(&self, study: StudyId) {
+        self.queue().queue_ended([study]);
         self.wake.notify_one();
     }
 
@@ -171,14 +171,14 @@ impl<J: TrialJob> TrialJobs<J> {
     async fn read_record(&self, first: bool) -> StoreResult<()> {
         if first {
             let cancelled = self.job.cancelled().await?;
-            self.queue().recall_cancelled(cancelled);
+            self.queue().restore_cancelled(cancelled);
         }
         if first || J::READS_REQUESTS {
             let requested = self.job.requested().await?;
             self.queue().recall(requested);
         }
         let ended = self.job.ended().await?;
-        self.queue().take_up(ended);
+        self.queue().queue_ended(ended);
         Ok(())
     }
 
@@ -250,15 +250,15 @@ impl<J: TrialJob> fmt::Debug for TrialJobs<J> {
 ///
 /// # Errors
 /// [`Error::Internal`] if no thread can be started or the work panics.
-pub(super) async fn behind<T: Send + 'static>(
+pub(super) async fn run_cancellable<T: Send + 'static>(
     name: &'static str,
     work: impl FnOnce(&CancelToken) -> T + Send + 'static,
 ) -> Result<T, Error> {
     let cancel = CancelToken::new();
     let (_cancels, of_thread) = (CancelOnDrop(cancel.clone()), cancel);
-    let told = behind_solves(name, move || work(&of_thread))
+    let result = run_below_solves(name, move || work(&of_thread))
         .map_err(|error| Error::Internal(format!("cannot start a thread for the {name}: {error}")))?;
-    told.await.map_err(|_| Error::Internal(format!("the {name} panicked")))
+    result.await.map_err(|_| Error::Internal(format!("the {name} panicked")))
 }
 
 /// Cancels work when the caller stops waiting for it.

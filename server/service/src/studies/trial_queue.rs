@@ -95,7 +95,7 @@ impl<R: Clone> TrialQueue<R> {
     }
 
     /// Adds cancellations of earlier processes.
-    pub(super) fn recall_cancelled(&mut self, cancelled: Vec<TrialId>) {
+    pub(super) fn restore_cancelled(&mut self, cancelled: Vec<TrialId>) {
         self.cancelled.extend(cancelled);
     }
 
@@ -107,7 +107,7 @@ impl<R: Clone> TrialQueue<R> {
     }
 
     /// Queues ended studies behind requested trials.
-    pub(super) fn take_up(&mut self, studies: impl IntoIterator<Item = StudyId>) {
+    pub(super) fn queue_ended(&mut self, studies: impl IntoIterator<Item = StudyId>) {
         self.studies.extend(studies);
     }
 

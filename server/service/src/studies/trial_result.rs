@@ -4,12 +4,12 @@
 use super::comparison::{by_gait_rmse, partners};
 use super::preference::{self, PROGRAM};
 use super::snapshot::StudySnapshot;
-use super::trial_state::{self, Happening};
+use super::trial_state::{self, TrialEvent};
 use crate::error::Error;
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::gaits::PackedGait;
-use gaitwright_store::jobs::{Lease, Troubles};
+use gaitwright_store::jobs::{FailureCounts, Lease};
 use gaitwright_store::studies::FeedbackMode;
 use gaitwright_store::trials::{TrialEnd, TrialState};
 use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, jobs, studies, trials};
@@ -58,7 +58,7 @@ pub async fn ended(
             continue;
         }
         let used = jobs::finish(&mut writer, lease).await?;
-        attempts::keep(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, used).await?;
+        attempts::insert(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, used).await?;
         if !used {
             commit(writer).await?;
             return Ok(false);
@@ -84,9 +84,9 @@ pub async fn ended(
 pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, Error> {
     tracing::warn!(trial = %lease.trial, attempt = lease.attempt, reason, "a solve failed");
     let mut writer = store.write().await?;
-    let before = jobs::troubles(&mut writer, lease.job).await?;
-    let after = Troubles { failures: before.failures + 1, ..before };
-    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Broke(before), after, reason).await?;
+    let before = jobs::failure_counts(&mut writer, lease.job).await?;
+    let after = FailureCounts { failures: before.failures + 1, ..before };
+    let recorded = give_up_or_requeue(&mut writer, lease, TrialEvent::Broke(before), after, reason).await?;
     commit(writer).await?;
     Ok(recorded)
 }
@@ -95,12 +95,12 @@ pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, E
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
+pub async fn record_expired_lease(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
-    let before = jobs::troubles(&mut writer, lease.job).await?;
-    let after = Troubles { losses: before.losses + 1, ..before };
+    let before = jobs::failure_counts(&mut writer, lease.job).await?;
+    let after = FailureCounts { losses: before.losses + 1, ..before };
     let reason = "The worker's lease expired.";
-    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Silent(before), after, reason).await?;
+    let recorded = give_up_or_requeue(&mut writer, lease, TrialEvent::Silent(before), after, reason).await?;
     commit(writer).await?;
     Ok(recorded)
 }
@@ -111,8 +111,8 @@ pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
 /// Errors of the database.
 pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
-    let same = jobs::troubles(&mut writer, lease.job).await?;
-    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Interrupted, same, "").await?;
+    let same = jobs::failure_counts(&mut writer, lease.job).await?;
+    let recorded = give_up_or_requeue(&mut writer, lease, TrialEvent::Interrupted, same, "").await?;
     commit(writer).await?;
     Ok(recorded)
 }
@@ -123,7 +123,7 @@ pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
 /// [`Error::Conflict`] if the trial has ended; errors of the database.
 pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
-    let state = trial_state::after(row.state, Happening::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
+    let state = trial_state::after(row.state, TrialEvent::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
     jobs::cancel(writer, trial).await?;
     let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
     trials::finish(writer, trial, &end).await?;
@@ -137,7 +137,7 @@ pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Res
 /// [`Error::Conflict`] if the trial is open or has a result; errors of the database.
 pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
-    trial_state::after(row.state, Happening::Retried).map_err(|e| Error::conflict(e.to_string()))?;
+    trial_state::after(row.state, TrialEvent::Retried).map_err(|e| Error::conflict(e.to_string()))?;
     if row.script.is_some() {
         return Err(Error::conflict(
             "A script evaluates this trial, so it cannot be queued again. The script must ask for another trial.",
@@ -152,14 +152,14 @@ pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
 async fn give_up_or_requeue(
     writer: &mut Writer,
     lease: &Lease,
-    happening: Happening,
-    after: Troubles,
+    event: TrialEvent,
+    after: FailureCounts,
     reason: &str,
 ) -> Result<bool, Error> {
     if !jobs::finish(writer, lease).await? {
         return Ok(false);
     }
-    let state = trial_state::after(TrialState::Running, happening).map_err(|e| Error::Internal(e.to_string()))?;
+    let state = trial_state::after(TrialState::Running, event).map_err(|e| Error::Internal(e.to_string()))?;
     if state == TrialState::Queued {
         jobs::requeue(writer, lease.job, after).await?;
         trials::requeue(writer, lease.trial, reason).await?;

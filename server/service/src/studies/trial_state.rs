@@ -1,7 +1,7 @@
 //! The state machine of a trial, as a pure function of what happens to its job.
 
 use gait_optimizer::SolveStatus;
-use gaitwright_store::jobs::Troubles;
+use gaitwright_store::jobs::FailureCounts;
 use gaitwright_store::trials::TrialState;
 use thiserror::Error;
 
@@ -10,15 +10,15 @@ pub const RETRIES: u32 = 2;
 
 /// An event in the life of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Happening {
+pub enum TrialEvent {
     /// A worker takes the job.
     Leased,
     /// The solve ended by itself.
     Solved(SolveStatus),
     /// The program failed. Has the number of earlier failures.
-    Broke(Troubles),
+    Broke(FailureCounts),
     /// The worker stopped responding. Has the number of earlier failures.
-    Silent(Troubles),
+    Silent(FailureCounts),
     /// The process of the solve ended, which is not counted as a failure.
     Interrupted,
     /// A person cancels the trial.
@@ -29,24 +29,24 @@ pub enum Happening {
 
 /// The event is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("The trial is {}, so it cannot be {}.", state.as_str().replace('_', " "), participle(*happening))]
+#[error("The trial is {}, so it cannot be {}.", state.as_str().replace('_', " "), participle(*event))]
 pub struct Impossible {
     /// The state of the trial.
     pub state: TrialState,
     /// The event.
-    pub happening: Happening,
+    pub event: TrialEvent,
 }
 
 /// What happens to the trial, as a participle.
-fn participle(happening: Happening) -> &'static str {
-    match happening {
-        Happening::Leased => "started",
-        Happening::Solved(_) => "solved",
-        Happening::Broke(_) => "marked as failed",
-        Happening::Silent(_) => "marked as lost",
-        Happening::Interrupted => "interrupted",
-        Happening::Cancelled => "cancelled",
-        Happening::Retried => "retried",
+fn participle(event: TrialEvent) -> &'static str {
+    match event {
+        TrialEvent::Leased => "started",
+        TrialEvent::Solved(_) => "solved",
+        TrialEvent::Broke(_) => "marked as failed",
+        TrialEvent::Silent(_) => "marked as lost",
+        TrialEvent::Interrupted => "interrupted",
+        TrialEvent::Cancelled => "cancelled",
+        TrialEvent::Retried => "retried",
     }
 }
 
@@ -66,16 +66,16 @@ pub fn result_of(status: SolveStatus) -> Option<TrialState> {
 ///
 /// # Errors
 /// [`Impossible`], for example for any event after a result.
-pub fn after(state: TrialState, happening: Happening) -> Result<TrialState, Impossible> {
+pub fn after(state: TrialState, event: TrialEvent) -> Result<TrialState, Impossible> {
     use TrialState::{Cancelled, Failed, Lost, Queued, Running};
-    match (state, happening) {
-        (Queued, Happening::Leased) => Ok(Running),
-        (Running, Happening::Solved(status)) => result_of(status).ok_or(Impossible { state, happening }),
-        (Running, Happening::Broke(before)) => Ok(if before.failures < RETRIES { Queued } else { Failed }),
-        (Running, Happening::Silent(before)) => Ok(if before.losses < RETRIES { Queued } else { Lost }),
-        (Running, Happening::Interrupted) | (Failed | Lost | Cancelled, Happening::Retried) => Ok(Queued),
-        (Queued | Running, Happening::Cancelled) => Ok(Cancelled),
-        _ => Err(Impossible { state, happening }),
+    match (state, event) {
+        (Queued, TrialEvent::Leased) => Ok(Running),
+        (Running, TrialEvent::Solved(status)) => result_of(status).ok_or(Impossible { state, event }),
+        (Running, TrialEvent::Broke(before)) => Ok(if before.failures < RETRIES { Queued } else { Failed }),
+        (Running, TrialEvent::Silent(before)) => Ok(if before.losses < RETRIES { Queued } else { Lost }),
+        (Running, TrialEvent::Interrupted) | (Failed | Lost | Cancelled, TrialEvent::Retried) => Ok(Queued),
+        (Queued | Running, TrialEvent::Cancelled) => Ok(Cancelled),
+        _ => Err(Impossible { state, event }),
     }
 }
 
@@ -84,34 +84,34 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn any_happening() -> impl Strategy<Value = Happening> {
+    fn any_event() -> impl Strategy<Value = TrialEvent> {
         prop_oneof![
-            Just(Happening::Leased),
-            Just(Happening::Solved(SolveStatus::Converged)),
-            Just(Happening::Solved(SolveStatus::Infeasible)),
-            Just(Happening::Solved(SolveStatus::TimeLimit)),
-            (0_u32..4).prop_map(|failures| Happening::Broke(Troubles { failures, losses: 0 })),
-            (0_u32..4).prop_map(|losses| Happening::Silent(Troubles { failures: 0, losses })),
-            Just(Happening::Interrupted),
-            Just(Happening::Cancelled),
-            Just(Happening::Retried),
+            Just(TrialEvent::Leased),
+            Just(TrialEvent::Solved(SolveStatus::Converged)),
+            Just(TrialEvent::Solved(SolveStatus::Infeasible)),
+            Just(TrialEvent::Solved(SolveStatus::TimeLimit)),
+            (0_u32..4).prop_map(|failures| TrialEvent::Broke(FailureCounts { failures, losses: 0 })),
+            (0_u32..4).prop_map(|losses| TrialEvent::Silent(FailureCounts { failures: 0, losses })),
+            Just(TrialEvent::Interrupted),
+            Just(TrialEvent::Cancelled),
+            Just(TrialEvent::Retried),
         ]
     }
 
     proptest! {
         #[test]
         fn results_are_final_and_come_from_solves_only(
-            happenings in proptest::collection::vec(any_happening(), 0..60)
+            events in proptest::collection::vec(any_event(), 0..60)
         ) {
             let mut state = TrialState::Queued;
-            for happening in happenings {
-                let Ok(next) = after(state, happening) else { continue };
-                prop_assert!(!state.is_result(), "{:?} left {:?}", happening, state);
+            for event in events {
+                let Ok(next) = after(state, event) else { continue };
+                prop_assert!(!state.is_result(), "{:?} left {:?}", event, state);
                 if next.is_result() {
-                    prop_assert!(matches!(happening, Happening::Solved(_)));
+                    prop_assert!(matches!(event, TrialEvent::Solved(_)));
                 }
                 if next == TrialState::Running {
-                    prop_assert_eq!(happening, Happening::Leased);
+                    prop_assert_eq!(event, TrialEvent::Leased);
                 }
                 state = next;
             }
@@ -120,16 +120,16 @@ mod tests {
 
     #[test]
     fn failing_or_lost_job_is_given_up_after_two_retries() {
-        let broke = |failures| Happening::Broke(Troubles { failures, losses: 0 });
-        let silent = |losses| Happening::Silent(Troubles { failures: 0, losses });
-        let cases: [(&dyn Fn(u32) -> Happening, TrialState); 2] =
+        let broke = |failures| TrialEvent::Broke(FailureCounts { failures, losses: 0 });
+        let silent = |losses| TrialEvent::Silent(FailureCounts { failures: 0, losses });
+        let cases: [(&dyn Fn(u32) -> TrialEvent, TrialState); 2] =
             [(&broke, TrialState::Failed), (&silent, TrialState::Lost)];
-        for (happening, end) in cases {
+        for (event, end) in cases {
             let mut runs = 0;
             let mut state = TrialState::Queued;
             while state == TrialState::Queued && runs < 10 {
-                state = after(state, Happening::Leased).unwrap();
-                state = after(state, happening(runs)).unwrap();
+                state = after(state, TrialEvent::Leased).unwrap();
+                state = after(state, event(runs)).unwrap();
                 runs += 1;
             }
             assert_eq!((state, runs), (end, 3));

@@ -58,7 +58,7 @@ impl UtilityHistory {
     }
 }
 
-/// Whether the learner hears an entry. A label stays even if it were retracted: its trial was visited.
+/// Whether the learner observes an entry. A label stays even if it were retracted: its trial was visited.
 fn counts(row: &FeedbackRow) -> bool {
     row.retraction.is_none() || matches!(row.content, FeedbackContent::Label { .. })
 }
@@ -98,7 +98,7 @@ fn point(
             labelled.insert(trial.id);
         }
         if row.retraction.is_none() {
-            log.feedback.extend(snapshot.heard(&row.content));
+            log.feedback.extend(snapshot.feedback_for_learner(&row.content));
         }
     }
     let posterior = learner.posterior(&plan.search_space, &log, &plan.learner)?;

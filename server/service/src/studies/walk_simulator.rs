@@ -1,7 +1,7 @@
 //! The job that simulates walks with the gait of a trial, on request.
 
-use super::execution::{self, Simulation, WalksAsked};
-use super::trial_jobs::{TrialJob, behind};
+use super::execution::{self, NewExecutionReport, Simulation};
+use super::trial_jobs::{TrialJob, run_cancellable};
 use super::trial_queue::TrialJobState;
 use crate::error::Error;
 use gait_optimizer::execution::simulate;
@@ -17,13 +17,13 @@ pub(super) struct WalkSimulator {
 /// A request, and how much of it is done.
 #[derive(Debug, Clone)]
 pub(super) struct Request {
-    asked: WalksAsked,
+    asked: NewExecutionReport,
     /// Number of simulated walks so far.
     done: Arc<AtomicU32>,
 }
 
-impl From<WalksAsked> for Request {
-    fn from(asked: WalksAsked) -> Self {
+impl From<NewExecutionReport> for Request {
+    fn from(asked: NewExecutionReport) -> Self {
         Self { asked, done: Arc::default() }
     }
 }
@@ -41,7 +41,10 @@ impl TrialJob for WalkSimulator {
 
     async fn requested(&self) -> StoreResult<Vec<(TrialId, Request)>> {
         let requested = execution_reports::requested(&mut *self.store.read().await?).await?;
-        Ok(requested.into_iter().map(|(trial, walks, seed)| (trial, WalksAsked { walks, seed }.into())).collect())
+        Ok(requested
+            .into_iter()
+            .map(|(trial, walks, seed)| (trial, NewExecutionReport { walks, seed }.into()))
+            .collect())
     }
 
     async fn cancelled(&self) -> StoreResult<Vec<TrialId>> {
@@ -54,7 +57,7 @@ impl TrialJob for WalkSimulator {
         let mut store = self.store.clone();
         let gait = execution::gait_of(&mut *store.read().await?, trial).await?;
         let gait = store.compute(move |pool| gait.unpack(pool)).await??;
-        match behind("walk simulator", move |cancel| simulate(&gait, &options, &done, cancel)).await?? {
+        match run_cancellable("walk simulator", move |cancel| simulate(&gait, &options, &done, cancel)).await?? {
             Some(report) => execution::record(&self.store, trial, asked, report).await,
             None => Ok(()),
         }

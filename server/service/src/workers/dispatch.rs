@@ -38,7 +38,7 @@ pub struct Assignment {
 
 /// The result of an assignment.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub enum Finding {
+pub enum AssignmentResult {
     /// The solve ended by itself, with or without a gait.
     Ended {
         /// The outcome.
@@ -52,7 +52,7 @@ pub enum Finding {
 
 /// A message about a submitted job.
 #[derive(Debug)]
-pub enum News {
+pub enum EngineMessage {
     /// A worker started the job.
     Started {
         /// The attempt.
@@ -74,7 +74,7 @@ pub enum News {
         /// Name of the worker.
         worker: String,
         /// The result.
-        finding: Finding,
+        result: AssignmentResult,
         /// Must be signed once the result is on record. Otherwise the engine may deliver it again.
         receipt: Receipt,
     },
@@ -123,7 +123,7 @@ pub trait Dispatch: Send + Sync + 'static {
     fn outlives_process(&self) -> bool;
 
     /// Why the engine cannot work now, if it cannot.
-    fn trouble(&self) -> Option<String> {
+    fn problem(&self) -> Option<String> {
         None
     }
 
@@ -140,5 +140,5 @@ pub trait Dispatch: Send + Sync + 'static {
     fn cancel(&self, trial: TrialId) -> BoxFuture<'_, ()>;
 
     /// The next message. Dropping the future loses none.
-    fn next(&self) -> BoxFuture<'_, News>;
+    fn next(&self) -> BoxFuture<'_, EngineMessage>;
 }

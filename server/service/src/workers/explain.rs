@@ -1,11 +1,11 @@
 //! The interface between the service and infeasibility explanations.
 
-use gait_optimizer::explanation::{Explanation, Unsolved, explain};
+use gait_optimizer::explanation::{Explanation, SolveWithoutGait, explain};
 use gait_optimizer::{CancelToken, GaitProblem, SolveError, SolveOptions, SolveStatus, Violation, WarmStart};
 
 /// A solve that ended without a gait.
 #[derive(Debug, Clone)]
-pub struct Unexplained {
+pub struct SolveToExplain {
     /// The gait problem.
     pub problem: GaitProblem,
     /// Settings and limits of the solver.
@@ -24,7 +24,7 @@ pub trait Explain: Send + Sync + 'static {
     ///
     /// # Errors
     /// [`SolveError`] if the last iterate does not belong to the problem.
-    fn explain(&self, solve: &Unexplained, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError>;
+    fn explain(&self, solve: &SolveToExplain, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError>;
 }
 
 /// Explains with `gait_optimizer::explanation::explain`.
@@ -32,10 +32,10 @@ pub trait Explain: Send + Sync + 'static {
 pub struct GaitExplainer;
 
 impl Explain for GaitExplainer {
-    fn explain(&self, solve: &Unexplained, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError> {
-        let Unexplained { problem, options, status, violations, last } = solve;
+    fn explain(&self, solve: &SolveToExplain, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError> {
+        let SolveToExplain { problem, options, status, violations, last } = solve;
         // This low-priority thread has no time limit, because elapsed time says nothing about the problem.
         let options = SolveOptions { threads: 1, time_limit_s: None, ..*options };
-        explain(problem, Unsolved { status: *status, violations, last }, &options, &mut |_| {}, cancel)
+        explain(problem, SolveWithoutGait { status: *status, violations, last }, &options, &mut |_| {}, cancel)
     }
 }

@@ -1,11 +1,11 @@
 //! The engine of a single machine: one thread for each running solve.
 
-use super::dispatch::{Dispatch, Finding, News, Receipt};
+use super::dispatch::{AssignmentResult, Dispatch, EngineMessage, Receipt};
 use super::{Assignment, Evaluate};
 use crate::dispatch_error::DispatchError;
 use futures_util::future::BoxFuture;
 use gait_optimizer::CancelToken;
-use gaitwright_compute::priority::{SOLVER, STACK_BYTES, stand_back};
+use gaitwright_compute::priority::{SOLVER, STACK_BYTES, lower_priority};
 use gaitwright_store::TrialId;
 use std::any::Any;
 use std::collections::HashMap;
@@ -27,31 +27,31 @@ pub struct InProcess {
     evaluate: Arc<dyn Evaluate>,
     size: usize,
     lease: Duration,
-    stands_back: bool,
+    has_lower_priority: bool,
     running: Running,
-    news: UnboundedSender<News>,
-    heard: tokio::sync::Mutex<UnboundedReceiver<News>>,
+    sender: UnboundedSender<EngineMessage>,
+    messages: tokio::sync::Mutex<UnboundedReceiver<EngineMessage>>,
 }
 
 impl InProcess {
     /// An engine for at most `size` parallel solves (at least one).
     pub fn new(size: usize, evaluate: Arc<dyn Evaluate>) -> Self {
-        let (news, heard) = mpsc::unbounded_channel();
+        let (sender, messages) = mpsc::unbounded_channel();
         Self {
             evaluate,
             size: size.max(1),
             lease: LEASE,
-            stands_back: false,
+            has_lower_priority: false,
             running: Running::default(),
-            news,
-            heard: tokio::sync::Mutex::new(heard),
+            sender,
+            messages: tokio::sync::Mutex::new(messages),
         }
     }
 
     /// Lowers the priority of solves below that of requests.
     #[must_use]
-    pub fn standing_back(mut self) -> Self {
-        self.stands_back = true;
+    pub fn with_lower_priority(mut self) -> Self {
+        self.has_lower_priority = true;
         self
     }
 
@@ -75,22 +75,23 @@ impl InProcess {
                 superseded.cancel();
             }
         }
-        let (evaluate, news, stands_back) = (Arc::clone(&self.evaluate), self.news.clone(), self.stands_back);
+        let (evaluate, sender, has_lower_priority) =
+            (Arc::clone(&self.evaluate), self.sender.clone(), self.has_lower_priority);
         let running = Arc::clone(&self.running);
         let work = move || {
-            if stands_back {
-                stand_back(SOLVER);
+            if has_lower_priority {
+                lower_priority(SOLVER);
             }
             // Fails only while the process is shutting down.
-            let _ = news.send(News::Started { attempt, worker: IN_PROCESS.to_owned() });
-            let finding = solve(evaluate.as_ref(), &assignment, &news, &cancel);
+            let _ = sender.send(EngineMessage::Started { attempt, worker: IN_PROCESS.to_owned() });
+            let result = solve(evaluate.as_ref(), &assignment, &sender, &cancel);
             let mut running = lock(&running);
             if running.get(&attempt.trial).is_some_and(|(number, _)| *number == attempt.number) {
                 running.remove(&attempt.trial);
             }
             drop(running);
             let (worker, receipt) = (IN_PROCESS.to_owned(), Receipt::not_needed());
-            let _ = news.send(News::Ended { attempt, worker, finding, receipt });
+            let _ = sender.send(EngineMessage::Ended { attempt, worker, result, receipt });
         };
         let thread = std::thread::Builder::new().name("solver".to_owned()).stack_size(STACK_BYTES).spawn(work);
         thread.map(drop).map_err(|error| {
@@ -134,10 +135,10 @@ impl Dispatch for InProcess {
         })
     }
 
-    fn next(&self) -> BoxFuture<'_, News> {
+    fn next(&self) -> BoxFuture<'_, EngineMessage> {
         Box::pin(async move {
-            match self.heard.lock().await.recv().await {
-                Some(news) => news,
+            match self.messages.lock().await.recv().await {
+                Some(message) => message,
                 // Unreachable: the engine holds a sender itself.
                 None => std::future::pending().await,
             }
@@ -162,22 +163,22 @@ impl fmt::Debug for InProcess {
 fn solve(
     evaluate: &dyn Evaluate,
     assignment: &Assignment,
-    news: &UnboundedSender<News>,
+    sender: &UnboundedSender<EngineMessage>,
     cancel: &CancelToken,
-) -> Finding {
+) -> AssignmentResult {
     let attempt = assignment.attempt;
     let mut iterations = Vec::new();
     let found = catch_unwind(AssertUnwindSafe(|| {
         let mut observer = |record: &gait_optimizer::IterationRecord| {
             iterations.push(*record);
-            let _ = news.send(News::Iterated { attempt, record: *record });
+            let _ = sender.send(EngineMessage::Iterated { attempt, record: *record });
         };
         evaluate.evaluate(assignment, &mut observer, cancel)
     }));
     match found {
-        Ok(Ok(outcome)) => Finding::Ended { outcome: Box::new(outcome), iterations },
-        Ok(Err(reason)) => Finding::Broke(reason),
-        Err(panic) => Finding::Broke(format!("The solver panicked: {}.", words_of(panic.as_ref()))),
+        Ok(Ok(outcome)) => AssignmentResult::Ended { outcome: Box::new(outcome), iterations },
+        Ok(Err(reason)) => AssignmentResult::Broke(reason),
+        Err(panic) => AssignmentResult::Broke(format!("The solver panicked: {}.", words_of(panic.as_ref()))),
     }
 }
 

@@ -34,19 +34,19 @@ pub struct Track {
 
 /// The running solves.
 #[derive(Debug)]
-pub struct Board {
+pub struct RunningSolves {
     tracks: Mutex<HashMap<TrialId, Track>>,
     changes: broadcast::Sender<SolveProgress>,
 }
 
-impl Default for Board {
+impl Default for RunningSolves {
     fn default() -> Self {
         // A listener that falls further behind skips iterations.
         Self { tracks: Mutex::default(), changes: broadcast::channel(1024).0 }
     }
 }
 
-impl Board {
+impl RunningSolves {
     /// Subscribes to all further iterations.
     pub fn listen(&self) -> broadcast::Receiver<SolveProgress> {
         self.changes.subscribe()

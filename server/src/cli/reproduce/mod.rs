@@ -18,7 +18,7 @@ use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::built_in_entries;
-use gaitwright_service::studies::certified_best::Judged;
+use gaitwright_service::studies::certified_best::BestCertification;
 use gaitwright_service::studies::history;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
@@ -142,9 +142,10 @@ impl Reproduce {
                         (ran.snapshot, ran.beliefs)
                     };
                     failures.extend(unattended::failure(&snapshot).map(|failure| format!("{title}: {failure}")));
-                    let judged = unattended::certified(store, &snapshot, &beliefs).await?;
-                    outcomes
-                        .push(outcome(store, subject, muscles, seed, &snapshot, &beliefs, judged, reference).await?);
+                    let certification = unattended::certified(store, &snapshot, &beliefs).await?;
+                    outcomes.push(
+                        outcome(store, subject, muscles, seed, &snapshot, &beliefs, certification, reference).await?,
+                    );
                 }
             }
         }
@@ -179,7 +180,7 @@ impl Reproduce {
         commit(writer).await?;
         let same = known
             .into_iter()
-            .find(|study| study.state == StudyState::Finished && study.plan.tries_the_same_as(&wanted));
+            .find(|study| study.state == StudyState::Finished && study.plan.has_same_trials_as(&wanted));
         match same {
             Some(study) => Ok((study, true)),
             None => Ok((Box::pin(unattended::study(store, new)).await?, false)),
@@ -196,7 +197,7 @@ async fn outcome(
     seed: u64,
     snapshot: &StudySnapshot,
     beliefs: &Arc<Beliefs>,
-    judged: Judged,
+    certification: BestCertification,
     reference: &ReferenceGait,
 ) -> Result<ReproducedStudy, Error> {
     let (there, beliefs) = (snapshot.clone(), Arc::clone(beliefs));
@@ -223,9 +224,9 @@ async fn outcome(
         best_trial: best.map(|trial| trial.number),
         best_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        certificate: judged.certificate,
-        failures: judged.failures,
-        passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
+        certificate: certification.certificate,
+        failures: certification.failures,
+        passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
         best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
         gait,
         reference: reference.clone(),

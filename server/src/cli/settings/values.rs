@@ -126,7 +126,7 @@ impl Settings {
     pub(in crate::cli) fn reserve_bytes(&self) -> Result<u64, Error> {
         const ALLOWED: &str = "0 to 1000000";
         match self.parsed::<u64>("reserve_mb", ALLOWED)? {
-            mb @ 0..=1_000_000 => Ok(mb << 20),
+            mb @ 0..=1_000_000 => Ok(mb * 1_000_000),
             _ => Err(self.refused("reserve_mb", ALLOWED)),
         }
     }

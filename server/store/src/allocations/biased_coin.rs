@@ -1,5 +1,5 @@
 //! Draws of allocations: biased coins for lab sessions (Efron 1971) and fair coins for pairs, as pure functions of a
-//! random lot.
+//! random draw.
 //!
 //! Only unblinded allocations bias the coin of a session. A concealed one thus says nothing about any other, and nobody
 //! who sees everything else guesses it with a probability above [`BIAS`], whatever the order of planning and unblinding.
@@ -8,7 +8,7 @@ use crate::{StoreError, StoreResult};
 
 /// Random bytes for one allocation, from the operating system except in tests.
 #[derive(Debug, Clone, Copy)]
-pub struct Lot {
+pub struct RandomDraw {
     number: u64,
     nonce: [u8; 32],
 }
@@ -18,8 +18,8 @@ const TOLERANCE: u64 = 3;
 /// Of 4 biased draws, those that even out the lead.
 const BIAS: u64 = 3;
 
-impl Lot {
-    /// Draws a lot.
+impl RandomDraw {
+    /// Draws a random number.
     ///
     /// # Errors
     /// If the operating system cannot provide random numbers.
@@ -66,9 +66,9 @@ mod tests {
     /// The 99.9th percentile of the chi-squared distribution with one degree of freedom.
     const CRITICAL: f64 = 10.83;
 
-    fn lot(counter: u64) -> Lot {
+    fn random(counter: u64) -> RandomDraw {
         let digest = Sha256::digest(counter.to_le_bytes());
-        Lot { number: digest.iter().take(8).fold(0, |n, byte| (n << 8) | u64::from(*byte)), nonce: [0; 32] }
+        RandomDraw { number: digest.iter().take(8).fold(0, |n, byte| (n << 8) | u64::from(*byte)), nonce: [0; 32] }
     }
 
     fn chi_squared(count: usize, of: usize) -> f64 {
@@ -85,7 +85,7 @@ mod tests {
     fn in_order(sessions: u64) -> Vec<(i64, bool)> {
         let mut lead = 0;
         let next = |counter| {
-            let gait_a_first = lot(counter).gait_a_first(lead);
+            let gait_a_first = random(counter).gait_a_first(lead);
             let drawn = (lead, gait_a_first);
             lead += if gait_a_first { 1 } else { -1 };
             drawn
@@ -128,9 +128,9 @@ mod tests {
         let (mut lead, mut concealed) = (0_i64, Vec::new());
         let (mut expected, mut right, mut of) = (0.0, 0_u32, 0_u32);
         for counter in 0..200_000_u64 {
-            let Lot { number: choice, .. } = lot(1_000_000 + counter);
+            let RandomDraw { number: choice, .. } = random(1_000_000 + counter);
             if concealed.len() < 2 || (concealed.len() < 6 && choice % 2 == 0) {
-                concealed.push((lead, lot(counter).gait_a_first(lead)));
+                concealed.push((lead, random(counter).gait_a_first(lead)));
                 continue;
             }
             let at = usize::try_from(choice >> 1).unwrap_or(usize::MAX) % concealed.len();
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn sides_of_10_000_pairs_are_balanced_and_independent() {
-        let coins: Vec<bool> = (0..10_000).map(|counter| lot(counter).coin()).collect();
+        let coins: Vec<bool> = (0..10_000).map(|counter| random(counter).coin()).collect();
         let ones = coins.iter().filter(|coin| **coin).count();
         let same = coins.windows(2).filter(|pair| pair[0] == pair[1]).count();
         assert!(chi_squared(ones, coins.len()) < CRITICAL, "{ones}");
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn random_lots_differ_in_number_and_nonce() {
-        let (a, b) = (Lot::draw().unwrap(), Lot::draw().unwrap());
+        let (a, b) = (RandomDraw::draw().unwrap(), RandomDraw::draw().unwrap());
         assert!(a.number != b.number && a.nonce() != b.nonce() && a.nonce().len() == 64);
     }
 }

@@ -6,7 +6,7 @@
 
 mod biased_coin;
 
-pub use biased_coin::Lot;
+pub use biased_coin::RandomDraw;
 
 use super::audit::Actor;
 use super::blind_pairs::{BlindPair, Judgement, SELECT};
@@ -20,12 +20,17 @@ use sqlx::{AssertSqlSafe, Row};
 ///
 /// # Errors
 /// A violated constraint if the session has an allocation; errors of the database.
-pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32, lot: Lot) -> StoreResult<()> {
-    let gait_a_first = lot.gait_a_first(lead(db, number).await?);
+pub async fn of_session(
+    db: &mut Connection,
+    session: LabSessionId,
+    number: u32,
+    random: RandomDraw,
+) -> StoreResult<()> {
+    let gait_a_first = random.gait_a_first(lead(db, number).await?);
     sqlx::query("insert into lab_allocations (session_id, gait_a_first, nonce, created_at) values (?, ?, ?, ?)")
         .bind(session)
         .bind(gait_a_first)
-        .bind(lot.nonce())
+        .bind(random.nonce())
         .bind(now())
         .execute(db)
         .await?;
@@ -47,7 +52,7 @@ async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
 
 /// What may be known of the allocation of a session.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct OfSession {
+pub struct SessionAllocation {
     /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
     /// and then imported.
     pub included: bool,
@@ -74,7 +79,7 @@ pub struct ControllerFileDownload {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<OfSession> {
+pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<SessionAllocation> {
     let order = sqlx::query(
         "select iif(exists (select 1 from lab_session_steps t where t.session_id = a.session_id and t.step = 'unblinded'), \
          a.gait_a_first, null) from lab_allocations a where a.session_id = ?",
@@ -84,7 +89,7 @@ pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<OfSes
     let gait_a_first = order.map(|row| row.try_get(0)).transpose()?.flatten();
     let files = sqlx::query("select * from controller_file_downloads where session_id = ? order by id").bind(id);
     let files = files.fetch_all(db).await?.iter().map(controller_file).collect::<StoreResult<_>>()?;
-    Ok(OfSession { included, gait_a_first, files })
+    Ok(SessionAllocation { included, gait_a_first, files })
 }
 
 fn controller_file(row: &SqliteRow) -> StoreResult<ControllerFileDownload> {
@@ -141,20 +146,25 @@ pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> Sto
 }
 
 /// Draws which gait of a pair is shown first, by a fair coin. A biased one would not do: answers in the study reveal
-/// earlier allocations to readers who know the answer of the rater. A pair that is shown `again` after a retraction keeps its
-/// sides.
+/// earlier allocations to readers who know the answer of the rater. A pair that is shown again after a retraction keeps the
+/// sides of the earlier pair (`same_sides_as`).
 ///
 /// # Errors
 /// A violated constraint if the pair has an allocation; errors of the database.
-pub async fn of_pair(db: &mut Connection, id: BlindPairId, again: Option<BlindPairId>, lot: Lot) -> StoreResult<()> {
+pub async fn of_pair(
+    db: &mut Connection,
+    id: BlindPairId,
+    same_sides_as: Option<BlindPairId>,
+    random: RandomDraw,
+) -> StoreResult<()> {
     sqlx::query(
         "insert into blind_pair_allocations (pair_id, swapped, nonce, created_at) \
          values (?1, coalesce((select swapped from blind_pair_allocations where pair_id = ?2), ?3), ?4, ?5)",
     )
     .bind(id)
-    .bind(again)
-    .bind(lot.coin())
-    .bind(lot.nonce())
+    .bind(same_sides_as)
+    .bind(random.coin())
+    .bind(random.nonce())
     .bind(now())
     .execute(db)
     .await?;
@@ -163,13 +173,13 @@ pub async fn of_pair(db: &mut Connection, id: BlindPairId, again: Option<BlindPa
 
 /// A pair with its sides.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sided {
+pub struct PairWithSides {
     /// The pair.
     pub pair: BlindPair,
     swapped: bool,
 }
 
-impl Sided {
+impl PairWithSides {
     /// The gaits, in the order in which they are shown.
     pub fn shown(&self) -> (TrialId, TrialId) {
         let (a, b) = self.pair.trials();
@@ -191,7 +201,7 @@ impl Sided {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreResult<Option<Sided>> {
+pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreResult<Option<PairWithSides>> {
     let found = sided("where p.token = ? and p.rater = ?", &[token, rater], db).await?;
     Ok(found.into_iter().next())
 }
@@ -200,22 +210,22 @@ pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreRes
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Sided>> {
+pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreResult<Vec<PairWithSides>> {
     let rest = "where p.study_id = ? and exists \
                 (select 1 from unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
     sided(rest, &[&study.to_string()], db).await
 }
 
 /// Reads pairs with their sides. `rest` states why the sides may be known.
-async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> StoreResult<Vec<Sided>> {
+async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> StoreResult<Vec<PairWithSides>> {
     let columns = SELECT.replacen("select p.*", "select p.*, s.swapped", 1);
     let sql = format!("{columns} join blind_pair_allocations s on s.pair_id = p.id {rest}");
     let mut query = sqlx::query(AssertSqlSafe(sql));
     for value in values {
         query = query.bind((*value).to_owned());
     }
-    let row = |row: &SqliteRow| -> StoreResult<Sided> {
-        Ok(Sided { pair: BlindPair::from_row(row)?, swapped: row.try_get("swapped")? })
+    let row = |row: &SqliteRow| -> StoreResult<PairWithSides> {
+        Ok(PairWithSides { pair: BlindPair::from_row(row)?, swapped: row.try_get("swapped")? })
     };
     query.fetch_all(db).await?.iter().map(row).collect()
 }

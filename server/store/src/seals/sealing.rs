@@ -29,31 +29,31 @@ pub(in super::super) fn touched(table: &str, key: &str) -> StoreError {
     StoreError::Damaged { what: "evidence", reason }
 }
 
-/// A row that a change touched, as it was first noted.
-struct Noted {
+/// A row that a change touched, as it was before.
+struct ChangedRow {
     table: String,
     key: String,
     event: String,
     known: Option<String>,
 }
 
-/// Seals the noted rows.
+/// Seals the changed rows.
 ///
 /// # Errors
 /// [`StoreError::Damaged`] if another program had changed, added or deleted one of these rows before.
 pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
     // A single query, because every change waits for it.
-    let noted = "select place, table_name, key, event, known, (select hash from seals order by seq desc limit 1) \
+    let changed = "select place, table_name, key, event, known, (select hash from seals order by seq desc limit 1) \
                  from unsealed order by place";
-    let noted = sqlx::query(noted).fetch_all(&mut *db).await?;
-    let Some(first) = noted.first() else { return Ok(()) };
+    let changed = sqlx::query(changed).fetch_all(&mut *db).await?;
+    let Some(first) = changed.first() else { return Ok(()) };
     let mut previous: String = first.try_get::<Option<String>, _>(5)?.unwrap_or_else(|| ORIGIN.to_owned());
-    let mut rows: Vec<Noted> = Vec::new();
+    let mut rows: Vec<ChangedRow> = Vec::new();
     let mut places = HashMap::<(&str, &str), usize>::new();
     let mut deleted = HashSet::new();
     // The tables with old rows, each with the places of those that another change wrote.
     let mut old_rows = BTreeMap::<String, HashSet<i64>>::new();
-    for row in &noted {
+    for row in &changed {
         let (table, key, event): (&str, &str, &str) = (row.try_get(1)?, row.try_get(2)?, row.try_get(3)?);
         let has_old_row = event == RowEvent::Update.name() || event == RowEvent::Delete.name();
         let at = *places.entry((table, key)).or_insert(rows.len());
@@ -65,7 +65,7 @@ pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
         }
         if at == rows.len() {
             let (table, key, event) = (table.to_owned(), key.to_owned(), event.to_owned());
-            rows.push(Noted { table, key, event, known: row.try_get(4)? });
+            rows.push(ChangedRow { table, key, event, known: row.try_get(4)? });
         }
         // What became of a row at last.
         if event == RowEvent::Delete.name() {
@@ -76,7 +76,7 @@ pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
     }
     refuse_touched(db, &rows, &old_rows).await?;
     let mut keys = BTreeMap::<&str, Vec<&str>>::new();
-    for (at, Noted { table, key, .. }) in rows.iter().enumerate() {
+    for (at, ChangedRow { table, key, .. }) in rows.iter().enumerate() {
         if !deleted.contains(&at) {
             keys.entry(table).or_default().push(key);
         }
@@ -88,7 +88,7 @@ pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
         }
     }
     let (mut seals, mut checksums) = (Vec::new(), Vec::new());
-    for Noted { table, key, .. } in &rows {
+    for ChangedRow { table, key, .. } in &rows {
         let sha256 = hashes.get(table.as_str()).and_then(|of_table| of_table.get(key));
         if TABLES.iter().any(|sealed| sealed.table == table) {
             let sha256 = sha256.map_or("", String::as_str);
@@ -116,12 +116,12 @@ pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
 /// Refuses a change of rows that were not whole before it.
 async fn refuse_touched(
     db: &mut Connection,
-    noted: &[Noted],
+    changed: &[ChangedRow],
     old_rows: &BTreeMap<String, HashSet<i64>>,
 ) -> StoreResult<()> {
     // A seal or a checksum of a row that was not there: it was deleted outside the program.
-    let was_there = |row: &&Noted| row.known.as_ref().is_some_and(|known| !known.is_empty());
-    if let Some(row) = noted.iter().filter(|row| row.event == RowEvent::Insert.name()).find(was_there) {
+    let was_there = |row: &&ChangedRow| row.known.as_ref().is_some_and(|known| !known.is_empty());
+    if let Some(row) = changed.iter().filter(|row| row.event == RowEvent::Insert.name()).find(was_there) {
         return Err(touched(&row.table, &row.key));
     }
     for (table, firsts) in old_rows {

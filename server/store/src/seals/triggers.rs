@@ -38,23 +38,25 @@ impl Sealed {
     fn trigger(&self, event: RowEvent, keep: Option<&[String]>) -> String {
         let (table, name) = (self.table, event.name());
         let key = self.key_of(if event == RowEvent::Delete { "old." } else { "new." });
-        let (noted, known) = match keep {
+        let (written, known) = match keep {
             Some(_) => (name, self.known_hash(&key)),
             None => (RowEvent::MIGRATED, "null".to_owned()),
         };
         let note = "insert into unsealed (table_name, key, event, known)";
-        let mut acts = vec![format!("{note} values ('{table}', {key}, '{noted}', {known});")];
+        let mut statements = vec![format!("{note} values ('{table}', {key}, '{written}', {known});")];
         if let Some(columns) = keep.filter(|_| event != RowEvent::Insert) {
             let old: Vec<String> = columns.iter().map(|column| format!("old.\"{column}\"")).collect();
             let place = "(select max(place) from unsealed)";
-            acts.push(format!("insert into {} values ({place}, {});", self.old_rows(), old.join(", ")));
+            statements.push(format!("insert into {} values ({place}, {});", self.old_rows(), old.join(", ")));
         }
         if event != RowEvent::Insert && self.is_checked() {
             let old = self.key_of("old.");
-            acts.push(format!("delete from checksums where table_name = '{table}' and key = {old};"));
+            statements.push(format!("delete from checksums where table_name = '{table}' and key = {old};"));
         }
-        let acts = acts.join(" ");
-        format!("create temp trigger if not exists {table}_after_{name} after {name} on main.{table} begin {acts} end")
+        let statements = statements.join(" ");
+        format!(
+            "create temp trigger if not exists {table}_after_{name} after {name} on main.{table} begin {statements} end"
+        )
     }
 }
 

@@ -15,7 +15,7 @@ const BATCH: i64 = 1000;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SealCheck {
     /// Every row matches its seal.
-    Whole {
+    Intact {
         /// Number of seals.
         seals: u64,
         /// Hash of the last seal.
@@ -48,7 +48,7 @@ pub enum SealCheck {
 /// Errors of the database.
 pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
     let chain = walk(db).await?;
-    if !matches!(chain, SealCheck::Whole { .. }) {
+    if !matches!(chain, SealCheck::Intact { .. }) {
         return Ok(chain);
     }
     let known = present(db).await?;
@@ -105,7 +105,7 @@ async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
     if last_ever(db, "seals").await? != after {
         return Ok(SealCheck::Broken { seq: after + 1 });
     }
-    Ok(SealCheck::Whole { seals: after.unsigned_abs(), last })
+    Ok(SealCheck::Intact { seals: after.unsigned_abs(), last })
 }
 
 /// The key of a row that differs from the hash that the record has of it, and whether it has none; or the key of a hash

@@ -2,7 +2,7 @@
 
 use super::{Study, StudyState, from_row};
 use crate::accessible_studies::Reach;
-use crate::members::{binds, reached};
+use crate::members::{reach_values, reached};
 use crate::{Connection, Instant, StoreResult, StudyId, SubjectId};
 
 /// Which studies of those that a caller reaches.
@@ -36,7 +36,7 @@ impl StudyFilter {
 /// # Errors
 /// Errors of the database.
 pub async fn page(db: &mut Connection, reach: Reach, filter: &StudyFilter) -> StoreResult<Vec<Study>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let sql = concat!(
         "select s.* from studies s join subjects p on p.id = s.subject_id where ",
         reached!("s.id"),
@@ -58,7 +58,7 @@ pub async fn page(db: &mut Connection, reach: Reach, filter: &StudyFilter) -> St
 /// # Errors
 /// Errors of the database.
 pub async fn tags(db: &mut Connection, reach: Reach) -> StoreResult<Vec<String>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let sql = concat!(
         "select distinct t.value from studies s, json_each(s.tags) t where ",
         reached!("s.id"),
@@ -73,7 +73,7 @@ pub async fn tags(db: &mut Connection, reach: Reach) -> StoreResult<Vec<String>>
 /// # Errors
 /// Errors of the database.
 pub async fn is_named(db: &mut Connection, reach: Reach, name: &str, except: Option<StudyId>) -> StoreResult<bool> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let sql =
         concat!("select 1 from studies where ", reached!("id"), " and name = ?4 and (?5 is null or id <> ?5) limit 1");
     let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(name).bind(except);
@@ -84,8 +84,8 @@ pub async fn is_named(db: &mut Connection, reach: Reach, name: &str, except: Opt
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn asking_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
-    let (every, open, principal) = binds(reach);
+pub async fn awaiting_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = reach_values(reach);
     let sql = concat!(
         "select * from studies where state in ('running', 'waiting') and feedback_mode <> 'automatic' and ",
         reached!("id"),
@@ -110,7 +110,7 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
 /// # Errors
 /// Errors of the database.
 pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let sql = concat!(
         "select * from studies where state in ('waiting', 'paused', 'draft') and archived_at is null and ",
         reached!("id"),
@@ -139,7 +139,7 @@ macro_rules! reported {
 /// # Errors
 /// Errors of the database.
 pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let rows = sqlx::query(concat!(
         "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and ",
         reached!("s.id"),
@@ -178,7 +178,7 @@ pub async fn of_subject_with_safety_reports(db: &mut Connection, study: StudyId)
 /// # Errors
 /// Errors of the database.
 pub async fn of_subject(db: &mut Connection, reach: Reach, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
-    let (every, open, principal) = binds(reach);
+    let (every, open, principal) = reach_values(reach);
     let sql = concat!("select * from studies where subject_id = ?4 and ", reached!("id"), " order by id desc limit ?5");
     let query = sqlx::query(sql).bind(every).bind(open).bind(principal);
     query.bind(subject).bind(limit).fetch_all(db).await?.iter().map(from_row).collect()

@@ -119,13 +119,13 @@ pub struct StudyPlan {
 
 impl StudyPlan {
     /// Whether no trial may have an action whose gait is known. Scripts measure, so equal actions can give other results.
-    pub fn tries_new_gaits_only(&self) -> bool {
+    pub fn excludes_known_gaits(&self) -> bool {
         self.evaluation == Evaluation::Optimizer && !self.repeat_results
     }
 
     /// Whether a study with the other plan would try the same trials: same subject, problem, learner and seed. Name,
     /// priority and parallel trials do not matter.
-    pub fn tries_the_same_as(&self, other: &Self) -> bool {
+    pub fn has_same_trials_as(&self, other: &Self) -> bool {
         let own = |plan: &Self| Self { name: String::new(), priority: 0, parallel_trials: 1, ..plan.clone() };
         own(self) == own(other)
     }

@@ -269,7 +269,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn give_to(db: &mut Connection, id: TrialId, worker: &str) -> StoreResult<()> {
+pub async fn assign(db: &mut Connection, id: TrialId, worker: &str) -> StoreResult<()> {
     sqlx::query("update trials set state = 'running', started_at = ?, script = ? where id = ?")
         .bind(now())
         .bind(worker)

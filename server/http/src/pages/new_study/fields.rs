@@ -2,7 +2,7 @@
 
 use crate::form_errors;
 use gait_learner::{LearnerSettings, Method};
-use gait_optimizer::{BasinChoice, TunedBounds};
+use gait_optimizer::{LocalOptimumChoice, TunedBounds};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::StudyId;
 use gaitwright_store::studies::{Study, StudyPlan};
@@ -44,7 +44,7 @@ pub(crate) struct NewStudyFields {
     #[serde(default)]
     pub(super) repeat_results: Option<String>,
     #[serde(default)]
-    pub(super) basin_within_percent: String,
+    pub(super) nearest_within_percent: String,
     /// Whether bounds were relaxed in a clone, so that the table of bounds has to be shown.
     #[serde(skip)]
     pub(super) relaxed: bool,
@@ -78,7 +78,7 @@ impl Default for NewStudyFields {
             parallel_trials: text("1"),
             seed: text("1"),
             repeat_results: None,
-            basin_within_percent: String::new(),
+            nearest_within_percent: String::new(),
             relaxed: false,
             space: BTreeMap::new(),
         }
@@ -109,9 +109,9 @@ impl NewStudyFields {
             parallel_trials: plan.parallel_trials.to_string(),
             seed: plan.seed.to_string(),
             repeat_results: ticked(plan.repeat_results),
-            basin_within_percent: match plan.solve_options.basin_choice {
-                BasinChoice::NearestToReference { within_percent } => within_percent.to_string(),
-                BasinChoice::LowestObjective => String::new(),
+            nearest_within_percent: match plan.solve_options.local_optimum_choice {
+                LocalOptimumChoice::NearestToReference { within_percent } => within_percent.to_string(),
+                LocalOptimumChoice::LowestObjective => String::new(),
             },
             space: space_of(plan),
             ..Self::default()
@@ -165,7 +165,7 @@ impl NewStudyFields {
             "unchanged_limit" => self.unchanged_limit.clear(),
             "parallel_trials" => self.parallel_trials = default.parallel_trials,
             "seed" => self.seed = default.seed,
-            "basin_within_percent" => self.basin_within_percent.clear(),
+            "nearest_within_percent" => self.nearest_within_percent.clear(),
             _ => {
                 let bound = field.rsplit('_').next().unwrap_or_default();
                 if !TunedBounds::NAMES.contains(&bound) {
@@ -265,7 +265,7 @@ fn label(field: &str) -> String {
         "unchanged_limit" => "Stop early after",
         "parallel_trials" => "Parallel trials",
         "seed" => "Seed",
-        "basin_within_percent" => "Objective tolerance, %",
+        "nearest_within_percent" => "Objective tolerance, %",
         other => other,
     };
     match field.split_once('_') {

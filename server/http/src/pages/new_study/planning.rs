@@ -4,7 +4,7 @@ use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as
 use super::space_editor::SpaceEditor;
 use crate::accessible::Named;
 use crate::body_measures;
-use gait_optimizer::{BasinChoice, SolveOptions};
+use gait_optimizer::{LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
@@ -149,7 +149,7 @@ fn study_of(
         base_bounds,
         feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
             .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human or mixed"))?,
-        solve_options: SolveOptions { basin_choice: basin_choice(fields)?, ..base.solve_options },
+        solve_options: SolveOptions { local_optimum_choice: local_optimum_choice(fields)?, ..base.solve_options },
         learner: match learner(&fields.learner) {
             Some(chosen) => chosen,
             None if like.is_some() && fields.learner == KEPT => base.learner,
@@ -168,14 +168,14 @@ fn study_of(
 }
 
 /// `None` if only the lowest objective counts.
-fn basin_choice(fields: &NewStudyFields) -> Result<BasinChoice, Error> {
-    let field = "basin_within_percent";
+fn local_optimum_choice(fields: &NewStudyFields) -> Result<LocalOptimumChoice, Error> {
+    let field = "nearest_within_percent";
     let allowed = "0 to 100, or empty";
-    let Some(within_percent) = optional(field, &fields.basin_within_percent, allowed)? else {
-        return Ok(BasinChoice::LowestObjective);
+    let Some(within_percent) = optional(field, &fields.nearest_within_percent, allowed)? else {
+        return Ok(LocalOptimumChoice::LowestObjective);
     };
-    let chosen = BasinChoice::NearestToReference { within_percent };
-    chosen.validate().map_err(|_| Error::invalid(field, fields.basin_within_percent.as_str(), allowed))?;
+    let chosen = LocalOptimumChoice::NearestToReference { within_percent };
+    chosen.validate().map_err(|_| Error::invalid(field, fields.nearest_within_percent.as_str(), allowed))?;
     Ok(chosen)
 }
 

@@ -3,9 +3,9 @@
 use super::answers::{AnswerRow, answers};
 use super::recommended_walker::RecommendedGait;
 use super::time_left::time_left;
-use super::transitions::{ActButton, button};
+use super::transitions::{TransitionButton, button};
 use super::trials_table::{TrialRow, TrialsQuery, TrialsTable};
-use super::without_gait::WithoutGait;
+use super::without_gait::TrialsWithoutGait;
 use crate::AppState;
 use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
 use crate::format::{self, Bound};
@@ -19,10 +19,10 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Caller, Permission, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
-use gaitwright_service::studies::certified_best::{self, CertificateState, Judged};
+use gaitwright_service::studies::certified_best::{self, BestCertification, CertificateState};
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
-use gaitwright_service::studies::lifecycle::{self, StudyTransition, acts_of_people};
+use gaitwright_service::studies::lifecycle::{self, StudyTransition, transitions_for_people};
 use gaitwright_service::studies::safety_reports::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
@@ -38,14 +38,14 @@ use std::sync::Arc;
 pub(super) struct Live {
     study: Study,
     state: String,
-    acts: Vec<ActButton>,
+    transitions: Vec<TransitionButton>,
     /// Whether it can be stopped.
     may_stop: bool,
     /// Whether it has ended and can get more trials.
     may_extend: bool,
     pub(super) counts: TrialCounts,
     /// Why trials have no gait.
-    without_gait: Option<WithoutGait>,
+    without_gait: Option<TrialsWithoutGait>,
     /// The bounds that were active in no gait so far; empty if none or unknown.
     never_active: String,
     /// Number of results, and number of planned trials.
@@ -123,7 +123,7 @@ struct BestGait {
     /// Whether a script evaluated it and reported figures only.
     by_script: bool,
     /// The state of its certificate.
-    judged: Judged,
+    certification: BestCertification,
     /// How many simulated walks with it were complete; `None` if none were simulated.
     simulated_walks: Option<String>,
     /// If it failed, the best trial whose gait passed.
@@ -132,15 +132,15 @@ struct BestGait {
 
 impl BestGait {
     fn failed(&self) -> bool {
-        self.judged.certificate == CertificateState::Failed
+        self.certification.certificate == CertificateState::Failed
     }
 
     fn passed(&self) -> bool {
-        self.judged.certificate == CertificateState::Passed
+        self.certification.certificate == CertificateState::Passed
     }
 
     fn is_being_certified(&self) -> bool {
-        self.judged.certificate == CertificateState::BeingCertified
+        self.certification.certificate == CertificateState::BeingCertified
     }
 }
 
@@ -176,8 +176,8 @@ pub(super) async fn read_live(
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
     // The computing time of the learner also grows with the answers.
-    let heard = feedback::count(&mut reader, id).await? as usize;
-    let large = counts.total as usize >= MANY || heard > MOST_ANSWERS;
+    let answer_count = feedback::count(&mut reader, id).await? as usize;
+    let large = counts.total as usize >= MANY || answer_count > MOST_ANSWERS;
     let snapshot = if large {
         StudySnapshot::newest(&mut reader, study, SHOWN).await?
     } else {
@@ -195,10 +195,10 @@ pub(super) async fn read_live(
     let (snapshot, learned) = app.compute(draw).await?;
     let Learned { outcome, certainty, utility } = learned.map_err(Error::Learner)?;
     let mut reader = app.read().await?;
-    let mut judged = certified_best::judged(&mut reader, &outcome.ranking).await?;
-    let without_gait = WithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
+    let mut certification = certified_best::of_ranking(&mut reader, &outcome.ranking).await?;
+    let without_gait = TrialsWithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
     let has_gait = match outcome.best {
-        Some(best) => gaits::is_here(&mut reader, best).await?,
+        Some(best) => gaits::exists(&mut reader, best).await?,
         None => false,
     };
     let simulated_walks = match outcome.best {
@@ -206,19 +206,19 @@ pub(super) async fn read_live(
         None => None,
     };
     drop(reader);
-    if let Some(next) = judged.without_certificate {
-        judged.certified_by_service(app.scheduler.is_certifying(id, next));
+    if let Some(next) = certification.without_certificate {
+        certification.certified_by_service(app.scheduler.is_certifying(id, next));
     }
     let running = snapshot
         .trials
         .iter()
         .filter(|trial| trial.state == TrialState::Running)
-        .map(|trial| running_row(trial, app.scheduler.board().track(trial.id).as_ref()))
+        .map(|trial| running_row(trial, app.scheduler.running_solves().track(trial.id).as_ref()))
         .collect();
     let mut answers = answers(&snapshot, &assessments);
     answers.truncate(ANSWERS);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let found = StudyFindings { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait };
+    let found = StudyFindings { outcome, certainty, utility, certification, simulated_walks, has_gait, without_gait };
     let pace = time_left(&snapshot, counts.results(), app.scheduler.workers());
     // A large study shows only its newest trials, so whether a bound was ever active is unknown.
     let inactive = if large { Vec::new() } else { never_active(&snapshot) };
@@ -275,12 +275,12 @@ struct StudyFindings {
     certainty: Option<String>,
     utility: Option<Figure>,
     /// The states of the certificates.
-    judged: Judged,
+    certification: BestCertification,
     /// How many simulated walks with the best gait were complete.
     simulated_walks: Option<String>,
     /// Whether the trajectory of the best gait is stored.
     has_gait: bool,
-    without_gait: Option<WithoutGait>,
+    without_gait: Option<TrialsWithoutGait>,
 }
 
 fn view(
@@ -292,7 +292,7 @@ fn view(
     answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
-    let StudyFindings { outcome, certainty, utility, judged, simulated_walks, has_gait, without_gait } = found;
+    let StudyFindings { outcome, certainty, utility, certification, simulated_walks, has_gait, without_gait } = found;
     let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| BestGait {
         id: trial.id,
         number: trial.number,
@@ -301,12 +301,12 @@ fn view(
         bounds: format::bounds(&trial.action),
         has_gait,
         by_script: trial.script.is_some(),
-        passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
+        passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,
             rmse: format::figure(trial.gait_rmse_rad),
         }),
-        judged: judged.clone(),
+        certification: certification.clone(),
         simulated_walks,
     });
     let unsafe_gait = |report: &ReportedGait| {
@@ -317,12 +317,12 @@ fn view(
     let unsafe_gaits = snapshot.grounds.safety_reports.in_force.iter().filter_map(unsafe_gait).collect();
     let converged = snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
     let files = format!("/api/v1/studies/{}/figures", snapshot.study.id);
-    let acts = if may_run { acts_of_people(snapshot.study.state) } else { Vec::new() };
+    let transitions = if may_run { transitions_for_people(snapshot.study.state) } else { Vec::new() };
     Live {
         state: lifecycle::in_words(snapshot.study.state).to_owned(),
-        may_stop: acts.contains(&StudyTransition::Stop),
-        may_extend: acts.contains(&StudyTransition::Extend),
-        acts: acts.into_iter().filter_map(button).collect(),
+        may_stop: transitions.contains(&StudyTransition::Stop),
+        may_extend: transitions.contains(&StudyTransition::Extend),
+        transitions: transitions.into_iter().filter_map(button).collect(),
         pace: String::new(),
         queued: String::new(),
         without_gait,

@@ -144,6 +144,8 @@ pub(super) async fn running(
     Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Response, PageError> {
     let trial = trials::get(&mut *app.read().await?, id).await?;
-    let Some(track) = app.scheduler.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
+    let Some(track) = app.scheduler.running_solves().track(id) else {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    };
     Ok(page(&RunningPage { row: running_row(&trial, Some(&track)) })?.into_response())
 }

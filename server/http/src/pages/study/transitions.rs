@@ -16,15 +16,15 @@ use gaitwright_store::{StudyId, commit};
 use serde::Deserialize;
 
 /// A button of the page.
-pub(super) struct ActButton {
-    pub(super) act: &'static str,
+pub(super) struct TransitionButton {
+    pub(super) transition: &'static str,
     pub(super) label: &'static str,
 }
 
 /// The form of a button.
 #[derive(Debug, Deserialize)]
-pub(in crate::pages) struct Do {
-    act: String,
+pub(in crate::pages) struct TransitionForm {
+    transition: String,
     /// The new total number of trials, for an extension.
     #[serde(default)]
     trial_budget: String,
@@ -35,21 +35,21 @@ pub(in crate::pages) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    Form(form): Form<Do>,
+    Form(form): Form<TransitionForm>,
 ) -> Result<Redirect, PageError> {
-    let act = StudyTransition::ALL
+    let transition = StudyTransition::ALL
         .into_iter()
-        .find(|act| act.as_str() == form.act && acts_for_pages(*act))
-        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop or extend"))?;
+        .find(|transition| transition.as_str() == form.transition && is_offered_on_pages(*transition))
+        .ok_or_else(|| Error::invalid("transition", form.transition, "start, pause, resume, stop or extend"))?;
     let mut writer = app.write().await?;
-    let cancelled = if act == StudyTransition::Extend {
+    let cancelled = if transition == StudyTransition::Extend {
         let refused =
             || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
         let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
         study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
         Vec::new()
     } else {
-        command::act(&mut writer, &authorized.caller.actor, id, act, "").await?.cancelled
+        command::transition(&mut writer, &authorized.caller.actor, id, transition, "").await?.cancelled
     };
     commit(writer).await?;
     for trial in cancelled {
@@ -60,9 +60,9 @@ pub(in crate::pages) async fn post(
 }
 
 /// Whether the page has a button for it.
-pub(super) fn acts_for_pages(act: StudyTransition) -> bool {
+pub(super) fn is_offered_on_pages(transition: StudyTransition) -> bool {
     matches!(
-        act,
+        transition,
         StudyTransition::Start
             | StudyTransition::Pause
             | StudyTransition::Resume
@@ -72,11 +72,11 @@ pub(super) fn acts_for_pages(act: StudyTransition) -> bool {
 }
 
 /// Acts that need no confirmation.
-pub(super) fn button(act: StudyTransition) -> Option<ActButton> {
-    match act {
-        StudyTransition::Start => Some(ActButton { act: "start", label: "Start" }),
-        StudyTransition::Pause => Some(ActButton { act: "pause", label: "Pause" }),
-        StudyTransition::Resume => Some(ActButton { act: "resume", label: "Resume" }),
+pub(super) fn button(transition: StudyTransition) -> Option<TransitionButton> {
+    match transition {
+        StudyTransition::Start => Some(TransitionButton { transition: "start", label: "Start" }),
+        StudyTransition::Pause => Some(TransitionButton { transition: "pause", label: "Pause" }),
+        StudyTransition::Resume => Some(TransitionButton { transition: "resume", label: "Resume" }),
         _ => None,
     }
 }

@@ -8,14 +8,14 @@ use std::collections::BTreeMap;
 
 /// A sentence about the trials without a gait, and an example.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct WithoutGait {
+pub(crate) struct TrialsWithoutGait {
     /// The sentence.
     pub(super) reason: String,
     /// One of these trials: identifier and number.
     pub(super) instance: (TrialId, u32),
 }
 
-impl WithoutGait {
+impl TrialsWithoutGait {
     /// `None` if every solved trial has a gait.
     pub(super) fn of(trials: &[Trial], common: &Common) -> Option<Self> {
         let explained = common.explained;

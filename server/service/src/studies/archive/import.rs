@@ -6,7 +6,7 @@ use super::file::{ArchiveFacts, Next, Unpacker, refuse};
 use super::signature::PublicKey;
 use crate::error::Error;
 use gaitwright_compute::Pool;
-use gaitwright_store::archive::{self, Known, Unpacking};
+use gaitwright_store::archive::{self, RowMatch, Unpacking};
 use gaitwright_store::archived_row::{Cell, Row};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::imports::{self, NewImport};
@@ -166,16 +166,16 @@ async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unp
         _ => "reference gait",
     };
     match archive::known(writer, table, row).await? {
-        Known::New => Ok(true),
-        Known::Same(here) => {
+        RowMatch::New => Ok(true),
+        RowMatch::Same(here) => {
             unpacking.same.insert(id, here);
             Ok(false)
         }
-        Known::Differs(columns) => {
+        RowMatch::Differs(columns) => {
             let differing: Vec<String> = columns.iter().map(|column| format!("{column} differs")).collect();
             Err(does_not_fit(format!("{what} {id} exists here with different content ({})", differing.join(", "))))
         }
-        Known::NameTaken(name) => {
+        RowMatch::NameTaken(name) => {
             if table == "subjects"
                 && is_built_in(row)
                 && let Some(here) = subjects::by_pseudonym(writer, &name).await?

@@ -14,7 +14,7 @@ fn sees_gaits(caller: &Caller) -> bool {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn sees_or_saw_gaits(db: &mut Connection, caller: &Caller) -> Result<bool, Error> {
+pub async fn is_never_blind(db: &mut Connection, caller: &Caller) -> Result<bool, Error> {
     if sees_gaits(caller) {
         return Ok(true);
     }
@@ -22,13 +22,13 @@ pub async fn sees_or_saw_gaits(db: &mut Connection, caller: &Caller) -> Result<b
     Ok(users::former_roles(db, user).await?.iter().any(|role| role.rights().has(Right::Read)))
 }
 
-/// Whether a caller could know which gait is which in a study: besides who is [not blind in any](sees_or_saw_gaits), a
+/// Whether a caller could know which gait is which in a study: besides who is [not blind in any](is_never_blind), a
 /// rater may have been unblinded, and a controller file of a lab walk shows a gait.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn could_have_known(db: &mut Connection, caller: &Caller, study: StudyId) -> Result<bool, Error> {
-    Ok(sees_or_saw_gaits(db, caller).await?
+    Ok(is_never_blind(db, caller).await?
         || blind_pairs::is_unblinded(db, study, &caller.name).await?
         || allocations::has_file(db, study, &caller.actor).await?)
 }

@@ -9,7 +9,7 @@ const REPEAT_ONE_IN: u64 = 10;
 
 /// The chosen pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Drawn {
+pub struct NextPair {
     /// Why it is shown.
     pub kind: BlindPairKind,
     /// The two gaits, the newer one first.
@@ -17,36 +17,37 @@ pub struct Drawn {
     /// The earlier pair that it repeats.
     pub repeats: Option<BlindPairId>,
     /// The pair whose answer was retracted: it is shown again, with the same sides.
-    pub again: Option<BlindPairId>,
+    pub same_sides_as: Option<BlindPairId>,
 }
 
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
 /// earlier blind_pairs of this rater; `reported` lists trials with a safety report in force.
-pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[BlindPair], reported: &[TrialId]) -> Drawn {
+pub fn next_pair(random: u64, question: (TrialId, TrialId), before: &[BlindPair], reported: &[TrialId]) -> NextPair {
     let retracted = before.last().filter(|last| last.answer == Some(Judgement::Retracted));
     if let Some(last) = retracted.filter(|last| !last.has_one_of(reported)) {
         // A rater who confused the sides must find them unchanged.
-        let again = Drawn { kind: last.kind, pair: last.trials(), repeats: last.repeats, again: Some(last.id) };
+        let repeated =
+            NextPair { kind: last.kind, pair: last.trials(), repeats: last.repeats, same_sides_as: Some(last.id) };
         let is_question = is_same_pair(last.trials(), question);
         if last.kind == BlindPairKind::Repeat || is_question {
-            return again;
+            return repeated;
         }
     }
-    let new = Drawn { kind: BlindPairKind::New, pair: question, repeats: None, again: None };
-    if !lot.is_multiple_of(REPEAT_ONE_IN) {
+    let new = NextPair { kind: BlindPairKind::New, pair: question, repeats: None, same_sides_as: None };
+    if !random.is_multiple_of(REPEAT_ONE_IN) {
         return new;
     }
-    let repeat = |earlier: &BlindPair| Drawn {
+    let repeat = |earlier: &BlindPair| NextPair {
         kind: BlindPairKind::Repeat,
         pair: earlier.trials(),
         repeats: Some(earlier.id),
-        again: None,
+        same_sides_as: None,
     };
-    repeatable(before, reported, lot / REPEAT_ONE_IN).map_or(new, repeat)
+    repeatable(before, reported, random / REPEAT_ONE_IN).map_or(new, repeat)
 }
 
 /// An earlier pair with a plain answer that has not been repeated.
-fn repeatable<'a>(before: &'a [BlindPair], reported: &[TrialId], lot: u64) -> Option<&'a BlindPair> {
+fn repeatable<'a>(before: &'a [BlindPair], reported: &[TrialId], random: u64) -> Option<&'a BlindPair> {
     let plain = |shown: &&BlindPair| {
         shown.kind == BlindPairKind::New
             && shown.answer.is_some_and(is_plain)
@@ -54,7 +55,7 @@ fn repeatable<'a>(before: &'a [BlindPair], reported: &[TrialId], lot: u64) -> Op
             && !before.iter().any(|other| other.repeats == Some(shown.id))
     };
     let candidates: Vec<&BlindPair> = before.iter().filter(plain).collect();
-    let index = lot.checked_rem(candidates.len() as u64)?;
+    let index = random.checked_rem(candidates.len() as u64)?;
     candidates.get(usize::try_from(index).ok()?).copied()
 }
 
@@ -73,17 +74,17 @@ mod tests {
     use super::*;
     use gaitwright_store::{StudyId, now};
 
-    fn shown(number: u32, drawn: Drawn) -> BlindPair {
+    fn shown(number: u32, next: NextPair) -> BlindPair {
         BlindPair {
             id: BlindPairId::fresh(),
             token: String::new(),
             study_id: StudyId::fresh(),
             rater: "R".to_owned(),
             number,
-            kind: drawn.kind,
-            trial_a: drawn.pair.0,
-            trial_b: drawn.pair.1,
-            repeats: drawn.repeats,
+            kind: next.kind,
+            trial_a: next.pair.0,
+            trial_b: next.pair.1,
+            repeats: next.repeats,
             could_have_known: false,
             created_at: now(),
             answer: Some(Judgement::First),
@@ -100,13 +101,13 @@ mod tests {
     fn one_pair_in_ten_repeats_an_earlier_one() {
         let mut before: Vec<BlindPair> = Vec::new();
         for number in 1..=400 {
-            let drawn = draw(u64::from(number) * 7, question(), &before, &[]);
-            if let Some(repeats) = drawn.repeats {
+            let next = next_pair(u64::from(number) * 7, question(), &before, &[]);
+            if let Some(repeats) = next.repeats {
                 let earlier = before.iter().find(|shown| shown.id == repeats).unwrap();
-                assert_eq!((drawn.kind, drawn.pair), (BlindPairKind::Repeat, earlier.trials()));
+                assert_eq!((next.kind, next.pair), (BlindPairKind::Repeat, earlier.trials()));
                 assert!(!before.iter().any(|shown| shown.repeats == Some(repeats)));
             }
-            before.push(shown(number, drawn));
+            before.push(shown(number, next));
         }
         let repeats = before.iter().filter(|shown| shown.kind == BlindPairKind::Repeat).count();
         assert_eq!(repeats, 40);
@@ -114,30 +115,31 @@ mod tests {
 
     #[test]
     fn pair_with_retracted_answer_is_shown_again_with_the_same_sides() {
-        for lot in [1, 10] {
-            let asked = question();
-            let earlier = shown(1, draw(1, question(), &[], &[]));
-            let drawn = draw(lot, asked, std::slice::from_ref(&earlier), &[]);
-            let retracted = BlindPair { answer: Some(Judgement::Retracted), ..shown(2, drawn) };
+        for random in [1, 10] {
+            let pending = question();
+            let earlier = shown(1, next_pair(1, question(), &[], &[]));
+            let next = next_pair(random, pending, std::slice::from_ref(&earlier), &[]);
+            let retracted = BlindPair { answer: Some(Judgement::Retracted), ..shown(2, next) };
             let id = retracted.id;
-            let again = draw(3, asked, &[earlier, retracted], &[]);
-            assert_eq!(again, Drawn { again: Some(id), ..drawn });
+            let repeated = next_pair(3, pending, &[earlier, retracted], &[]);
+            assert_eq!(repeated, NextPair { same_sides_as: Some(id), ..next });
         }
     }
 
     #[test]
     fn settled_comparison_is_not_shown_again() {
-        let retracted = BlindPair { answer: Some(Judgement::Retracted), ..shown(1, draw(1, question(), &[], &[])) };
-        let asked = question();
-        assert_eq!(draw(1, asked, &[retracted], &[]).pair, asked);
+        let retracted =
+            BlindPair { answer: Some(Judgement::Retracted), ..shown(1, next_pair(1, question(), &[], &[])) };
+        let pending = question();
+        assert_eq!(next_pair(1, pending, &[retracted], &[]).pair, pending);
     }
 
     #[test]
     fn unsafe_gaits_are_not_repeated() {
-        let drawn = draw(1, question(), &[], &[]);
-        let before: Vec<BlindPair> = (1..=50).map(|number| shown(number, drawn)).collect();
-        for lot in 0..50 {
-            assert_eq!(draw(10 * lot, question(), &before, &[drawn.pair.1]).kind, BlindPairKind::New);
+        let next = next_pair(1, question(), &[], &[]);
+        let before: Vec<BlindPair> = (1..=50).map(|number| shown(number, next)).collect();
+        for random in 0..50 {
+            assert_eq!(next_pair(10 * random, question(), &before, &[next.pair.1]).kind, BlindPairKind::New);
         }
     }
 }

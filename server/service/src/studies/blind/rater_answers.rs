@@ -1,31 +1,31 @@
 //! The actions of a rater: take a pair, answer it, retract the answer.
 
 use super::could_have_known;
-use super::next_pair::draw;
+use super::next_pair::next_pair;
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
-use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
 use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
-use gaitwright_store::allocations::{self, Lot, Sided};
+use gaitwright_store::allocations::{self, PairWithSides, RandomDraw};
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind, Judgement, NewBlindPair, NewPairAnswer};
 use gaitwright_store::feedback::{self, Attribution, Source};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{
-    Connection, LentWriter, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
+    BorrowedWriter, Connection, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeSet;
 use utoipa::ToSchema;
 
-/// The refusal of a pair that a rule excluded after it was drawn.
+/// The refusal of a pair that a rule excluded after it was chosen.
 const NO_LONGER_SHOWN: &str = "This pair is no longer shown. Continue with the next pair.";
 
 /// Answer of a rater.
@@ -47,7 +47,7 @@ pub struct RaterAnswer {
 /// Confirmation of a rater's answer. The response is stored, and sent again if the request is repeated. It omits the
 /// gaits and the answer, because others who can read the study must not learn which gait was shown on which side.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Answered {
+pub struct AnswerReceipt {
     /// Number of the pair for this rater.
     pub number: u32,
 }
@@ -78,7 +78,7 @@ pub async fn next<'a>(
     store: &'a mut Store,
     caller: &Caller,
     study: StudyId,
-) -> Result<(LentWriter<'a>, Option<Sided>), Error> {
+) -> Result<(BorrowedWriter<'a>, Option<PairWithSides>), Error> {
     let question = question(store, study).await?;
     let mut writer = store.write().await?;
     let safety_reports = SafetyReports::read(&mut writer, study).await?;
@@ -104,21 +104,20 @@ pub async fn next<'a>(
     if !walkable::are_walkable(&mut writer, pair).await? || is_answered(&mut writer, study, pair, &caller.name).await? {
         return Ok((writer, None));
     }
-    let lot = Lot::draw()?;
-    let drawn = draw(lot.number(), pair, &own, &reported);
+    let next = next_pair(RandomDraw::draw()?.number(), pair, &own, &reported);
     let token = secret::fresh()?;
     let new = NewBlindPair {
         token: token.clone(),
         study_id: study,
         rater: caller.name.clone(),
         number: u32::try_from(own.len()).unwrap_or(u32::MAX).saturating_add(1),
-        kind: drawn.kind,
-        pair: drawn.pair,
-        repeats: drawn.repeats,
+        kind: next.kind,
+        pair: next.pair,
+        repeats: next.repeats,
         could_have_known: could_have_known(&mut writer, caller, study).await?,
     };
     let id = blind_pairs::insert(&mut writer, &new).await?;
-    allocations::of_pair(&mut writer, id, drawn.again, Lot::draw()?).await?;
+    allocations::of_pair(&mut writer, id, next.same_sides_as, RandomDraw::draw()?).await?;
     let shown = own_pair(&mut writer, caller, &token).await?;
     note(&mut writer, caller, &shown.pair, "blind_pair.draw").await?;
     Ok((writer, Some(shown)))
@@ -175,7 +174,7 @@ pub async fn answer(
     caller: &Caller,
     token: &str,
     given: &RaterAnswer,
-) -> Result<(StudyId, Answered), Error> {
+) -> Result<(StudyId, AnswerReceipt), Error> {
     let sided = own(writer, caller, token).await?;
     let shown = &sided.pair;
     answering::refuse_retracted(given.answer)?;
@@ -196,29 +195,29 @@ pub async fn answer(
         if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.are_all_in_force(&gaits)) {
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
-        return Ok((shown.study_id, Answered { number: shown.number }));
+        return Ok((shown.study_id, AnswerReceipt { number: shown.number }));
     }
-    let again = if shown.kind == BlindPairKind::Repeat { Again::Meant } else { Again::Refused };
+    let second_answer = if shown.kind == BlindPairKind::Repeat { SecondAnswer::Allowed } else { SecondAnswer::Refused };
     let (study, pair, fields) = (shown.study_id, shown.trials(), ("first", "second"));
-    let statement = GivenJudgement { study, pair, fields, judgement, attribution, again };
-    let heard = preference::record(writer, statement).await.map_err(without_gaits)?;
+    let statement = AttributedJudgement { study, pair, fields, judgement, attribution, second_answer };
+    let feedback_id = preference::record(writer, statement).await.map_err(without_gaits)?;
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
     let row = NewPairAnswer {
         judgement,
         response_ms: given.response_ms,
         note: &given.note,
-        feedback: heard,
+        feedback: feedback_id,
         could_have_known,
     };
     if !blind_pairs::answer(writer, shown.id, row).await? {
         return Err(Error::conflict(answered_already(sided.answer())));
     }
-    let payload = json!({ "feedback_id": heard, "pair_id": shown.id });
+    let payload = json!({ "feedback_id": feedback_id, "pair_id": shown.id });
     events::append(writer, shown.study_id, "feedback_given", &payload).await?;
     // The audit trail omits the answer in terms of sides, because it would reveal the allocation.
     let detail = json!({ "study": shown.study_id, "number": shown.number, "could_have_known": could_have_known });
     audit::append(writer, &caller.actor, "blind_pair.answer", &format!("blind pair {}", shown.id), &detail).await?;
-    Ok((shown.study_id, Answered { number: shown.number }))
+    Ok((shown.study_id, AnswerReceipt { number: shown.number }))
 }
 
 /// Replaces an error by one that names no gait.
@@ -258,22 +257,22 @@ pub fn sides_in_words(answer: Judgement) -> &'static str {
 ///
 /// # Errors
 /// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] if the answer cannot be retracted.
-pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
+pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Result<AnswerReceipt, Error> {
     let shown = own(writer, caller, token).await?.pair;
     if !can_be_retracted(writer, &shown).await? {
         let why = "Only the last answer can be retracted, and only once. A safety report cannot be retracted: staff \
                    review it.";
         return Err(Error::conflict(why));
     }
-    if let Some(heard) = blind_pairs::feedback_of(writer, shown.id).await?
+    if let Some(feedback_id) = blind_pairs::feedback_of(writer, shown.id).await?
         // Staff may have retracted it already.
-        && feedback::get(writer, heard).await?.retraction.is_none()
+        && feedback::get(writer, feedback_id).await?.retraction.is_none()
     {
-        answering::retract(writer, caller, Some(shown.study_id), heard, None, "by the rater").await?;
+        answering::retract(writer, caller, Some(shown.study_id), feedback_id, None, "by the rater").await?;
     }
     blind_pairs::retract(writer, shown.id).await?;
     note(writer, caller, &shown, "blind_pair.retract").await?;
-    Ok(Answered { number: shown.number })
+    Ok(AnswerReceipt { number: shown.number })
 }
 
 /// Whether the answer can be retracted: it is the rater's last one and not a safety report.
@@ -283,18 +282,18 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Resul
 pub async fn can_be_retracted(db: &mut Connection, shown: &BlindPair) -> Result<bool, Error> {
     let all = blind_pairs::of_study(db, shown.study_id).await?;
     let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
-    let stands = matches!(
+    let is_retractable = matches!(
         shown.answer,
         Some(Judgement::First | Judgement::Second | Judgement::NoDifference | Judgement::CannotTell)
     );
-    Ok(last && stands)
+    Ok(last && is_retractable)
 }
 
 /// The pair of a token with its sides, if it belongs to this rater and the rater can access its study.
 ///
 /// # Errors
 /// What the record reports, and [`Error::NotFound`] for a token that is not of this rater.
-pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
     let shown = own_pair(db, caller, token).await?;
     if !members::reaches(db, caller.reach(), shown.pair.study_id).await? {
         return Err(unknown_pair());
@@ -307,7 +306,7 @@ pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Si
 ///
 /// # Errors
 /// As [`own`], and [`Error::Conflict`] if a gait of the pair must no longer be shown.
-pub async fn own_to_show(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+pub async fn own_showable_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
     let shown = own(db, caller, token).await?;
     if !walkable::are_walkable(db, shown.pair.trials()).await? {
         return Err(Error::conflict(NO_LONGER_SHOWN));
@@ -315,7 +314,7 @@ pub async fn own_to_show(db: &mut Connection, caller: &Caller, token: &str) -> R
     Ok(shown)
 }
 
-async fn own_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+async fn own_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
     allocations::own_pair(db, token, &caller.name).await?.ok_or_else(unknown_pair)
 }
 

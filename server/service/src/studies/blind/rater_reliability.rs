@@ -1,8 +1,10 @@
 //! Reliability of raters: agreement with their own earlier answers, position bias, and unblinded answers.
 
 use super::next_pair::{is_plain, is_same_pair};
-use gaitwright_store::allocations::Sided;
-use gaitwright_store::blind_pairs::{BlindPair, Judgement};
+use crate::error::Error;
+use gaitwright_store::allocations::{self, PairWithSides};
+use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
+use gaitwright_store::{Connection, StudyId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -58,15 +60,25 @@ pub struct RaterReliability {
     pub could_have_known: u32,
 }
 
+/// The reliability of every rater of a study, by name.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> Result<Vec<RaterReliability>, Error> {
+    let shown = blind_pairs::of_study(db, study).await?;
+    let sides = allocations::of_unblinded_raters(db, study).await?;
+    Ok(figures(&shown, &sides))
+}
+
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-pub fn figures(blind_pairs: &[BlindPair], sides: &[Sided]) -> Vec<RaterReliability> {
+fn figures(blind_pairs: &[BlindPair], sides: &[PairWithSides]) -> Vec<RaterReliability> {
     let mut raters: Vec<&str> = blind_pairs.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
     raters.into_iter().map(|rater| of_rater(rater, blind_pairs, sides)).collect()
 }
 
-fn of_rater(rater: &str, all: &[BlindPair], sides: &[Sided]) -> RaterReliability {
+fn of_rater(rater: &str, all: &[BlindPair], sides: &[PairWithSides]) -> RaterReliability {
     let own: Vec<&BlindPair> = all.iter().filter(|shown| shown.rater == rater).collect();
     let count = |wanted: &dyn Fn(&BlindPair) -> bool| {
         u32::try_from(own.iter().filter(|shown| wanted(shown)).count()).unwrap_or(u32::MAX)
@@ -84,11 +96,11 @@ fn of_rater(rater: &str, all: &[BlindPair], sides: &[Sided]) -> RaterReliability
     }
 }
 
-fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
+fn first_preferred(rater: &str, sides: &[PairWithSides]) -> Option<Share> {
     let mut own = sides.iter().filter(|sided| sided.pair.rater == rater).peekable();
     own.peek()?;
     let blind = own.filter(|sided| !sided.pair.could_have_known);
-    let answers: Vec<Judgement> = blind.filter_map(Sided::answer).collect();
+    let answers: Vec<Judgement> = blind.filter_map(PairWithSides::answer).collect();
     let count =
         |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
     let (first, second) = (count(Judgement::First), count(Judgement::Second));

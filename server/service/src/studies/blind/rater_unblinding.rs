@@ -3,7 +3,7 @@
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use gaitwright_store::allocations::{self, Sided};
+use gaitwright_store::allocations::{self, PairWithSides};
 use gaitwright_store::blind_pairs::{self, BlindPairKind, Judgement};
 use gaitwright_store::{BlindPairId, Instant, StudyId, TrialId, Writer, audit, consents, studies};
 use serde::Serialize;
@@ -39,8 +39,8 @@ pub struct UnblindedPair {
     pub answered_at: Option<Instant>,
 }
 
-impl From<&Sided> for UnblindedPair {
-    fn from(sided: &Sided) -> Self {
+impl From<&PairWithSides> for UnblindedPair {
+    fn from(sided: &PairWithSides) -> Self {
         let row = &sided.pair;
         let (shown_first, shown_second) = sided.shown();
         Self {

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::answer as answering;
 use crate::studies::assessment;
-use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
 use gaitwright_store::audit::Actor;
@@ -70,9 +70,9 @@ pub async fn give(
             "Walk {walk} is not recorded yet. Record all walks before you record the answer."
         )));
     }
-    if let Some(stands) = session.answer() {
+    if let Some(current) = session.answer() {
         let other = "There is already an answer. To change it, retract it first.";
-        return if is_same(stands, new) { session_progress(writer, id).await } else { Err(Error::conflict(other)) };
+        return if is_same(current, new) { session_progress(writer, id).await } else { Err(Error::conflict(other)) };
     }
     if new.number != number {
         return Err(Error::conflict(format!(
@@ -84,8 +84,8 @@ pub async fn give(
 }
 
 /// Whether an answer is the same form, sent twice.
-fn is_same(stands: &LabAnswer, new: &NewAnswer) -> bool {
-    (stands.number, stands.judgement, stands.note.as_str()) == (new.number, new.answer, new.note.as_str())
+fn is_same(current: &LabAnswer, new: &NewAnswer) -> bool {
+    (current.number, current.judgement, current.note.as_str()) == (new.number, new.answer, new.note.as_str())
 }
 
 /// Records a safety report: as the answer of the session, in place of another answer while the session is blinded. If
@@ -103,14 +103,14 @@ async fn report_unsafe(
     };
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,
-        Some(stands)
-            if is_same(stands, new)
+        Some(current)
+            if is_same(current, new)
                 && SafetyReports::read(writer, session.study_id).await?.are_all_in_force(&gaits) =>
         {
             session_progress(writer, session.id).await
         }
-        Some(stands) if walked.is_none() && !stands.judgement.is_about_safety() => {
-            retract_number(writer, caller, session.id, stands.number).await?;
+        Some(current) if walked.is_none() && !current.judgement.is_about_safety() => {
+            retract_number(writer, caller, session.id, current.number).await?;
             add(writer, caller, session.id, next_number(session), new).await
         }
         Some(_) => {
@@ -177,21 +177,21 @@ pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> 
     let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
     let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
-    let statement = GivenJudgement {
+    let statement = AttributedJudgement {
         study: study.id,
         pair: walked,
         fields: ("walk 2", "walk 3"),
         judgement: given.judgement,
         attribution: Attribution { source: Source::Subject, author: &author, note: &given.note },
         // Several sessions may compare the same two gaits.
-        again: Again::Meant,
+        second_answer: SecondAnswer::Allowed,
     };
-    let heard = if given.judgement.is_assessment() {
+    let feedback_id = if given.judgement.is_assessment() {
         assessment::write(writer, statement).await.map(drop)
     } else {
         record_preference(writer, statement).await
     };
-    match heard {
+    match feedback_id {
         Err(reason @ (Error::Invalid(_) | Error::Conflict(_))) => {
             let detail = json!({ "number": given.number, "reason": reason.to_string() });
             let object = format!("lab session {}", session.id);
@@ -201,7 +201,7 @@ pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> 
     }
 }
 
-async fn record_preference(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<(), Error> {
-    let heard = preference::record(writer, statement).await?;
-    Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": heard })).await?)
+async fn record_preference(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<(), Error> {
+    let feedback_id = preference::record(writer, statement).await?;
+    Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": feedback_id })).await?)
 }

@@ -29,6 +29,6 @@ pub use session::{
 pub use session_view::{Condition, LabSessionState, LabSessionView, WalkView};
 pub use unblinding::unblind;
 pub use upload::{
-    CheckedFile, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, brought, check_kept,
-    keep,
+    CheckedFile, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, check_kept,
+    read_upload, store_upload,
 };

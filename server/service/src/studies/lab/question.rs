@@ -51,7 +51,7 @@ pub(super) fn next_walk(session: &LabSession) -> Option<u8> {
 }
 
 /// The number of the answer that is asked for now, if any.
-pub(super) fn asked_answer(session: &LabSession) -> Option<u32> {
+pub(super) fn requested_answer(session: &LabSession) -> Option<u32> {
     let open =
         session.done(SessionStep::Closed).is_none() && next_walk(session).is_none() && session.answer().is_none();
     open.then(|| next_number(session))

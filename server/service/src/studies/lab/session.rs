@@ -1,12 +1,12 @@
 //! Lab sessions: planning, controller files, recording of walks, closing.
 
-use super::question::{AnswerView, WALKS, asked_answer, can_be_retracted, next_walk, takes_report};
+use super::question::{AnswerView, WALKS, can_be_retracted, next_walk, requested_answer, takes_report};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::same_motion::is_same_gait;
 use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
-use gaitwright_store::allocations::{self, Lot};
+use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, LabSession, SessionStep};
 use gaitwright_store::trials::{self, Trial, TrialState};
@@ -165,7 +165,7 @@ pub async fn plan(
         notes: &new.notes,
     };
     let id = lab_sessions::insert(writer, actor, &row).await?;
-    allocations::of_session(writer, id, row.number, Lot::draw()?).await?;
+    allocations::of_session(writer, id, row.number, RandomDraw::draw()?).await?;
     let detail = json!({ "study": study, "number": row.number, "trial_a": row.trial_a, "trial_b": row.trial_b });
     audit::append(writer, actor, "lab_session.plan", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)
@@ -214,7 +214,7 @@ pub async fn session_progress(db: &mut Connection, id: LabSessionId) -> Result<L
         walk: next_walk(&session).filter(|_| !closed && session.answer().is_none()),
         walks: WALKS,
         last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(SessionStep::Walk(walk))).map(|done| done.at),
-        answer_number: asked_answer(&session),
+        answer_number: requested_answer(&session),
         report_number: takes_report(&session),
         answer: session.answer().map(|answer| AnswerView::of(&session, answer)),
         can_be_retracted: can_be_retracted(&session),
@@ -256,7 +256,7 @@ pub async fn record_walk(
     if walk > 1 {
         both_walkable(writer, &session).await?;
     }
-    lab_sessions::record_step(writer, actor, id, SessionStep::Walk(walk), &walked.note).await?;
+    lab_sessions::add_step(writer, actor, id, SessionStep::Walk(walk), &walked.note).await?;
     let detail = json!({ "walk": walk, "note": walked.note });
     audit::append(writer, actor, "lab_session.walk", &format!("lab session {id}"), &detail).await?;
     session_progress(writer, id).await
@@ -300,7 +300,7 @@ pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSess
 pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &str) -> Result<LabSession, Error> {
     printable::note("note", note, LONGEST_NOTE)?;
     still_open(writer, id).await?;
-    lab_sessions::record_step(writer, actor, id, SessionStep::Closed, note).await?;
+    lab_sessions::add_step(writer, actor, id, SessionStep::Closed, note).await?;
     let detail = json!({ "note": note });
     audit::append(writer, actor, "lab_session.close", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)

@@ -63,7 +63,7 @@ pub struct WalkView {
     /// Who recorded the walk, and when.
     pub recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
-    pub after_unblinding: bool,
+    pub recorded_after_unblinding: bool,
 }
 
 /// Lab session, without blinded data.
@@ -114,7 +114,7 @@ impl From<&LabSession> for LabSessionView {
                 number,
                 condition: condition(session, number),
                 recorded: recorded.cloned(),
-                after_unblinding: unblinded_before
+                recorded_after_unblinding: unblinded_before
                     || recorded.is_some_and(|done| has_file(session, &done.actor, done.at)),
             }
         };

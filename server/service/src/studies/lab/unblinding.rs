@@ -20,7 +20,7 @@ pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reaso
     if !still_shown(writer, id).await?.allocation.included {
         return Err(not_included());
     }
-    if !lab_sessions::record_step(writer, actor, id, SessionStep::Unblinded, reason).await? {
+    if !lab_sessions::add_step(writer, actor, id, SessionStep::Unblinded, reason).await? {
         return Err(Error::conflict("This session is already unblinded."));
     }
     let detail = json!({ "reason": reason });

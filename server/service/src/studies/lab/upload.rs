@@ -321,7 +321,7 @@ pub struct UploadedFile {
 ///
 /// # Errors
 /// [`Error::NotFound`], or an error if the file does not match its hash.
-pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<UploadedFile, Error> {
+pub async fn read_upload(db: &mut Connection, id: MeasurementFileId) -> Result<UploadedFile, Error> {
     /// The reading parameter that both kinds have in common.
     #[derive(Deserialize)]
     struct ReadingFormat {
@@ -337,13 +337,13 @@ pub async fn brought(db: &mut Connection, id: MeasurementFileId) -> Result<Uploa
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] if the session is closed, the walk is not recorded yet, or the same file
 /// was uploaded for another walk.
-pub async fn keep(
+pub async fn store_upload(
     writer: &mut Writer,
     actor: &Actor,
     id: LabSessionId,
     checked: &CheckedFile,
 ) -> Result<MeasurementFile, Error> {
-    writer.room()?;
+    writer.check_free_space()?;
     let walk = checked.walk;
     if still_open(writer, id).await?.done(SessionStep::Walk(walk)).is_none() {
         return Err(Error::conflict(format!("Walk {walk} is not recorded yet. Record it in the lab session first.")));

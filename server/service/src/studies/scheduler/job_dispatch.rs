@@ -23,7 +23,7 @@ impl Scheduler {
         let engine = &self.0.engine;
         // This runs on every change, so it must not occupy the only writer.
         let (queued, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
-        if queued == 0 || leased as usize >= engine.size() || engine.trouble().is_some() {
+        if queued == 0 || leased as usize >= engine.size() || engine.problem().is_some() {
             return Ok(None);
         }
         let mut writer = self.0.store.write().await?;
@@ -48,10 +48,10 @@ impl Scheduler {
         match self.0.prefetches.claim(&assignment) {
             Prepared::Nothing => {}
             Prepared::Running => return self.started(attempt, PREPARED).await,
-            Prepared::Done(finding) => {
+            Prepared::Done(result) => {
                 drop(hand_over);
                 self.started(attempt, PREPARED).await?;
-                self.ended(attempt, PREPARED, finding).await?;
+                self.ended(attempt, PREPARED, result).await?;
                 self.changed();
                 return Ok(());
             }

@@ -21,15 +21,15 @@ impl Scheduler {
         Ok(())
     }
 
-    pub(super) async fn look_after_leases(&self) -> Result<(), Error> {
+    pub(super) async fn handle_expired_leases(&self) -> Result<(), Error> {
         let mut reader = self.0.store.read().await?;
         let expired = jobs::expired(&mut reader, now()).await?;
-        let held_up = jobs::held_up(&mut reader).await?;
+        let unstarted = jobs::unstarted_of_inactive_studies(&mut reader).await?;
         drop(reader);
         for lease in expired {
-            self.look_after(&lease).await?;
+            self.handle_expired(&lease).await?;
         }
-        for lease in held_up {
+        for lease in unstarted {
             self.give_back(&lease).await?;
         }
         Ok(())
@@ -39,7 +39,7 @@ impl Scheduler {
     /// worker that has started a job does not need the storage.
     pub(super) async fn replace_lost_jobs(&self, known: &mut u64) -> Result<(), Error> {
         let storages = self.0.engine.storages();
-        if storages == *known || self.0.engine.trouble().is_some() {
+        if storages == *known || self.0.engine.problem().is_some() {
             return Ok(());
         }
         *known = storages;
@@ -59,10 +59,10 @@ impl Scheduler {
 
     /// Handles an expired lease. A job that no worker has started is dispatched again, in case the engine lost it. A
     /// job of a silent worker is taken from it.
-    pub(super) async fn look_after(&self, lease: &Lease) -> Result<(), Error> {
+    pub(super) async fn handle_expired(&self, lease: &Lease) -> Result<(), Error> {
         if !self.replace_unstarted(lease).await? {
             self.cancel_solve(lease.trial).await;
-            trial_result::silent(&self.0.store, lease).await?;
+            trial_result::record_expired_lease(&self.0.store, lease).await?;
         }
         Ok(())
     }
@@ -73,8 +73,8 @@ impl Scheduler {
         if state != TrialState::Queued {
             return Ok(false);
         }
-        if self.0.engine.trouble().is_none() {
-            self.live_on(lease).await?;
+        if self.0.engine.problem().is_none() {
+            self.renew(lease).await?;
             self.submit(lease).await?;
         }
         Ok(true)
@@ -92,7 +92,7 @@ impl Scheduler {
     }
 
     /// Renews a lease. Returns `false` if it has passed to another attempt.
-    pub(super) async fn live_on(&self, lease: &Lease) -> Result<bool, Error> {
+    pub(super) async fn renew(&self, lease: &Lease) -> Result<bool, Error> {
         self.lease_until(lease, now().after(self.0.engine.lease())).await
     }
 

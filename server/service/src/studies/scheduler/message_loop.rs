@@ -4,7 +4,7 @@ use super::super::trial_result;
 use super::{HEARTBEATS_PER_LEASE, Scheduler};
 use crate::error::Error;
 use crate::supervise::Task;
-use crate::workers::{Attempt, Finding, News};
+use crate::workers::{AssignmentResult, Attempt, EngineMessage};
 use gait_optimizer::SolveStatus;
 use gaitwright_compute::OnPool;
 use gaitwright_store::{TrialId, commit, events, gaits, jobs, now, trials};
@@ -18,21 +18,21 @@ impl Scheduler {
         task.works();
         let mut written: HashMap<TrialId, Instant> = HashMap::new();
         loop {
-            let news = match self.0.prefetches.hear(self.0.engine.next().await) {
-                Ok(news) => news,
+            let message = match self.0.prefetches.receive(self.0.engine.next().await) {
+                Ok(message) => message,
                 Err(receipt) => {
                     receipt.sign().await;
                     self.0.wake.notify_one();
                     continue;
                 }
             };
-            let heard = match news {
-                News::Started { attempt, worker } => {
+            let handled = match message {
+                EngineMessage::Started { attempt, worker } => {
                     written.insert(attempt.trial, Instant::now());
                     self.started(attempt, &worker).await
                 }
-                News::Iterated { attempt, record } => {
-                    self.0.board.add(attempt.trial, record);
+                EngineMessage::Iterated { attempt, record } => {
+                    self.0.running_solves.add(attempt.trial, record);
                     let last = written.entry(attempt.trial).or_insert_with(Instant::now);
                     if last.elapsed() < self.0.engine.lease() / HEARTBEATS_PER_LEASE {
                         continue;
@@ -40,11 +40,11 @@ impl Scheduler {
                     *last = Instant::now();
                     self.heartbeat(attempt).await
                 }
-                News::Ended { attempt, worker, finding, receipt } => {
+                EngineMessage::Ended { attempt, worker, result, receipt } => {
                     written.remove(&attempt.trial);
                     let scheduler = self.clone();
                     self.0.tasks.spawn(async move {
-                        match scheduler.ended(attempt, &worker, finding).await {
+                        match scheduler.ended(attempt, &worker, result).await {
                             Ok(()) => receipt.sign().await,
                             // Without a receipt the message comes again, or the lease expires.
                             Err(error) => tracing::error!(trial = %attempt.trial, %error, "cannot record a trial"),
@@ -54,7 +54,7 @@ impl Scheduler {
                     Ok(())
                 }
             };
-            heard?;
+            handled?;
         }
     }
 
@@ -72,27 +72,27 @@ impl Scheduler {
         let payload = json!({ "trial_id": trial.id, "number": trial.number, "state": trial.state, "worker": worker });
         events::append(&mut writer, lease.study, "trial_started", &payload).await?;
         commit(writer).await?;
-        self.0.board.open(trial.id, lease.study, trial.number);
+        self.0.running_solves.open(trial.id, lease.study, trial.number);
         self.0.pulse.send_modify(|count| *count = count.wrapping_add(1));
         Ok(())
     }
 
     pub(super) async fn heartbeat(&self, attempt: Attempt) -> Result<(), Error> {
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
-        if !self.live_on(&lease).await? {
+        if !self.renew(&lease).await? {
             self.cancel_solve(attempt.trial).await;
         }
         Ok(())
     }
 
     /// Records the result of an attempt.
-    pub(super) async fn ended(&self, attempt: Attempt, worker: &str, finding: Finding) -> Result<(), Error> {
-        self.0.board.close(attempt.trial);
+    pub(super) async fn ended(&self, attempt: Attempt, worker: &str, result: AssignmentResult) -> Result<(), Error> {
+        self.0.running_solves.close(attempt.trial);
         let mut store = self.0.store.clone();
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
-        let (outcome, iterations) = match finding {
-            Finding::Ended { outcome, iterations } => (outcome, iterations),
-            Finding::Broke(reason) => return trial_result::broke(&store, &lease, &reason).await.map(drop),
+        let (outcome, iterations) = match result {
+            AssignmentResult::Ended { outcome, iterations } => (outcome, iterations),
+            AssignmentResult::Broke(reason) => return trial_result::broke(&store, &lease, &reason).await.map(drop),
         };
         let pack = move |pool: &OnPool| {
             let packed = gaits::PackedGait::new(pool, &outcome, &iterations);

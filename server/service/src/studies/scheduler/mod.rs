@@ -10,7 +10,7 @@ mod planning_loop;
 mod prefetch_loop;
 
 use super::belief::Beliefs;
-use super::execution::{Simulation, WalksAsked};
+use super::execution::{NewExecutionReport, Simulation};
 use super::explanation::ExplanationEffort;
 use super::job::{JobId, JobState};
 use super::jobs_after_solves::JobsAfterSolves;
@@ -18,7 +18,7 @@ use super::prefetch::Prefetches;
 use super::snapshot::StudySnapshot;
 use crate::error::Error;
 use crate::supervise::{Task, Tasks};
-use crate::workers::{AfterSolves, Board, Dispatch};
+use crate::workers::{AfterSolves, Dispatch, RunningSolves};
 use futures_util::future::BoxFuture;
 use gaitwright_store::{Store, StudyId, TrialId};
 use std::fmt;
@@ -40,7 +40,7 @@ struct Inner {
     unpacking: Store,
     engine: Arc<dyn Dispatch>,
     /// Progress of the running solves.
-    board: Arc<Board>,
+    running_solves: Arc<RunningSolves>,
     /// Prefetched solves.
     prefetches: Prefetches,
     /// Snapshots of the studies that wait for an answer, for prefetching.
@@ -91,7 +91,7 @@ impl Scheduler {
             store,
             beliefs,
             engine,
-            board: Arc::default(),
+            running_solves: Arc::default(),
             prefetches: Prefetches::default(),
             waiting: watch::channel(Arc::default()).0,
             hand_over: Mutex::default(),
@@ -111,8 +111,8 @@ impl Scheduler {
     }
 
     /// Progress of the running solves.
-    pub fn board(&self) -> &Arc<Board> {
-        &self.0.board
+    pub fn running_solves(&self) -> &Arc<RunningSolves> {
+        &self.0.running_solves
     }
 
     /// Cached posteriors of studies.
@@ -164,7 +164,7 @@ impl Scheduler {
 
     /// Requests the execution report of one gait; `None` if it exists already. Returns `false` if this process simulates
     /// no walks.
-    pub(super) fn simulate(&self, trial: TrialId, asked: Option<WalksAsked>) -> bool {
+    pub(super) fn simulate(&self, trial: TrialId, asked: Option<NewExecutionReport>) -> bool {
         self.0.after_solves.as_ref().map(|jobs| jobs.simulate(trial, asked)).is_some()
     }
 
@@ -176,7 +176,7 @@ impl Scheduler {
     /// Resumes the explanation of a trial whose explanation was cancelled.
     pub fn explain_again(&self, trial: TrialId) {
         if let Some(jobs) = &self.0.after_solves {
-            jobs.explanations.again(trial);
+            jobs.explanations.forget_end(trial);
         }
     }
 
@@ -202,10 +202,10 @@ impl Scheduler {
     /// Cancels the solve of a trial, which stops within one iteration.
     pub async fn cancel_solve(&self, trial: TrialId) {
         self.0.engine.cancel(self.0.prefetches.name_of(trial)).await;
-        self.0.board.close(trial);
+        self.0.running_solves.close(trial);
     }
 
-    /// Keeps another background task running until the scheduler stops; [`Self::trouble`] reports its failures too.
+    /// Keeps another background task running until the scheduler stops; [`Self::problem`] reports its failures too.
     pub async fn keep<F>(&self, name: &'static str, begin: impl Fn(Task) -> F)
     where
         F: Future<Output = Result<(), Error>> + Send + 'static,
@@ -221,7 +221,7 @@ impl Scheduler {
     /// Runs until [`Self::stop`]. Solves that are still running in this process return to the queue.
     ///
     /// # Errors
-    /// Errors of the database while stopping. A task that fails earlier is restarted, and [`Self::trouble`] reports it.
+    /// Errors of the database while stopping. A task that fails earlier is restarted, and [`Self::problem`] reports it.
     pub async fn run(&self) -> Result<(), Error> {
         let keep = |name, begin: fn(Self, Task) -> BoxFuture<'static, Result<(), Error>>| {
             let scheduler = self.clone();
@@ -249,15 +249,15 @@ impl Scheduler {
     }
 
     /// Which background tasks have failed, in words; `None` if all run.
-    pub fn trouble(&self) -> Option<String> {
-        self.0.health.trouble().or_else(|| self.0.engine.trouble())
+    pub fn problem(&self) -> Option<String> {
+        self.0.health.problem().or_else(|| self.0.engine.problem())
     }
 
     /// Certifies gaits forever. The explanations of a study follow the certificates of its best gaits.
     async fn keep_certifying(&self, task: &Task) -> Result<(), Error> {
         let Some(jobs) = &self.0.after_solves else { return std::future::pending().await };
         task.works();
-        jobs.certificates.run(self.pulse(), || self.changed(), |study| jobs.explanations.take_up(study)).await;
+        jobs.certificates.run(self.pulse(), || self.changed(), |study| jobs.explanations.queue_ended(study)).await;
         Ok(())
     }
 

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 /// The longest time between two rounds of planning.
 const IDLE: Duration = Duration::from_secs(5);
-/// Pause before asking an engine in trouble again whether it can take jobs.
+/// Pause before asking an engine that cannot work now whether it can take jobs.
 const ENGINE_AGAIN: Duration = Duration::from_millis(100);
 /// Changes within this time are planned together.
 const TOGETHER: Duration = Duration::from_millis(10);
@@ -32,7 +32,7 @@ impl Scheduler {
         let mut since = None;
         let mut storages = 0;
         loop {
-            self.look_after_leases().await?;
+            self.handle_expired_leases().await?;
             self.replace_lost_jobs(&mut storages).await?;
             self.begin_plans(&mut plans).await?;
             since.get_or_insert_with(Instant::now);
@@ -40,7 +40,7 @@ impl Scheduler {
             let looked = tokio::time::sleep(pause);
             tokio::pin!(looked);
             loop {
-                let hand_out_at = since.map(|since| plans.hand_out_at(since));
+                let dispatch_at = since.map(|since| plans.dispatch_at(since));
                 tokio::select! {
                     Some((study, snapshot)) = plans.next() => {
                         let again = plans.ended(study, snapshot?);
@@ -50,7 +50,7 @@ impl Scheduler {
                             break;
                         }
                     }
-                    () = self.can_hand_out(hand_out_at), if since.is_some() => {
+                    () = self.wait_to_dispatch(dispatch_at), if since.is_some() => {
                         self.dispatch().await?;
                         since = None;
                     }
@@ -66,9 +66,9 @@ impl Scheduler {
     }
 
     /// Waits until the engine can take jobs, and until this time at least.
-    pub(super) async fn can_hand_out(&self, at: Option<Instant>) {
+    pub(super) async fn wait_to_dispatch(&self, at: Option<Instant>) {
         tokio::time::sleep_until(at.unwrap_or_else(Instant::now).into()).await;
-        while self.0.engine.trouble().is_some() {
+        while self.0.engine.problem().is_some() {
             tokio::time::sleep(ENGINE_AGAIN).await;
         }
     }
@@ -84,7 +84,7 @@ impl Scheduler {
                 match scheduler.plan(study.clone()).await {
                     Err(error) if error.is_of_machine() => Err(error),
                     // Planning would fail again, so a person has to see it.
-                    Err(error) => scheduler.hold(&study, &error).await.map(|()| None),
+                    Err(error) => scheduler.pause_unplannable(&study, &error).await.map(|()| None),
                     snapshot => snapshot,
                 }
             });
@@ -109,10 +109,12 @@ impl Scheduler {
             let (snapshot, step) = store.compute(decide).await?;
             match step? {
                 PlanningStep::Nothing => return Ok(Some(snapshot).filter(|s| s.study.state == StudyState::Waiting)),
-                PlanningStep::Act(act, reason) => match self.act(&snapshot.study, act, &reason).await? {
-                    Some(changed) => study = changed,
-                    None => return Ok(None),
-                },
+                PlanningStep::Transition(transition, reason) => {
+                    match self.transition(&snapshot.study, transition, &reason).await? {
+                        Some(changed) => study = changed,
+                        None => return Ok(None),
+                    }
+                }
                 PlanningStep::Try(new) => {
                     if !self.propose(&snapshot, &new).await? {
                         return Ok(None);
@@ -132,13 +134,18 @@ impl Scheduler {
     }
 
     /// Pauses a study that cannot be planned, and records the reason.
-    pub(super) async fn hold(&self, study: &Study, error: &Error) -> Result<(), Error> {
+    pub(super) async fn pause_unplannable(&self, study: &Study, error: &Error) -> Result<(), Error> {
         tracing::error!(study = %study.id, %error, "cannot plan a study; pausing it");
-        self.act(study, StudyTransition::Pause, &format!("Planning failed: {error}")).await.map(drop)
+        self.transition(study, StudyTransition::Pause, &format!("Planning failed: {error}")).await.map(drop)
     }
 
-    pub(super) async fn act(&self, study: &Study, act: StudyTransition, reason: &str) -> Result<Option<Study>, Error> {
-        let state = lifecycle::after(study.state, act)?;
+    pub(super) async fn transition(
+        &self,
+        study: &Study,
+        transition: StudyTransition,
+        reason: &str,
+    ) -> Result<Option<Study>, Error> {
+        let state = lifecycle::after(study.state, transition)?;
         let mut writer = self.0.store.write().await?;
         if !studies::set_state(&mut writer, study, state, reason).await? {
             return Ok(None);
@@ -155,7 +162,7 @@ impl Scheduler {
     pub(super) async fn propose(&self, snapshot: &StudySnapshot, new: &NewTrial) -> Result<bool, Error> {
         let study = snapshot.study.id;
         let mut writer = self.0.store.write().await?;
-        if let Err(shortage) = writer.room() {
+        if let Err(shortage) = writer.check_free_space() {
             tracing::warn!(%study, %shortage, "no trial is proposed because the disk is nearly full");
             return Ok(false);
         }

@@ -125,7 +125,7 @@ impl BrokerConnection {
     }
 
     /// Why the broker cannot be reached now, if it cannot.
-    pub(super) fn trouble(&self) -> Option<String> {
+    pub(super) fn problem(&self) -> Option<String> {
         (self.context.client().connection_state() != State::Connected)
             .then(|| "The NATS broker cannot be reached.".to_owned())
     }

@@ -4,7 +4,7 @@ use super::broker_connection::{AGAIN, BROKER_HEARTBEAT, BrokerConnection, EXPIRE
 use super::message::{PROGRAM, ResultMessage, Sign, SolveOrder, pack, unpack};
 use crate::dispatch_error::DispatchError;
 use crate::workers::Assignment;
-use crate::workers::dispatch::{Dispatch, News, Receipt};
+use crate::workers::dispatch::{Dispatch, EngineMessage, Receipt};
 use async_nats::jetstream::stream::{LastRawMessageErrorKind, Stream};
 use async_nats::jetstream::{self, AckKind};
 use futures_util::StreamExt;
@@ -29,7 +29,7 @@ const MOST_DELIVERIES: i64 = 10;
 pub struct JetStream {
     link: BrokerConnection,
     size: usize,
-    heard: Mutex<Receiver<News>>,
+    messages: Mutex<Receiver<EngineMessage>>,
     /// Threads that compress jobs.
     pool: Pool,
     /// Why the engine does not receive messages, if it does not.
@@ -46,23 +46,23 @@ impl JetStream {
     /// [`DispatchError::Unreachable`] for a malformed address.
     pub async fn connect(url: &str, queue: &str, size: usize, lease: Duration) -> Result<Self, DispatchError> {
         let link = BrokerConnection::open(url, queue, lease).await?;
-        let (news, heard) = mpsc::channel(WAITING);
+        let (sender, messages) = mpsc::channel(WAITING);
         let ends = CancellationToken::new();
-        let (trouble, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
+        let (problem, listening) = watch::channel(Some("The NATS broker is not connected yet.".to_owned()));
         let storages = Arc::<AtomicU64>::default();
         for task in [0, 1] {
-            let (link, news, ends, trouble) = (link.clone(), news.clone(), ends.clone(), trouble.clone());
+            let (link, sender, ends, problem) = (link.clone(), sender.clone(), ends.clone(), problem.clone());
             let mut storage = Storage { created: None, count: Arc::clone(&storages) };
             tokio::spawn(ends.run_until_cancelled_owned(async move {
                 loop {
                     let ended = match task {
-                        0 => signs(&link, &news).await,
-                        _ => results(&link, &news, &trouble, &mut storage).await,
+                        0 => signs(&link, &sender).await,
+                        _ => results(&link, &sender, &problem, &mut storage).await,
                     };
                     if let Err(error) = ended {
                         tracing::warn!(%error, "cannot receive messages from workers; retrying");
                         if task == 1 {
-                            trouble.send_replace(Some(error.to_string()));
+                            problem.send_replace(Some(error.to_string()));
                         }
                     }
                     tokio::time::sleep(AGAIN).await;
@@ -72,7 +72,7 @@ impl JetStream {
         Ok(Self {
             link,
             size: size.max(1),
-            heard: Mutex::new(heard),
+            messages: Mutex::new(messages),
             pool: Pool::default(),
             listening,
             storages,
@@ -116,8 +116,8 @@ impl Dispatch for JetStream {
         self.link.lease
     }
 
-    fn trouble(&self) -> Option<String> {
-        self.link.trouble().or_else(|| self.listening.borrow().clone())
+    fn problem(&self) -> Option<String> {
+        self.link.problem().or_else(|| self.listening.borrow().clone())
     }
 
     fn outlives_process(&self) -> bool {
@@ -141,10 +141,10 @@ impl Dispatch for JetStream {
         })
     }
 
-    fn next(&self) -> BoxFuture<'_, News> {
+    fn next(&self) -> BoxFuture<'_, EngineMessage> {
         Box::pin(async move {
-            match self.heard.lock().await.recv().await {
-                Some(news) => news,
+            match self.messages.lock().await.recv().await {
+                Some(message) => message,
                 // Unreachable: the receiving tasks live as long as this engine.
                 None => std::future::pending().await,
             }
@@ -181,16 +181,16 @@ fn gone<T>(_: T) -> DispatchError {
 }
 
 /// Forwards heartbeats until the subscription ends.
-async fn signs(link: &BrokerConnection, news: &Sender<News>) -> Result<(), DispatchError> {
+async fn signs(link: &BrokerConnection, sender: &Sender<EngineMessage>) -> Result<(), DispatchError> {
     let mut signs = link.context.client().subscribe(link.sign_subject()).await.map_err(unreachable)?;
     while let Some(message) = signs.next().await {
         match unpack::<Sign>(&message.payload) {
             Ok(Sign { attempt, worker, records }) if records.is_empty() => {
-                news.send(News::Started { attempt, worker }).await.map_err(gone)?;
+                sender.send(EngineMessage::Started { attempt, worker }).await.map_err(gone)?;
             }
             Ok(Sign { attempt, records, .. }) => {
                 for record in records {
-                    news.send(News::Iterated { attempt, record }).await.map_err(gone)?;
+                    sender.send(EngineMessage::Iterated { attempt, record }).await.map_err(gone)?;
                 }
             }
             Err(error) => tracing::warn!(%error, "ignoring a malformed heartbeat"),
@@ -202,8 +202,8 @@ async fn signs(link: &BrokerConnection, news: &Sender<News>) -> Result<(), Dispa
 /// Forwards results until the broker reports an error.
 async fn results(
     link: &BrokerConnection,
-    news: &Sender<News>,
-    trouble: &watch::Sender<Option<String>>,
+    sender: &Sender<EngineMessage>,
+    problem: &watch::Sender<Option<String>>,
     storage: &mut Storage,
 ) -> Result<(), DispatchError> {
     let pool = Pool::default();
@@ -211,15 +211,19 @@ async fn results(
     let messages = recorder.stream().max_messages_per_batch(16).expires(EXPIRES).heartbeat(BROKER_HEARTBEAT);
     let mut messages = messages.messages().await.map_err(unreachable)?;
     storage.note(&link.jobs().await?);
-    trouble.send_replace(None);
+    problem.send_replace(None);
     while let Some(message) = messages.next().await {
         let message = message.map_err(unreachable)?;
-        bring(message, news, &pool).await?;
+        deliver(message, sender, &pool).await?;
     }
     Ok(())
 }
 
-async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) -> Result<(), DispatchError> {
+async fn deliver(
+    message: jetstream::Message,
+    sender: &Sender<EngineMessage>,
+    pool: &Pool,
+) -> Result<(), DispatchError> {
     let delivered = message.info().map_or(1, |info| info.delivered);
     let (message, acker) = message.split();
     if delivered > MOST_DELIVERIES {
@@ -240,6 +244,6 @@ async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) ->
             tracing::warn!(%error, "cannot acknowledge a result to the broker");
         }
     });
-    let ResultMessage { attempt, worker, finding } = brought;
-    news.send(News::Ended { attempt, worker, finding, receipt }).await.map_err(gone)
+    let ResultMessage { attempt, worker, result } = brought;
+    sender.send(EngineMessage::Ended { attempt, worker, result, receipt }).await.map_err(gone)
 }

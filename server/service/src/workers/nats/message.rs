@@ -2,7 +2,7 @@
 
 use crate::dispatch_error::DispatchError;
 use crate::workers::dispatch::Assignment;
-use crate::workers::dispatch::{Attempt, Finding};
+use crate::workers::dispatch::{AssignmentResult, Attempt};
 use gait_optimizer::IterationRecord;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ pub struct ResultMessage {
     /// Name of the worker.
     pub worker: String,
     /// The result.
-    pub finding: Finding,
+    pub result: AssignmentResult,
 }
 
 /// Writes a message.
@@ -104,7 +104,7 @@ mod tests {
         #[test]
         fn message_with_changed_bytes_is_read_or_refused(at in any::<prop::sample::Index>(), flip in 1_u8..) {
             let attempt = Attempt { trial: TrialId::fresh(), number: 3 };
-            let brought = ResultMessage { attempt, worker: "w".to_owned(), finding: Finding::Broke("reason".to_owned()) };
+            let brought = ResultMessage { attempt, worker: "w".to_owned(), result: AssignmentResult::Broke("reason".to_owned()) };
             let mut bytes = rmp_serde::to_vec_named(&brought).unwrap();
             let place = at.index(bytes.len());
             bytes[place] ^= flip;

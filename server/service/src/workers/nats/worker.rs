@@ -3,7 +3,7 @@
 use super::broker_connection::{AGAIN, BrokerConnection, unreachable};
 use super::message::{PROGRAM, ResultMessage, Sign, SolveOrder, pack, unpack};
 use crate::dispatch_error::DispatchError;
-use crate::workers::dispatch::{Attempt, Dispatch, Finding, News};
+use crate::workers::dispatch::{AssignmentResult, Attempt, Dispatch, EngineMessage};
 use crate::workers::{Evaluate, InProcess};
 use async_nats::jetstream::message::Acker;
 use async_nats::jetstream::{self, AckKind};
@@ -46,10 +46,10 @@ struct HeldJob {
     number: u32,
     acker: Acker,
     /// Iterations that are not sent yet.
-    untold: Vec<IterationRecord>,
+    unreported: Vec<IterationRecord>,
     /// Time of the last iteration.
-    lived: Instant,
-    told: Instant,
+    last_renewal: Instant,
+    last_sign: Instant,
     permit: OwnedSemaphorePermit,
 }
 
@@ -90,7 +90,7 @@ impl Worker {
             tokio::select! {
                 _ = &mut puller => break,
                 Some(job) = jobs.recv() => self.take(&mut held, job).await,
-                news = self.engine.next() => self.hear(&mut held, news).await,
+                event = self.engine.next() => self.receive(&mut held, event).await,
                 Some(message) = cancels.next() => {
                     let trial = std::str::from_utf8(&message.payload).ok().and_then(|text| text.parse().ok());
                     if let Some(trial) = trial {
@@ -164,35 +164,42 @@ impl Worker {
             return answer(&acker, AckKind::Nak(Some(AGAIN))).await;
         }
         let now = Instant::now();
-        let job = HeldJob { number: attempt.number, acker, untold: Vec::new(), lived: now, told: now, permit };
+        let job = HeldJob {
+            number: attempt.number,
+            acker,
+            unreported: Vec::new(),
+            last_renewal: now,
+            last_sign: now,
+            permit,
+        };
         held.insert(attempt.trial, job);
     }
 
-    async fn hear(&self, held: &mut HashMap<TrialId, HeldJob>, news: News) {
-        match news {
-            News::Started { attempt, .. } => self.tell(attempt, Vec::new()).await,
-            News::Iterated { attempt, record } => {
+    async fn receive(&self, held: &mut HashMap<TrialId, HeldJob>, event: EngineMessage) {
+        match event {
+            EngineMessage::Started { attempt, .. } => self.tell(attempt, Vec::new()).await,
+            EngineMessage::Iterated { attempt, record } => {
                 let Some(job) = held.get_mut(&attempt.trial).filter(|job| job.number == attempt.number) else { return };
                 let now = Instant::now();
-                job.untold.push(record);
-                job.lived = now;
-                if now.duration_since(job.told) >= SIGN_EVERY.min(self.link.ack_wait() / 4) {
-                    job.told = now;
+                job.unreported.push(record);
+                job.last_renewal = now;
+                if now.duration_since(job.last_sign) >= SIGN_EVERY.min(self.link.ack_wait() / 4) {
+                    job.last_sign = now;
                     answer(&job.acker, AckKind::Progress).await;
-                    let records = std::mem::take(&mut job.untold);
+                    let records = std::mem::take(&mut job.unreported);
                     self.tell(attempt, records).await;
                 }
             }
-            News::Ended { attempt, finding, .. } => {
+            EngineMessage::Ended { attempt, result, .. } => {
                 if held.get(&attempt.trial).is_some_and(|job| job.number == attempt.number)
                     && let Some(job) = held.remove(&attempt.trial)
                 {
-                    self.results.spawn(bring(
+                    self.results.spawn(deliver(
                         self.link.clone(),
                         self.pool.clone(),
                         self.name.clone(),
                         attempt,
-                        finding,
+                        result,
                         job,
                     ));
                 }
@@ -202,7 +209,7 @@ impl Worker {
 
     /// Returns jobs whose solve makes no progress.
     async fn give_up_hanging(&self, held: &mut HashMap<TrialId, HeldJob>) {
-        let hangs = |job: &HeldJob| job.lived.elapsed() > self.link.ack_wait();
+        let hangs = |job: &HeldJob| job.last_renewal.elapsed() > self.link.ack_wait();
         let hanging: Vec<TrialId> = held.iter().filter(|(_, job)| hangs(job)).map(|(trial, _)| *trial).collect();
         for trial in hanging {
             tracing::warn!(%trial, "a solve is hanging; returning its job");
@@ -234,14 +241,21 @@ impl Worker {
 
 /// Publishes a result, with retries, then acknowledges the job. A result that cannot be published is dropped: its slot
 /// is freed and its job left to other workers.
-async fn bring(link: BrokerConnection, pool: Pool, worker: String, attempt: Attempt, finding: Finding, job: HeldJob) {
+async fn deliver(
+    link: BrokerConnection,
+    pool: Pool,
+    worker: String,
+    attempt: Attempt,
+    result: AssignmentResult,
+    job: HeldJob,
+) {
     let HeldJob { acker, permit, .. } = job;
-    let brought = ResultMessage { attempt, worker, finding };
+    let brought = ResultMessage { attempt, worker, result };
     let bytes = pool.run(move |_| {
         let fits = |bytes: Vec<u8>| link.fits("a result", &bytes).map(|()| bytes);
         let bytes = pack(&brought)
             .and_then(fits)
-            .or_else(|error| pack(&ResultMessage { finding: Finding::Broke(error.to_string()), ..brought }));
+            .or_else(|error| pack(&ResultMessage { result: AssignmentResult::Broke(error.to_string()), ..brought }));
         (link, bytes)
     });
     let Ok((link, bytes)) = bytes.await else { return };

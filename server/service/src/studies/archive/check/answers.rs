@@ -24,14 +24,14 @@ pub(super) async fn answers(
 ) -> Result<(), Error> {
     let id = study.id;
     let rows = at("feedback", feedback::of_study(db, id, 0).await)?;
-    let noted = at("assessments", assessments::of_study(db, id).await)?;
+    let assessments = at("assessments", assessments::of_study(db, id).await)?;
     // Whoever has answered may still report a gait as unsafe.
-    let of_reports: HashSet<FeedbackId> = noted.iter().filter_map(|assessment| assessment.feedback_id).collect();
+    let of_reports: HashSet<FeedbackId> = assessments.iter().filter_map(|assessment| assessment.feedback_id).collect();
     let mut labelled = 0;
     let mut answered: HashMap<_, usize> = HashMap::new();
     for row in &rows {
         let what = format!("feedback {} ({})", row.seq, row.id);
-        at(&what, heard(row, study, trials))?;
+        at(&what, check_feedback(row, study, trials))?;
         labelled += usize::from(matches!(row.content, FeedbackContent::Label { .. }));
         let Some(compared) = pair(&row.content).filter(|_| is_of_person(row) && !of_reports.contains(&row.id)) else {
             continue;
@@ -50,7 +50,7 @@ pub(super) async fn answers(
         return Err(refuse(format!("{results} trials have a result, but {labelled} have a label")));
     }
     let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.content)?))).collect();
-    for assessment in &noted {
+    for assessment in &assessments {
         let what = format!("assessment {}", assessment.id);
         at(&what, of_gaits(trials, [assessment.trial_a, assessment.trial_b]))?;
         let compared = [assessment.trial_a, assessment.trial_b].map(|id| trials.get(&id).copied());
@@ -58,13 +58,13 @@ pub(super) async fn answers(
             at(&what, after_both(assessment.created_at, [first, second]))?;
         }
         let wanted = sorted(assessment.trial_a, assessment.trial_b);
-        if assessment.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
+        if assessment.feedback_id.is_some_and(|id| pairs.get(&id) != Some(&wanted)) {
             return Err(refuse(format!("{what}: the preference derived from it is about other trials")));
         }
     }
     let mut reports: HashSet<SafetyReportId> = HashSet::new();
     reports.extend(
-        noted.iter().filter(|assessment| assessment.answer.is_about_safety()).map(|a| SafetyReportId::from(a.id)),
+        assessments.iter().filter(|assessment| assessment.answer.is_about_safety()).map(|a| SafetyReportId::from(a.id)),
     );
     for shown in at("blind_pairs", blind_pairs::of_study(db, id).await)? {
         at(format!("blind pair {}", shown.id), of_gaits(trials, [shown.trial_a, shown.trial_b]))?;
@@ -113,7 +113,7 @@ fn after_both(answered_at: Instant, compared: [&Trial; 2]) -> Result<(), String>
 }
 
 /// Checks a row of the feedback log against the trials that it names.
-fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
+fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
     let trial =
         |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} does not belong to this study"));
     match row.content {

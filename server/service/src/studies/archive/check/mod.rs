@@ -145,7 +145,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
         at(&what, trial::figures(trial, &context.study.plan))?;
         let has_gait = at(&what, trial::gait(db, pool, trial, &context).await)?;
         unchecked_rmse += u32::from(trial.gait_rmse_rad.is_some() && !has_gait);
-        at(&what, trial::brought(db, trial).await)?;
+        at(&what, trial::check_results(db, trial).await)?;
     }
     if let Some(number) = at("jobs", archive::trial_unlike_its_job(db).await)? {
         return Err(refuse(format!("trial {number}: its state contradicts its job")));

@@ -76,7 +76,7 @@ pub(super) async fn gait(
     context: &Arc<Context>,
 ) -> Result<bool, String> {
     let text = |error: StoreError| error.to_string();
-    if !gaits::is_here(db, trial.id).await.map_err(text)? {
+    if !gaits::exists(db, trial.id).await.map_err(text)? {
         return Ok(false);
     }
     if trial.script.is_some() || !trial.state.is_result() {
@@ -133,14 +133,14 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
 fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
     let Some(report) = &trial.report else { return Ok(()) };
     let anew = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
-    match GaitResults::stated_in(report).difference(&anew) {
+    match GaitResults::of_report(report).difference(&anew) {
         Some((name, stated, anew)) => Err(format!("its stated {name} is {stated}, but its gait gives {anew}")),
         None => Ok(()),
     }
 }
 
 /// Checks the results that workers delivered for a trial.
-pub(super) async fn brought(db: &mut Connection, trial: &Trial) -> Result<(), String> {
+pub(super) async fn check_results(db: &mut Connection, trial: &Trial) -> Result<(), String> {
     let results = attempts::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
     let mut used = results.iter().filter(|result| result.used);
     let Some(result) = used.next() else { return Ok(()) };

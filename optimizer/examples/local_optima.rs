@@ -1,6 +1,6 @@
 //! Local optima that initial guesses reach: objective, Gait RMSE and iterations.
 //!
-//! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--guesses
+//! `cargo run --release -p gait-optimizer --example local_optima -- [--subjects 1,2] [--muscles on] [--threads 2] [--guesses
 //! 14] [--grid off]`: solves from the first `--guesses` initial guesses, or with `--grid on` from a grid of timings,
 //! knee flexions, strides and barrier parameters. Prints one CSV row for each.
 
