@@ -83,7 +83,7 @@ pub async fn by_hash(db: &mut Connection, hash: &str) -> StoreResult<Option<Toke
     row.as_ref().map(from_row).transpose()
 }
 
-/// The tokens of a user that were not revoked. Older rows have only the name of the user.
+/// The tokens that a user created and that were not revoked.
 ///
 /// # Errors
 /// Errors of the database.
