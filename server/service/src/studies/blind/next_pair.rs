@@ -21,7 +21,7 @@ pub struct NextPair {
 }
 
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
-/// earlier blind_pairs of this rater; `reported` lists trials with a safety report in force.
+/// earlier blind pairs of this rater; `reported` lists trials with a safety report in force.
 pub fn next_pair(random: u64, question: (TrialId, TrialId), before: &[BlindPair], reported: &[TrialId]) -> NextPair {
     let retracted = before.last().filter(|last| last.answer == Some(Judgement::Retracted));
     if let Some(last) = retracted.filter(|last| !last.has_one_of(reported)) {

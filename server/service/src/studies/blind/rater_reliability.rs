@@ -71,11 +71,11 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> Result<Vec<RaterRe
 }
 
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-fn figures(blind_pairs: &[BlindPair], sides: &[PairWithSides]) -> Vec<RaterReliability> {
-    let mut raters: Vec<&str> = blind_pairs.iter().map(|shown| shown.rater.as_str()).collect();
+fn figures(pairs: &[BlindPair], sides: &[PairWithSides]) -> Vec<RaterReliability> {
+    let mut raters: Vec<&str> = pairs.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
-    raters.into_iter().map(|rater| of_rater(rater, blind_pairs, sides)).collect()
+    raters.into_iter().map(|rater| of_rater(rater, pairs, sides)).collect()
 }
 
 fn of_rater(rater: &str, all: &[BlindPair], sides: &[PairWithSides]) -> RaterReliability {
