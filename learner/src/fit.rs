@@ -41,12 +41,6 @@ impl Fit {
     }
 }
 
-/// Logarithm of the approximate marginal likelihood of the observations.
-pub(crate) fn log_evidence(model: &ProcessModel<'_>, observations: &[Observation]) -> Result<f64> {
-    let fit = Fit::of(model, observations)?;
-    model.method.log_evidence(&fit.observed, model.link, &fit.approximation)
-}
-
 /// The last fit of a process. It serves as long as the observations stay the same.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LastFit(Option<(Vec<Observation>, Arc<Fit>)>);

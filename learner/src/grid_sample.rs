@@ -1,8 +1,7 @@
 //! Exact joint samples of the utility of all actions.
 //!
-//! A sample of the prior uses its structure. The product part applies the Cholesky factor of each dimension's table to
-//! an array of normals (a Kronecker product); the additive and pairwise parts are sums of samples over one and two
-//! dimensions. Matheron's rule then conditions the sample pathwise (Wilson et al. 2020): `f + k(x, V) K_VV^-1 (f_V -
+//! A sample of the prior is an array of normals times the Cholesky factor of each dimension's table (a Kronecker
+//! product). Matheron's rule then conditions the sample pathwise (Wilson et al. 2020): `f + k(x, V) K_VV^-1 (f_V -
 //! f(V) - e)`, with `f_V` a posterior sample at the points `V` and `e` a sample of the nugget.
 
 use crate::error::Result;
@@ -28,41 +27,15 @@ fn along(array: &mut [f64], count: usize, stride: usize, factor: &Cholesky) {
     }
 }
 
-fn normals(count: usize, scale: f64, random: &mut Random) -> Vec<f64> {
-    (0..count).map(|_| scale * random.normal()).collect()
-}
-
 /// A sample of the prior: one utility for each action.
 fn prior_sample(space: &SearchSpace, process: &GaussianProcess, random: &mut Random) -> Result<Vec<f64>> {
     let shape = space.shape();
-    let size: usize = shape.iter().product();
     let kernel = &process.kernel;
-    let [product, additive, pairwise] = kernel.weights();
-    let strides: Vec<usize> = (0..shape.len()).map(|d| shape[d + 1..].iter().product()).collect();
-    let mut sample = vec![0.0; size];
-    if product > 0.0 {
-        sample = normals(size, product.sqrt(), random);
-        for (d, &count) in shape.iter().enumerate() {
-            along(&mut sample, count, strides[d], &Cholesky::new(&kernel.factor(d).ridged(1e-10))?);
-        }
-    }
-    if additive > 0.0 || pairwise > 0.0 {
-        let broad: Vec<Cholesky> =
-            (0..shape.len()).map(|d| Cholesky::new(&kernel.broad(d).ridged(1e-10))).collect::<Result<_>>()?;
-        for (d, &count) in shape.iter().enumerate() {
-            let main = broad[d].multiply(&normals(count, additive.sqrt(), random));
-            for (x, value) in sample.iter_mut().enumerate() {
-                *value += main[x / strides[d] % count];
-            }
-            for (e, &other) in shape.iter().enumerate().skip(d + 1) {
-                let mut pair = normals(count * other, pairwise.sqrt(), random);
-                along(&mut pair, count, other, &broad[d]);
-                along(&mut pair, other, 1, &broad[e]);
-                for (x, value) in sample.iter_mut().enumerate() {
-                    *value += pair[x / strides[d] % count * other + x / strides[e] % other];
-                }
-            }
-        }
+    let scale = kernel.variance.sqrt();
+    let mut sample: Vec<f64> = (0..shape.iter().product()).map(|_| scale * random.normal()).collect();
+    for (d, &count) in shape.iter().enumerate() {
+        let stride = shape[d + 1..].iter().product();
+        along(&mut sample, count, stride, &Cholesky::new(&kernel.factor(d).ridged(1e-10))?);
     }
     Ok(sample)
 }
@@ -115,41 +88,34 @@ mod tests {
             .map(|(d, &n)| Dimension { name: d.to_string(), values: (0..n).map(f64::from).collect(), lengthscale: 1.5 })
             .collect();
         let space = SearchSpace::new(dimensions).unwrap();
-        for (additive_share, pairwise_share) in [(0.0, 0.0), (0.3, 0.3)] {
-            for method in [Method::LineCoSpar, Method::Eubo] {
-                let settings = LearnerSettings {
-                    additive_share,
-                    pairwise_share,
-                    preference_noise: 0.3,
-                    ..LearnerSettings::of(method)
-                };
-                let [a, b, c] = [0, 7, 20].map(ActionIndex);
-                let log = FeedbackLog {
-                    visited: vec![a, b, c],
-                    feedback: vec![
-                        Feedback::Preference { winner: a, loser: b },
-                        Feedback::Preference { winner: a, loser: c },
-                        Feedback::Label { action: b, category: 1 },
-                    ],
-                };
-                let posterior = posterior(&space, &log, &settings).unwrap();
-                let grid = WholeGrid::new(&space, &posterior.utility);
-                let mut random = Random::new(11, 0);
-                let count = 3_000;
-                let (mut first, mut second) = (vec![0.0; 24], vec![0.0; 24]);
-                for _ in 0..count {
-                    let sample = posterior_sample(&space, &posterior.utility, &grid, &mut random).unwrap();
-                    for (x, value) in sample.into_iter().enumerate() {
-                        first[x] += value / f64::from(count);
-                        second[x] += value * value / f64::from(count);
-                    }
+        for method in [Method::LineCoSpar, Method::Eubo] {
+            let settings = LearnerSettings { preference_noise: 0.3, ..LearnerSettings::of(method) };
+            let [a, b, c] = [0, 7, 20].map(ActionIndex);
+            let log = FeedbackLog {
+                visited: vec![a, b, c],
+                feedback: vec![
+                    Feedback::Preference { winner: a, loser: b },
+                    Feedback::Preference { winner: a, loser: c },
+                    Feedback::Label { action: b, category: 1 },
+                ],
+            };
+            let posterior = posterior(&space, &log, &settings).unwrap();
+            let grid = WholeGrid::new(&space, &posterior.utility);
+            let mut random = Random::new(11, 0);
+            let count = 3_000;
+            let (mut first, mut second) = (vec![0.0; 24], vec![0.0; 24]);
+            for _ in 0..count {
+                let sample = posterior_sample(&space, &posterior.utility, &grid, &mut random).unwrap();
+                for (x, value) in sample.into_iter().enumerate() {
+                    first[x] += value / f64::from(count);
+                    second[x] += value * value / f64::from(count);
                 }
-                for x in 0..24 {
-                    let expected = posterior.predict(ActionIndex(x as u64)).unwrap();
-                    let sd = (second[x] - first[x] * first[x]).sqrt();
-                    assert!((first[x] - expected.mean).abs() < 0.07, "{x}: {} {expected:?}", first[x]);
-                    assert!((sd - expected.standard_deviation).abs() < 0.07, "{x}: {sd} {expected:?}");
-                }
+            }
+            for x in 0..24 {
+                let expected = posterior.predict(ActionIndex(x as u64)).unwrap();
+                let sd = (second[x] - first[x] * first[x]).sqrt();
+                assert!((first[x] - expected.mean).abs() < 0.07, "{x}: {} {expected:?}", first[x]);
+                assert!((sd - expected.standard_deviation).abs() < 0.07, "{x}: {sd} {expected:?}");
             }
         }
     }

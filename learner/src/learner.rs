@@ -6,11 +6,10 @@ use std::sync::Arc;
 use crate::action::ActionIndex;
 use crate::error::Result;
 use crate::feedback::{Feedback, FeedbackLog};
-use crate::fit::{LastFit, ProcessModel, log_evidence};
+use crate::fit::{LastFit, ProcessModel};
 use crate::gaussian_process::GaussianProcess;
-use crate::hyperparameters::Hyperparameters;
 use crate::inference::{Approximate, ExpectationPropagation, Laplace};
-use crate::kernel::{Kernel, KernelShape};
+use crate::kernel::Kernel;
 use crate::likelihood::Interval;
 use crate::observations::Observation;
 use crate::posterior::Posterior;
@@ -25,10 +24,6 @@ pub struct Learner {
     cached_for: Option<(SearchSpace, LearnerSettings)>,
     utility: LastFit,
     feasibility: LastFit,
-    /// The hyperparameters of the last fit of the utility.
-    fitted_with: Option<Hyperparameters>,
-    /// The last learned hyperparameters, and the observations that they were learned from.
-    learned: Option<(Vec<Observation>, Hyperparameters)>,
 }
 
 /// The posterior over the utility, given a log.
@@ -43,7 +38,6 @@ pub fn posterior(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSetti
 fn observations(
     log: &FeedbackLog,
     settings: &LearnerSettings,
-    preference_noise: f64,
     infeasible: &HashSet<ActionIndex>,
 ) -> [Vec<Observation>; 2] {
     let above = |noise| Interval { low: 0.0, high: f64::INFINITY, noise };
@@ -58,7 +52,7 @@ fn observations(
                 continue;
             }
             Feedback::Label { category, .. } => settings.label_interval(category),
-            Feedback::Preference { .. } => above(preference_noise),
+            Feedback::Preference { .. } => above(settings.preference_noise),
             Feedback::Suggestion { .. } => above(settings.coactive_noise),
             Feedback::Tie { .. } => {
                 Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise }
@@ -73,34 +67,9 @@ fn observations(
     split
 }
 
-/// Kernel of the utility; `factors` multiply the lengthscales.
-pub(crate) fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings, factors: &[f64]) -> KernelShape {
-    let dimensions = space.dimensions();
-    KernelShape {
-        variance: settings.signal_variance,
-        nugget: settings.nugget,
-        product: 1.0 - settings.additive_share - settings.pairwise_share,
-        additive: settings.additive_share,
-        pairwise: settings.pairwise_share,
-        lengthscales: dimensions
-            .iter()
-            .zip(factors)
-            .map(|(d, factor)| d.lengthscale * settings.lengthscale_factor * factor)
-            .collect(),
-        broad_lengthscales: dimensions.iter().map(|d| d.range() * settings.broad_lengthscale).collect(),
-    }
-}
-
-/// Kernel of feasibility.
-fn feasibility_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape {
-    let factor = settings.lengthscale_factor * settings.feasibility_lengthscale_factor;
-    KernelShape {
-        product: 1.0 - settings.feasibility_additive_share,
-        additive: settings.feasibility_additive_share,
-        pairwise: 0.0,
-        lengthscales: space.dimensions().iter().map(|d| d.lengthscale * factor).collect(),
-        ..kernel_shape(space, settings, &vec![1.0; space.dimensions().len()])
-    }
+/// The prior of utility and feasibility.
+pub(crate) fn kernel(space: &SearchSpace, settings: &LearnerSettings) -> Kernel {
+    Kernel::new(space, settings.signal_variance, settings.nugget, settings.lengthscale_factor)
 }
 
 impl Learner {
@@ -124,28 +93,19 @@ impl Learner {
             Inference::Laplace => &Laplace,
             Inference::ExpectationPropagation => &ExpectationPropagation::default(),
         };
-        let learned = self.hyperparameters(space, log, settings, method, &infeasible)?;
-        if self.fitted_with.as_ref() != Some(&learned) {
-            self.utility = LastFit::default();
-            self.fitted_with = Some(learned.clone());
-        }
-        let preference_noise = settings.preference_noise * learned.preference_noise;
-        let kernel = Arc::new(Kernel::new(space, &kernel_shape(space, settings, &learned.lengthscales)));
+        let kernel = Arc::new(kernel(space, settings));
         let model = ProcessModel { space, kernel: &kernel, link: settings.link, method };
-        let [of_utility, of_feasibility] = observations(log, settings, preference_noise, &infeasible);
+        let [of_utility, of_feasibility] = observations(log, settings, &infeasible);
         let fit = self.utility.get_or_fit(&model, of_utility)?;
         let utility = GaussianProcess { kernel: Arc::clone(&kernel), fit };
         let feasibility = match settings.labels {
             Labels::InUtility => None,
             Labels::Separate => {
-                let kernel = Arc::new(Kernel::new(space, &feasibility_shape(space, settings)));
-                let model = ProcessModel { space, kernel: &kernel, link: settings.link, method };
                 let fit = self.feasibility.get_or_fit(&model, of_feasibility)?;
-                Some(GaussianProcess { kernel, fit })
+                Some(GaussianProcess { kernel: Arc::clone(&kernel), fit })
             }
         };
         Ok(Posterior {
-            preference_noise,
             space: space.clone(),
             settings: settings.clone(),
             visited: log.visited.clone(),
@@ -154,42 +114,5 @@ impl Learner {
             feasibility,
             infeasible,
         })
-    }
-
-    /// The hyperparameters learned from the log, or neutral ones.
-    fn hyperparameters(
-        &mut self,
-        space: &SearchSpace,
-        log: &FeedbackLog,
-        settings: &LearnerSettings,
-        method: &dyn Approximate,
-        infeasible: &HashSet<ActionIndex>,
-    ) -> Result<Hyperparameters> {
-        let visited = settings.learn_every.map_or(0, |every| log.visited.len() / every * every);
-        if visited == 0 {
-            return Ok(Hyperparameters::neutral(space));
-        }
-        let known: HashSet<ActionIndex> = log.visited[..visited].iter().copied().collect();
-        let about_known = |feedback: &&Feedback| {
-            let (first, second) = feedback.actions();
-            known.contains(&first) && second.is_none_or(|second| known.contains(&second))
-        };
-        let feedback = log.feedback.iter().filter(about_known).copied().collect();
-        let log = FeedbackLog { visited: log.visited[..visited].to_vec(), feedback };
-        let [current, _] = observations(&log, settings, settings.preference_noise, infeasible);
-        if let Some((learned_from, learned)) = &self.learned
-            && *learned_from == current
-        {
-            return Ok(learned.clone());
-        }
-        let learned = Hyperparameters::learn(space, |candidate| {
-            let kernel = Kernel::new(space, &kernel_shape(space, settings, &candidate.lengthscales));
-            let model = ProcessModel { space, kernel: &kernel, link: settings.link, method };
-            let noise = settings.preference_noise * candidate.preference_noise;
-            let [of_utility, _] = observations(&log, settings, noise, infeasible);
-            log_evidence(&model, &of_utility)
-        })?;
-        self.learned = Some((current, learned.clone()));
-        Ok(learned)
     }
 }

@@ -48,7 +48,6 @@ mod feedback;
 mod fit;
 mod gaussian_process;
 mod grid_sample;
-mod hyperparameters;
 mod inference;
 mod kernel;
 mod learner;

@@ -48,8 +48,6 @@ impl Prediction {
 pub struct Posterior {
     pub(crate) space: SearchSpace,
     pub(crate) settings: LearnerSettings,
-    /// As set, or as learned.
-    pub(crate) preference_noise: f64,
     pub(crate) visited: Vec<ActionIndex>,
     pub(crate) feedback: Vec<Feedback>,
     pub(crate) utility: GaussianProcess,

@@ -96,19 +96,8 @@ pub struct LearnerSettings {
     pub nugget: f64,
     /// Factor on the lengthscale of every dimension, 0.01 to 100.
     pub lengthscale_factor: f64,
-    /// Share of the prior variance in functions of one dimension, 0 to 1.
-    pub additive_share: f64,
-    /// Share of the prior variance in functions of two dimensions, 0 to 1. The rest is the product kernel of the
-    /// literature.
-    pub pairwise_share: f64,
-    /// Lengthscale of the additive and pairwise parts, as a multiple of the range of each dimension, 0.01 to 1000.
-    pub broad_lengthscale: f64,
     /// The function that labels are about.
     pub labels: Labels,
-    /// Factor on every lengthscale of feasibility, 0.01 to 100.
-    pub feasibility_lengthscale_factor: f64,
-    /// Share of the prior variance of feasibility in functions of one dimension, 0 to 1.
-    pub feasibility_additive_share: f64,
     /// The first action of a study.
     pub start: Start,
     /// Noise scale of preferences, in units of utility. All noise scales lie between 1e-3 and 1e3 prior standard
@@ -125,9 +114,6 @@ pub struct LearnerSettings {
     pub tie_noise: f64,
     /// Utilities that differ by less than this feel equal.
     pub tie_width: f64,
-    /// Number of trials after which lengthscales and preference noise are learned again from the evidence. `None` keeps
-    /// them as set.
-    pub learn_every: Option<usize>,
     /// Region of avoidance (ROIAL, Li et al. 2021): an action is not proposed if its mean plus this many standard
     /// deviations is below the lowest threshold, unless no other action is left. ROIAL uses -0.45. Mean and deviation
     /// are those of the function that labels are about. All methods but `random` respect it. `None` disables it.
@@ -185,12 +171,7 @@ impl LearnerSettings {
             signal_variance: 1.0,
             nugget: 1e-5,
             lengthscale_factor: 1.0,
-            additive_share: 0.0,
-            pairwise_share: 0.0,
-            broad_lengthscale: 1.0,
             labels: Labels::InUtility,
-            feasibility_lengthscale_factor: 1.0,
-            feasibility_additive_share: 0.0,
             start: Start::Random,
             preference_noise: 0.02,
             ordinal_noise: 0.1,
@@ -198,7 +179,6 @@ impl LearnerSettings {
             coactive_noise: 0.02,
             tie_noise: 0.02,
             tie_width: 0.02,
-            learn_every: None,
             avoidance: None,
             samples_per_iteration: 1,
             repeats: true,
@@ -260,11 +240,6 @@ impl LearnerSettings {
             ("signal_variance", self.signal_variance, 1e-6, 1e6),
             ("nugget", self.nugget, 1e-10 * self.signal_variance, self.signal_variance),
             ("lengthscale_factor", self.lengthscale_factor, 1e-2, 1e2),
-            ("additive_share", self.additive_share, 0.0, 1.0),
-            ("pairwise_share", self.pairwise_share, 0.0, 1.0),
-            ("broad_lengthscale", self.broad_lengthscale, 1e-2, 1e3),
-            ("feasibility_lengthscale_factor", self.feasibility_lengthscale_factor, 1e-2, 1e2),
-            ("feasibility_additive_share", self.feasibility_additive_share, 0.0, 1.0),
         ] {
             if !(value >= low && value <= high) {
                 return refuse(setting, outside(value, low, high));
@@ -286,22 +261,10 @@ impl LearnerSettings {
                 return refuse(setting, reason);
             }
         }
-        if self.learn_every == Some(0) {
-            return refuse("learn_every", "is 0; it must be at least 1, or null to keep the hyperparameters".into());
-        }
         if let Some(avoidance) = self.avoidance
             && (avoidance.is_nan() || avoidance.abs() > 1e3)
         {
             return refuse("avoidance", outside(avoidance, -1e3, 1e3));
-        }
-        if self.additive_share + self.pairwise_share > 1.0 {
-            return refuse(
-                "pairwise_share",
-                format!(
-                    "is {}; its sum with additive_share ({}) must be at most 1",
-                    self.pairwise_share, self.additive_share
-                ),
-            );
         }
         if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
             return refuse("link", "must be probit for expectation propagation".into());

@@ -1,11 +1,11 @@
 //! Means, covariances and variances of all `N` actions at once.
 //!
 //! The `N x n` covariances with the points are never stored. The dimensions are divided into a left and a right half; a
-//! covariance is a short sum of products of one number from each half (`Kernel::split`).
+//! covariance is the product of one number from each half.
 
 use crate::action::ActionIndex;
 use crate::gaussian_process::GaussianProcess;
-use crate::linalg::{BLOCK, Block, add_scaled, add_scaled_products};
+use crate::linalg::{BLOCK, Block, add_scaled_products};
 use crate::search_space::SearchSpace;
 
 /// A whole grid under a Gaussian process.
@@ -16,51 +16,25 @@ pub(crate) struct WholeGrid<'a> {
     right: Half,
 }
 
-/// Covariance terms of all combinations of levels of one half with the points, point by point.
+/// Covariance factors of all combinations of levels of one half with the points, point by point. Those of the left half
+/// contain the prior variance.
 struct Half {
     /// Number of combinations of levels.
     count: usize,
-    /// Coupled terms of [`Kernel::split`](crate::kernel::Kernel::split): all first ones, then, if the kernel has them,
-    /// all second ones.
-    coupled: Vec<f64>,
-    /// Separate terms, if the kernel has them.
-    separate: Vec<f64>,
+    factors: Vec<f64>,
 }
 
 impl Half {
-    fn new(process: &GaussianProcess, shape: &[usize], from: usize, to: usize, left: bool) -> Self {
+    fn new(process: &GaussianProcess, shape: &[usize], from: usize, to: usize, scale: f64) -> Self {
         let points = &process.observed().levels;
-        let pure = process.kernel.is_product();
         let count: usize = shape[from..to].iter().product();
-        let mut coupled = Vec::with_capacity(count * points.len() * if pure { 1 } else { 2 });
-        let (mut others, mut separate) = (Vec::new(), Vec::new());
-        if pure {
-            let mut products = Vec::with_capacity(count);
-            for point in points {
-                process.kernel.products(from, &point[from..to], left, &mut products);
-                coupled.extend_from_slice(&products);
-            }
-            return Self { count, coupled, separate };
-        }
+        let mut factors = Vec::with_capacity(count * points.len());
+        let mut products = Vec::with_capacity(count);
         for point in points {
-            for symmetric in process.kernel.combinations(from, &point[from..to]) {
-                let (pair, alone) = process.kernel.split(symmetric, left);
-                coupled.push(pair[0]);
-                others.push(pair[1]);
-                separate.push(alone);
-            }
+            process.kernel.products(from, &point[from..to], scale, &mut products);
+            factors.extend_from_slice(&products);
         }
-        coupled.append(&mut others);
-        Self { count, coupled, separate }
-    }
-
-    /// Weighted sum of the separate terms over the points.
-    fn separate_form(&self, weights: &[f64]) -> Vec<f64> {
-        let mut form = vec![0.0; self.count];
-        for (terms, &weight) in self.separate.chunks_exact(self.count.max(1)).zip(weights) {
-            add_scaled(&mut form, weight, terms);
-        }
-        form
+        Self { count, factors }
     }
 }
 
@@ -71,8 +45,8 @@ impl<'a> WholeGrid<'a> {
         let cut = (0..=shape.len())
             .min_by_key(|&cut| shape[..cut].iter().product::<usize>().max(shape[cut..].iter().product()))
             .unwrap_or(0);
-        let left = Half::new(process, &shape, 0, cut, true);
-        let right = Half::new(process, &shape, cut, shape.len(), false);
+        let left = Half::new(process, &shape, 0, cut, process.kernel.variance);
+        let right = Half::new(process, &shape, cut, shape.len(), 1.0);
         Self { process, cut, left, right }
     }
 
@@ -80,16 +54,7 @@ impl<'a> WholeGrid<'a> {
     pub(crate) fn form(&self, weights: &[f64]) -> Vec<f64> {
         let (rows, columns) = (self.left.count, self.right.count);
         let mut form = vec![0.0; rows * columns];
-        if !self.left.separate.is_empty() {
-            let (left, right) = (self.left.separate_form(weights), self.right.separate_form(weights));
-            for (row, left) in form.chunks_exact_mut(columns).zip(left) {
-                for (value, right) in row.iter_mut().zip(&right) {
-                    *value = left + right;
-                }
-            }
-        }
-        let cycled: Vec<f64> = weights.iter().cycle().take(self.left.coupled.len() / rows.max(1)).copied().collect();
-        add_scaled_products(&self.left.coupled, &self.right.coupled, &cycled, &mut form, columns);
+        add_scaled_products(&self.left.factors, &self.right.factors, weights, &mut form, columns);
         form
     }
 
@@ -99,7 +64,7 @@ impl<'a> WholeGrid<'a> {
         let kernel = &self.process.kernel;
         let left = kernel.combinations(0, &target[..self.cut]);
         let right = kernel.combinations(self.cut, &target[self.cut..]);
-        left.iter().flat_map(|&y| right.iter().map(move |&z| kernel.join(y, z))).collect()
+        left.iter().flat_map(|y| right.iter().map(move |z| kernel.variance * y * z)).collect()
     }
 
     /// Prior covariances of up to [`BLOCK`] actions with the points.
@@ -108,17 +73,9 @@ impl<'a> WholeGrid<'a> {
         let (rows, columns) = (self.left.count, self.right.count);
         let mut block: Block = vec![[0.0; BLOCK]; points];
         for (i, lanes) in block.iter_mut().enumerate() {
-            let (left, right) = (&self.left.coupled[i * rows..], &self.right.coupled[i * columns..]);
+            let (left, right) = (&self.left.factors[i * rows..], &self.right.factors[i * columns..]);
             for (lane, action) in lanes.iter_mut().zip(actions) {
                 *lane = left[action / columns] * right[action % columns];
-            }
-            if !self.left.separate.is_empty() {
-                let (left, right) = (&left[points * rows..], &right[points * columns..]);
-                let (alone_left, alone_right) = (&self.left.separate[i * rows..], &self.right.separate[i * columns..]);
-                for (lane, action) in lanes.iter_mut().zip(actions) {
-                    let (y, z) = (action / columns, action % columns);
-                    *lane += left[y] * right[z] + alone_left[y] + alone_right[z];
-                }
             }
         }
         block

@@ -41,7 +41,6 @@ fn all_settings() -> Vec<LearnerSettings> {
     settings.push(LearnerSettings::published(Method::Eubo));
     settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::default() });
     settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::of(Method::InformationGain) });
-    settings.push(LearnerSettings { learn_every: Some(5), ..LearnerSettings::published(Method::Eubo) });
     for method in [Method::Eubo, Method::Thompson, Method::InformationGain] {
         settings.push(LearnerSettings { avoidance: Some(-0.45), ..LearnerSettings::of(method) });
     }
@@ -49,8 +48,6 @@ fn all_settings() -> Vec<LearnerSettings> {
         inference: Inference::ExpectationPropagation,
         link: Link::Probit,
         avoidance: Some(-0.45),
-        additive_share: 0.4,
-        pairwise_share: 0.3,
         ..LearnerSettings::default()
     });
     settings
@@ -207,7 +204,7 @@ fn hundred_answers_in_thirty_dimensions_are_valid() {
         }
         log.visited.push(action);
     }
-    for settings in all_settings().into_iter().filter(|settings| settings.learn_every.is_none()) {
+    for settings in all_settings() {
         exercise(&space, &log, &settings);
     }
 }

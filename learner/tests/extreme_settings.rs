@@ -52,14 +52,12 @@ fn any_settings() -> impl Strategy<Value = LearnerSettings> {
         (Inference::Laplace, Link::Probit),
         (Inference::ExpectationPropagation, Link::Probit),
     ]);
-    let shapes = (methods, inference, any::<[bool; 5]>(), decades(1e-6, 1e6));
-    let reach = (decades(1e-2, 1e2), decades(1e-2, 1e3), decades(1e-2, 1e2), 0.0..1.0_f64, 0.0..1.0_f64);
+    let shapes = (methods, inference, any::<[bool; 4]>(), decades(1e-6, 1e6));
     let shares = (decades(1e-10, 1.0), prop::collection::vec(-10.0..10.0_f64, 0..4), -1e3..1e3_f64);
     let noises = prop::array::uniform5(decades(1e-3, 1e3));
-    (shapes, reach, shares, noises).prop_map(|(shapes, reach, shares, noises)| {
+    (shapes, decades(1e-2, 1e2), shares, noises).prop_map(|(shapes, lengthscale_factor, shares, noises)| {
         let (method, (inference, link), flags, signal_variance) = shapes;
-        let [separate, centre, repeats, learn, avoid] = flags;
-        let (lengthscale_factor, broad_lengthscale, feasibility_lengthscale_factor, additive, pairwise) = reach;
+        let [separate, centre, repeats, avoid] = flags;
         let (nugget, mut ordinal_thresholds, avoidance) = shares;
         let sd = signal_variance.sqrt();
         let [preference_noise, ordinal_noise, coactive_noise, tie_noise, tie_width] = noises.map(|noise| noise * sd);
@@ -75,12 +73,7 @@ fn any_settings() -> impl Strategy<Value = LearnerSettings> {
             signal_variance,
             nugget: (nugget * signal_variance).clamp(1e-10 * signal_variance, signal_variance),
             lengthscale_factor,
-            additive_share: additive,
-            pairwise_share: pairwise * (1.0 - additive),
-            broad_lengthscale,
             labels: if separate { Labels::Separate } else { Labels::InUtility },
-            feasibility_lengthscale_factor,
-            feasibility_additive_share: additive,
             start: if centre { Start::Centre } else { Start::Random },
             preference_noise: within(preference_noise, 1e-3, 1e3),
             ordinal_noise: within(ordinal_noise, 1e-3, 1e3),
@@ -88,7 +81,6 @@ fn any_settings() -> impl Strategy<Value = LearnerSettings> {
             coactive_noise: within(coactive_noise, 1e-3, 1e3),
             tie_noise: within(tie_noise, 1e-3, 1e3),
             tie_width: within(tie_width, 1e-3, 1e3),
-            learn_every: learn.then_some(3),
             avoidance: avoid.then_some(avoidance),
             repeats,
             ..LearnerSettings::of(method)

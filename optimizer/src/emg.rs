@@ -7,10 +7,12 @@
 
 mod activity;
 mod cycle;
+mod emg_filter;
 mod emg_recording;
 mod envelope;
 mod filter_settings;
 mod model_activity;
+mod raw_signal_checks;
 
 pub use activity::Activity;
 pub use cycle::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse, is_plausible, strides_between};

@@ -1,5 +1,6 @@
 //! Imports between the files of a crate, read from their text: `use` declarations and paths that begin with `crate` or
-//! `super`. A re-export leads to the file that defines the name. Modules of unit tests are left out.
+//! `super`. A re-export leads to the file that defines the name. Modules of unit tests are left out, in files of their own
+//! as well.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,8 +28,12 @@ struct Source {
 
 /// The imports of a crate, from its files by their path below `src`, with their texts.
 pub fn of_crate(files: &[(String, String)]) -> Imports {
-    let sources: BTreeMap<Module, Source> =
-        files.iter().map(|(file, text)| (module_of(file), source(file, &code_of(text)))).collect();
+    let tests: Vec<Module> = files.iter().flat_map(|(file, text)| test_modules(&module_of(file), text)).collect();
+    let sources: BTreeMap<Module, Source> = files
+        .iter()
+        .map(|(file, text)| (module_of(file), source(file, &code_of(text))))
+        .filter(|(module, _)| !tests.iter().any(|tests| module.starts_with(tests)))
+        .collect();
     let mut imports = Imports::new();
     for (module, source) in &sources {
         let used = source.uses.iter().filter(|used| !used.is_export).map(|used| &used.path);
@@ -38,6 +43,30 @@ pub fn of_crate(files: &[(String, String)]) -> Imports {
         imports.insert(source.file.clone(), others);
     }
     imports
+}
+
+/// The imports between the modules of each folder: what the files of a module, and of its folder, import from the other
+/// modules beside it. The crate itself is the first folder.
+pub fn between_modules(imports: &Imports) -> Vec<Imports> {
+    let modules: BTreeSet<Module> = imports.keys().map(|file| module_of(file)).collect();
+    let folders: BTreeSet<&[String]> =
+        modules.iter().flat_map(|module| (0..module.len()).map(|depth| &module[..depth])).collect();
+    folders.into_iter().map(|folder| within(imports, folder)).collect()
+}
+
+/// The imports between the modules of one folder.
+fn within(imports: &Imports, folder: &[String]) -> Imports {
+    let part = |file: &str| {
+        let module = module_of(file);
+        (module.len() > folder.len() && module.starts_with(folder)).then(|| module[..=folder.len()].join("::"))
+    };
+    let mut found = Imports::new();
+    for (file, others) in imports {
+        let Some(own) = part(file) else { continue };
+        let others = others.iter().filter_map(|other| part(other)).filter(|other| *other != own);
+        found.entry(own.clone()).or_default().extend(others);
+    }
+    found
 }
 
 /// A circle of files that import from each other, if there is one.
@@ -66,6 +95,20 @@ fn module_of(file: &str) -> Module {
         parts.pop();
     }
     parts
+}
+
+/// The modules of unit tests that a file declares and that have files of their own.
+fn test_modules(parent: &Module, text: &str) -> Vec<Module> {
+    let mut found = Vec::new();
+    for (at, attribute) in text.match_indices("#[cfg(test)]") {
+        let mut lines = text[at + attribute.len()..]
+            .lines()
+            .map(str::trim)
+            .skip_while(|line| line.is_empty() || line.starts_with("#["));
+        let declared = lines.next().and_then(|line| line.strip_suffix(';')?.strip_prefix("mod "));
+        found.extend(declared.map(|name| [&parent[..], &[name.to_owned()]].concat()));
+    }
+    found
 }
 
 /// The file that defines what a path names, as seen from a module. `None` for other crates.
@@ -237,6 +280,41 @@ mod tests {
         assert!(found["lib.rs"].is_empty());
         assert_eq!(found["b/mod.rs"], BTreeSet::from(["a.rs".to_owned()]));
         assert_eq!(found["b/c.rs"], BTreeSet::from(["a.rs".to_owned()]));
+        assert_eq!(circle(&found), None);
+    }
+
+    #[test]
+    fn circles_of_modules_are_found_where_files_have_none() {
+        let files = [
+            ("lib.rs", "mod a;\nmod b;\n"),
+            ("a/mod.rs", "mod low;\nmod high;\n"),
+            ("a/low.rs", "pub struct Low;\n"),
+            ("a/high.rs", "use crate::b::Middle;\n"),
+            ("b.rs", "use crate::a::low::Low;\npub struct Middle;\n"),
+        ];
+        let found = imports(&files);
+        assert_eq!(circle(&found), None);
+        let circles: Vec<_> = between_modules(&found).iter().filter_map(circle).collect();
+        assert_eq!(circles, [["a", "b"]]);
+
+        // In a folder of the crate.
+        let nested: Vec<_> = files
+            .map(|(file, text)| (format!("n/{file}").replace("lib", "mod"), text.replace("crate::", "crate::n::")))
+            .into();
+        let found = of_crate(&[&nested[..], &[("lib.rs".to_owned(), "mod n;".to_owned())]].concat());
+        let circles: Vec<_> = between_modules(&found).iter().filter_map(circle).collect();
+        assert_eq!(circles, [["n::a", "n::b"]]);
+    }
+
+    #[test]
+    fn files_of_unit_tests_are_left_out() {
+        let found = imports(&[
+            ("lib.rs", "mod a;\nmod b;\n"),
+            ("a/mod.rs", "#[cfg(test)]\n#[allow(x)]\nmod compared;\npub struct A;\n"),
+            ("a/compared.rs", "use crate::b::B;\n"),
+            ("b.rs", "use crate::a::A;\npub struct B;\n"),
+        ]);
+        assert_eq!(found.keys().collect::<Vec<_>>(), ["a/mod.rs", "b.rs", "lib.rs"]);
         assert_eq!(circle(&found), None);
     }
 

@@ -73,12 +73,20 @@ fn files_of_a_crate_do_not_import_from_each_other_in_circles() {
 }
 
 #[test]
+fn modules_of_a_crate_do_not_import_from_each_other_in_circles() {
+    for folder in CRATES {
+        let imports = imports::of_crate(&sources::below(folder));
+        for modules in imports::between_modules(&imports) {
+            assert_eq!(imports::circle(&modules), None, "{folder}");
+        }
+    }
+}
+
+#[test]
 fn modules_do_not_import_across_the_walls_of_the_architecture() {
     for (crate_folder, folder, forbidden) in WALLS {
         let imports = imports::of_crate(&sources::below(crate_folder));
-        // Tests may use what their subject must not.
-        let is_behind = |file: &str| file.starts_with(folder) && !file.ends_with("tests.rs");
-        let behind: Vec<_> = imports.iter().filter(|(file, _)| is_behind(file)).collect();
+        let behind: Vec<_> = imports.iter().filter(|(file, _)| file.starts_with(folder)).collect();
         assert!(!behind.is_empty(), "{crate_folder}/{folder} has moved");
         for (file, others) in behind {
             let crossed = others.iter().find(|other| forbidden.iter().any(|folder| other.starts_with(folder)));

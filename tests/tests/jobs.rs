@@ -5,7 +5,7 @@
 use axum::http::StatusCode;
 use gait_optimizer::Gait;
 use gaitwright_service::access::{Caller, Right};
-use gaitwright_service::studies::job::{JobId, JobState};
+use gaitwright_service::job::{JobId, JobState};
 use gaitwright_service::studies::job_status;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::{Trial, TrialState};

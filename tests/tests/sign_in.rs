@@ -279,7 +279,7 @@ async fn failures_of_a_network_begin_with_the_first_failure_after_a_success() {
     let mut writer = service.store.write().await.unwrap();
     let success = now();
     sign_in_failures::count(&mut writer, network, success, true).await.unwrap();
-    sign_in_failures::uncount(&mut writer, network).await.unwrap();
+    sign_in_failures::remove(&mut writer, network).await.unwrap();
     let failure = now();
     for at in [failure, now()] {
         sign_in_failures::count(&mut writer, network, at, false).await.unwrap();

@@ -26,8 +26,6 @@ const SAMPLES: usize = 256;
 /// Mutual information with common random numbers.
 struct InformationGain<'a> {
     settings: &'a LearnerSettings,
-    /// As set, or as learned.
-    preference_noise: f64,
     /// Intervals of utilities that a label can name.
     grades: Vec<Interval>,
     normals: Vec<[f64; 2]>,
@@ -53,7 +51,7 @@ fn binary_entropy(p: f64) -> f64 {
 }
 
 impl<'a> InformationGain<'a> {
-    fn new(settings: &'a LearnerSettings, preference_noise: f64, random: &mut Random) -> Self {
+    fn new(settings: &'a LearnerSettings, random: &mut Random) -> Self {
         let categories = 0..settings.categories();
         let mut grades: Vec<Interval> = match settings.labels {
             Labels::InUtility => categories.map(|category| settings.label_interval(category)).collect(),
@@ -62,12 +60,7 @@ impl<'a> InformationGain<'a> {
         if grades.is_empty() {
             grades.push(Interval { low: f64::NEG_INFINITY, high: f64::INFINITY, noise: settings.ordinal_noise });
         }
-        Self {
-            settings,
-            preference_noise,
-            grades,
-            normals: (0..SAMPLES).map(|_| [random.normal(), random.normal()]).collect(),
-        }
+        Self { settings, grades, normals: (0..SAMPLES).map(|_| [random.normal(), random.normal()]).collect() }
     }
 
     /// Information of the label and the comparison of an action, in nats. With separate labels, `feasibility` is the
@@ -91,7 +84,7 @@ impl<'a> InformationGain<'a> {
         let slope = covariance / sd;
         let rest = (variance[1] - slope * slope).max(0.0).sqrt();
         let link = self.settings.link;
-        let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.preference_noise };
+        let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.settings.preference_noise };
         let mut marginal = vec![[0.0; 2]; self.grades.len()];
         let mut conditional = 0.0;
         for [z, w] in &self.normals {
@@ -120,7 +113,7 @@ pub(crate) fn over_candidates(
     random: &mut Random,
 ) -> Option<ActionIndex> {
     let space = posterior.space();
-    let gain = InformationGain::new(posterior.settings(), posterior.preference_noise, random);
+    let gain = InformationGain::new(posterior.settings(), random);
     let avoidance = Avoidance::of(posterior);
     let partner = match posterior.settings().partner {
         Partner::Previous => posterior.visited().last().copied().unwrap_or(best),
@@ -201,7 +194,7 @@ mod tests {
                 preference_noise: 0.2,
                 ..LearnerSettings::of(Method::InformationGain)
             };
-            let gain = InformationGain::new(&settings, settings.preference_noise, &mut Random::new(1, 0));
+            let gain = InformationGain::new(&settings, &mut Random::new(1, 0));
             for compared in [true, false] {
                 for feasibility in [(-1.0, 0.3), (0.1, 0.7), (2.0, 0.2)] {
                     let exact = by_definition(&settings, &utility(compared), feasibility);
@@ -215,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn proposal_depends_on_the_learned_preference_noise() {
+    fn proposal_depends_on_the_preference_noise() {
         let dimension = Dimension { name: "x".into(), values: (0..200).map(f64::from).collect(), lengthscale: 4.0 };
         let space = SearchSpace::new(vec![dimension]).unwrap();
         let settings = LearnerSettings::of(Method::InformationGain);
@@ -231,7 +224,7 @@ mod tests {
         let forbidden = ForbiddenActions::new(&space, log.visited.iter().copied(), &excluded);
         let mut proposals = HashSet::new();
         for preference_noise in [0.02, 1.0, 20.0] {
-            posterior.preference_noise = preference_noise;
+            posterior.settings.preference_noise = preference_noise;
             proposals.insert(over_candidates(&posterior, best, &forbidden, &mut Random::new(3, 0)).unwrap());
         }
         assert!(proposals.len() > 1, "{proposals:?}");

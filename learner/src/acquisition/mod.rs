@@ -2,6 +2,7 @@
 
 pub(crate) mod avoidance;
 mod candidates;
+mod duel;
 pub(crate) mod eubo;
 mod eubo_bounds;
 pub(crate) mod information_gain;

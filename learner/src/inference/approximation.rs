@@ -21,10 +21,6 @@ pub(crate) struct Approximation {
     pub(crate) mean: Vec<f64>,
     /// `K^-1 mean`, length `n`.
     pub(crate) weights: Vec<f64>,
-    /// `L^-1 mean`, length `n`.
-    pub(crate) whitened: Vec<f64>,
-    /// One for each site.
-    pub(crate) factors: Vec<SiteFactor>,
     pub(crate) covariance: Square,
 }
 
@@ -32,9 +28,6 @@ pub(crate) struct Approximation {
 pub(crate) trait Approximate {
     /// The approximation for all sites.
     fn approximate(&self, observed: &ObservedPoints, link: Link) -> Result<Approximation>;
-
-    /// Logarithm of the approximate marginal likelihood of all sites.
-    fn log_evidence(&self, observed: &ObservedPoints, link: Link, approximation: &Approximation) -> Result<f64>;
 }
 
 impl Approximation {
@@ -56,12 +49,15 @@ impl Approximation {
 }
 
 /// Cholesky factor of `B = I + L' W L`, `W = sum_s precision_s a_s a_s'`, `a_s` the coefficients of site `s`.
-pub(crate) fn whitened_precision(prior: &Cholesky, sites: &[Site], factors: &[SiteFactor]) -> Result<Cholesky> {
+pub(crate) fn whitened_precision(
+    prior: &Cholesky,
+    sites: &[Site],
+    precisions: impl Iterator<Item = f64>,
+) -> Result<Cholesky> {
     let n = prior.order();
     // W L: each site has at most two non-zero coefficients.
     let mut product = Square::zeros(n);
-    for (site, factor) in sites.iter().zip(factors) {
-        let w = factor.precision;
+    for (site, w) in sites.iter().zip(precisions) {
         if w == 0.0 {
             continue;
         }

@@ -4,7 +4,7 @@
 //! P` is `B = I + L' W L`, whose eigenvalues are at least 1, and `K` is never inverted (Rasmussen and Williams 2006,
 //! algorithm 3.1).
 
-use super::approximation::{Approximate, Approximation, SiteFactor, covariance, whitened_precision};
+use super::approximation::{Approximate, Approximation, covariance, whitened_precision};
 use crate::error::{LearnerError, Result};
 use crate::likelihood::Link;
 use crate::linalg::dot;
@@ -32,19 +32,18 @@ impl Approximate for Laplace {
         let mut at_mode = false;
         for _ in 0..MAX_STEPS {
             let mut slope = vec![0.0; n];
-            let factors: Vec<SiteFactor> = sites
+            let curvatures: Vec<f64> = sites
                 .iter()
                 .map(|site| {
-                    let d = site.of(&f);
-                    let at = site.interval.log_likelihood(link, d);
+                    let at = site.interval.log_likelihood(link, site.of(&f));
                     slope[site.plus] += at.slope;
                     if let Some(minus) = site.minus {
                         slope[minus] -= at.slope;
                     }
-                    SiteFactor { precision: at.curvature, shift: at.slope + at.curvature * d }
+                    at.curvature
                 })
                 .collect();
-            let precision = whitened_precision(prior, sites, &factors)?;
+            let precision = whitened_precision(prior, sites, curvatures.into_iter())?;
             let pull = prior.multiply_transposed(&slope);
             let gradient: Vec<f64> = v.iter().zip(&pull).map(|(v, p)| v - p).collect();
             let mut step = gradient.clone();
@@ -72,27 +71,12 @@ impl Approximate for Laplace {
             };
             let Some(next) = next else {
                 // At the mode, or the objective cannot decrease in double precision.
-                let mut weights = v.clone();
-                prior.solve_upper(&mut weights);
-                return Ok(Approximation {
-                    mean: f,
-                    weights,
-                    whitened: v,
-                    factors,
-                    covariance: covariance(prior, &precision),
-                });
+                prior.solve_upper(&mut v);
+                return Ok(Approximation { mean: f, weights: v, covariance: covariance(prior, &precision) });
             };
             (v, f, value) = next;
         }
         Err(LearnerError::Numerical(format!("Laplace's approximation did not converge in {MAX_STEPS} Newton steps")))
-    }
-
-    fn log_evidence(&self, observed: &ObservedPoints, link: Link, approximation: &Approximation) -> Result<f64> {
-        let v = &approximation.whitened;
-        let precision = whitened_precision(&observed.prior, &observed.sites, &approximation.factors)?;
-        Ok(log_likelihood(&observed.sites, link, &approximation.mean)
-            - 0.5 * dot(v, v)
-            - 0.5 * precision.ln_determinant())
     }
 }
 
@@ -105,7 +89,6 @@ mod tests {
     use super::*;
     use crate::action::ActionIndex;
     use crate::fit::{Fit, ProcessModel};
-    use crate::kernel::Kernel;
     use crate::likelihood::Interval;
     use crate::observations::Observation;
     use crate::random::Random;
@@ -118,7 +101,7 @@ mod tests {
             .map(|d| Dimension { name: d.to_string(), values: vec![0.0, 1.0, 2.0, 3.0], lengthscale: 1.0 })
             .collect();
         let space = SearchSpace::new(dimensions).unwrap();
-        let kernel = Kernel::new(&space, &crate::learner::kernel_shape(&space, &LearnerSettings::default(), &[1.0; 4]));
+        let kernel = crate::learner::kernel(&space, &LearnerSettings::default());
         for (link, noise, seed) in [(Link::Logistic, 0.02, 1), (Link::Probit, 0.02, 2), (Link::Logistic, 0.5, 3)] {
             let mut random = Random::new(seed, 0);
             let mut observations = Vec::new();
@@ -140,7 +123,8 @@ mod tests {
             }
             let model = ProcessModel { space: &space, kernel: &kernel, link, method: &Laplace };
             let fit = Fit::of(&model, &observations).unwrap();
-            let Approximation { mean, whitened, .. } = &fit.approximation;
+            let Approximation { mean, weights, .. } = &fit.approximation;
+            let whitened = fit.observed.prior.multiply_transposed(weights);
             let mut slope = vec![0.0; mean.len()];
             for site in &fit.observed.sites {
                 let at = site.interval.log_likelihood(link, site.of(mean));
@@ -150,7 +134,7 @@ mod tests {
                 }
             }
             let pull = fit.observed.prior.multiply_transposed(&slope);
-            let largest = whitened.iter().zip(pull).fold(0.0_f64, |largest, (v, p)| largest.max((v - p).abs()));
+            let largest = whitened.iter().zip(&pull).fold(0.0_f64, |largest, (v, p)| largest.max((v - p).abs()));
             assert!(largest < 1e-9, "{link:?} {noise}: {largest}");
         }
     }

@@ -74,7 +74,7 @@ impl WorkingApproximation {
     }
 
     /// The cavity of a site with this factor. `None` if it is improper.
-    pub(super) fn cavity(&self, site: &Site, factor: SiteFactor) -> Option<Cavity> {
+    fn cavity(&self, site: &Site, factor: SiteFactor) -> Option<Cavity> {
         let variance = self.variance(site);
         if variance.is_nan() || variance < 1e-14 {
             return None;
@@ -123,7 +123,7 @@ impl WorkingApproximation {
 
     /// Recomputes covariance and mean from the factors.
     pub(super) fn refresh(&mut self, prior: &Cholesky, sites: &[Site]) -> Result<()> {
-        let precision = whitened_precision(prior, sites, &self.factors)?;
+        let precision = whitened_precision(prior, sites, self.factors.iter().map(|factor| factor.precision))?;
         self.covariance = covariance(prior, &precision);
         self.delayed.clear();
         self.mean = self.covariance.multiply(&shifts(prior.order(), sites, &self.factors));
@@ -138,16 +138,14 @@ impl WorkingApproximation {
 
     /// The approximation after the updates.
     pub(super) fn finish(self, prior: &Cholesky) -> Approximation {
-        let mut whitened = self.mean.clone();
-        prior.solve_lower(&mut whitened);
-        let mut weights = whitened.clone();
-        prior.solve_upper(&mut weights);
-        Approximation { mean: self.mean, weights, whitened, factors: self.factors, covariance: self.covariance }
+        let mut weights = self.mean.clone();
+        prior.solve(&mut weights);
+        Approximation { mean: self.mean, weights, covariance: self.covariance }
     }
 }
 
 /// `sum_s shift_s a_s`, `a_s` the coefficients of site `s`.
-pub(super) fn shifts(n: usize, sites: &[Site], factors: &[SiteFactor]) -> Vec<f64> {
+fn shifts(n: usize, sites: &[Site], factors: &[SiteFactor]) -> Vec<f64> {
     let mut h = vec![0.0; n];
     for (site, factor) in sites.iter().zip(factors) {
         h[site.plus] += factor.shift;

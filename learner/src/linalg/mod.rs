@@ -139,11 +139,6 @@ impl Cholesky {
         &self.packed[i * (i + 1) / 2..(i + 1) * (i + 2) / 2]
     }
 
-    /// `ln det A`.
-    pub(crate) fn ln_determinant(&self) -> f64 {
-        (0..self.n).map(|i| 2.0 * crate::special_functions::ln(self.row(i)[i])).sum()
-    }
-
     /// `L x`.
     pub(crate) fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];

@@ -70,7 +70,7 @@ impl Posterior {
         }
         let view = |action| self.utility.view(action, self.space().levels(action));
         let (mean, variance) = self.utility.difference(&view(a), &view(b));
-        let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.preference_noise };
+        let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.settings.preference_noise };
         let by_utility = self.probability(better, mean, variance);
         let labelled = self.feasibility.as_ref().is_some_and(|process| !process.observed().sites.is_empty());
         if !labelled {

@@ -33,61 +33,55 @@ fn log() -> FeedbackLog {
 
 #[test]
 fn marginals_are_averages_of_the_means_over_other_dimensions() {
-    for (additive_share, pairwise_share) in [(0.0, 0.0), (0.3, 0.4)] {
-        let settings = LearnerSettings { additive_share, pairwise_share, ..LearnerSettings::of(Method::Eubo) };
-        let estimate = posterior(&space(), &log(), &settings).unwrap();
-        for dimension in 0..3 {
-            for (level, marginal) in estimate.marginal(dimension).unwrap().iter().enumerate() {
-                // Without the nugget, which the mean of a point contains.
-                let mut total = 0.0;
-                let mut count = 0.0;
-                for action in (0..24).map(ActionIndex) {
-                    let levels = estimate.space().levels(action);
-                    if levels[dimension] == level {
-                        let column = estimate.utility.kernel.column(&levels, &estimate.utility.observed().levels);
-                        total += dot(&column, &estimate.utility.approximation().weights);
-                        count += 1.0;
-                    }
+    let estimate = posterior(&space(), &log(), &LearnerSettings::of(Method::Eubo)).unwrap();
+    for dimension in 0..3 {
+        for (level, marginal) in estimate.marginal(dimension).unwrap().iter().enumerate() {
+            // Without the nugget, which the mean of a point contains.
+            let mut total = 0.0;
+            let mut count = 0.0;
+            for action in (0..24).map(ActionIndex) {
+                let levels = estimate.space().levels(action);
+                if levels[dimension] == level {
+                    let column = estimate.utility.kernel.column(&levels, &estimate.utility.observed().levels);
+                    total += dot(&column, &estimate.utility.approximation().weights);
+                    count += 1.0;
                 }
-                assert!((marginal.average.mean - total / count).abs() < 1e-10);
-                assert!(marginal.average.standard_deviation > 0.0 && marginal.average.standard_deviation < 1.0);
             }
+            assert!((marginal.average.mean - total / count).abs() < 1e-10);
+            assert!(marginal.average.standard_deviation > 0.0 && marginal.average.standard_deviation < 1.0);
         }
     }
 }
 
 #[test]
 fn main_effect_is_the_difference_of_two_averages_over_the_grid() {
-    for (additive_share, pairwise_share) in [(0.0, 0.0), (0.3, 0.4)] {
-        let settings = LearnerSettings { additive_share, pairwise_share, ..LearnerSettings::of(Method::Eubo) };
-        let estimate = posterior(&space(), &log(), &settings).unwrap();
-        for dimension in 0..3 {
-            let marginals = estimate.marginal(dimension).unwrap();
-            let effect = estimate.main_effect(dimension).unwrap();
-            let at = |value: f64| marginals.iter().position(|m| m.value == value).unwrap();
-            let (best, worst) = (at(effect.best), at(effect.worst));
-            assert!(marginals.iter().all(|m| m.average.mean <= marginals[best].average.mean));
-            assert!(marginals.iter().all(|m| m.average.mean >= marginals[worst].average.mean));
-            // Over every pair of actions, without the nugget.
-            let process = &estimate.utility;
-            let of = |level| (0..24).map(ActionIndex).filter(move |a| space().levels(*a)[dimension] == level);
-            let unseen = |a: ActionIndex| {
-                let mut view = process.view(a, estimate.space().levels(a));
-                if process.observed().slot(a).is_some() {
-                    view = process.view(ActionIndex(u64::MAX), estimate.space().levels(a));
-                }
-                view
-            };
-            let covariance = |a: usize, b: usize| {
-                let (a, b): (Vec<_>, Vec<_>) = (of(a).map(unseen).collect(), of(b).map(unseen).collect());
-                let sum: f64 = a.iter().flat_map(|x| b.iter().map(|y| process.covariance(x, y))).sum();
-                sum / (a.len() * b.len()) as f64
-            };
-            let variance = covariance(best, best) + covariance(worst, worst) - 2.0 * covariance(best, worst);
-            let mean = marginals[best].average.mean - marginals[worst].average.mean;
-            assert!((effect.difference.mean - mean).abs() < 1e-12);
-            assert!((effect.difference.standard_deviation.powi(2) - variance).abs() < 1e-9);
-        }
+    let estimate = posterior(&space(), &log(), &LearnerSettings::of(Method::Eubo)).unwrap();
+    for dimension in 0..3 {
+        let marginals = estimate.marginal(dimension).unwrap();
+        let effect = estimate.main_effect(dimension).unwrap();
+        let at = |value: f64| marginals.iter().position(|m| m.value == value).unwrap();
+        let (best, worst) = (at(effect.best), at(effect.worst));
+        assert!(marginals.iter().all(|m| m.average.mean <= marginals[best].average.mean));
+        assert!(marginals.iter().all(|m| m.average.mean >= marginals[worst].average.mean));
+        // Over every pair of actions, without the nugget.
+        let process = &estimate.utility;
+        let of = |level| (0..24).map(ActionIndex).filter(move |a| space().levels(*a)[dimension] == level);
+        let unseen = |a: ActionIndex| {
+            let mut view = process.view(a, estimate.space().levels(a));
+            if process.observed().slot(a).is_some() {
+                view = process.view(ActionIndex(u64::MAX), estimate.space().levels(a));
+            }
+            view
+        };
+        let covariance = |a: usize, b: usize| {
+            let (a, b): (Vec<_>, Vec<_>) = (of(a).map(unseen).collect(), of(b).map(unseen).collect());
+            let sum: f64 = a.iter().flat_map(|x| b.iter().map(|y| process.covariance(x, y))).sum();
+            sum / (a.len() * b.len()) as f64
+        };
+        let variance = covariance(best, best) + covariance(worst, worst) - 2.0 * covariance(best, worst);
+        let mean = marginals[best].average.mean - marginals[worst].average.mean;
+        assert!((effect.difference.mean - mean).abs() < 1e-12);
+        assert!((effect.difference.standard_deviation.powi(2) - variance).abs() < 1e-9);
     }
 }
 

@@ -39,12 +39,7 @@ settings! {
     signal_variance: f64,
     nugget: f64,
     lengthscale_factor: f64,
-    additive_share: f64,
-    pairwise_share: f64,
-    broad_lengthscale: f64,
     labels: Labels,
-    feasibility_lengthscale_factor: f64,
-    feasibility_additive_share: f64,
     start: Start,
     preference_noise: f64,
     ordinal_noise: f64,
@@ -52,7 +47,6 @@ settings! {
     coactive_noise: f64,
     tie_noise: f64,
     tie_width: f64,
-    learn_every: Option<usize>,
     avoidance: Option<f64>,
     samples_per_iteration: usize,
     repeats: bool,
@@ -105,7 +99,7 @@ mod tests {
     #[test]
     fn settings_round_trip_through_json() {
         let changed = LearnerSettings {
-            learn_every: Some(7),
+            avoidance: Some(-0.3),
             ordinal_thresholds: vec![-0.5, 0.3],
             repeats: true,
             ..LearnerSettings::of(Method::Eubo)
@@ -122,10 +116,9 @@ mod tests {
     #[test]
     fn complete_document_overrides_every_recommendation() {
         let stored = r#"{"method":"eubo","inference":"laplace","link":"logistic","signal_variance":1.0,"nugget":1e-5,
-            "lengthscale_factor":1.0,"additive_share":0.0,"pairwise_share":0.0,"broad_lengthscale":1.0,
-            "labels":"in_utility","feasibility_lengthscale_factor":1.0,"feasibility_additive_share":0.0,
+            "lengthscale_factor":1.0,"labels":"in_utility",
             "start":"random","preference_noise":0.02,"ordinal_noise":0.1,"ordinal_thresholds":[0.0],
-            "coactive_noise":0.02,"tie_noise":0.02,"tie_width":0.02,"learn_every":null,"avoidance":null,
+            "coactive_noise":0.02,"tie_noise":0.02,"tie_width":0.02,"avoidance":null,
             "samples_per_iteration":1,"repeats":false,"lines":0,"line_trials":18446744073709551615,
             "partner":"incumbent","buffer":1}"#;
         assert_eq!(read(stored), LearnerSettings { method: Method::Eubo, ..LearnerSettings::of(Method::LineCoSpar) });

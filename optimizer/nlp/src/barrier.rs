@@ -28,25 +28,6 @@ pub(crate) fn barrier_term(form: &Formulation, w: &[f64], mu: f64) -> f64 {
     mu * (form.constants.damping * damping - logs)
 }
 
-/// Fraction-to-the-boundary rule: the largest alpha in (0, 1] for which w + alpha d keeps (1 - tau) of every slack
-/// (WB06 eq. 15).
-pub(crate) fn fraction_to_boundary(slack_lower: &[f64], slack_upper: &[f64], d: &[f64], tau: f64) -> f64 {
-    let mut alpha = 1.0f64;
-    for j in 0..d.len() {
-        if d[j] < 0.0 && slack_lower[j].is_finite() {
-            alpha = alpha.min(-tau * slack_lower[j] / d[j]);
-        } else if d[j] > 0.0 && slack_upper[j].is_finite() {
-            alpha = alpha.min(tau * slack_upper[j] / d[j]);
-        }
-    }
-    alpha
-}
-
-/// The same rule for multipliers z >= 0.
-pub(crate) fn fraction_to_zero(z: &[f64], d: &[f64], tau: f64) -> f64 {
-    z.iter().zip(d).fold(1.0, |alpha, (z, d)| if *d < 0.0 && *z > 0.0 { alpha.min(-tau * z / d) } else { alpha })
-}
-
 /// Smallest barrier parameter that the tolerances require; multipliers are scaled with the objective.
 pub(crate) fn smallest_mu(settings: &NlpSettings, objective_scale: f64) -> f64 {
     let complementarity = settings.complementarity_tolerance * objective_scale;
@@ -56,11 +37,6 @@ pub(crate) fn smallest_mu(settings: &NlpSettings, objective_scale: f64) -> f64 {
 /// max(mu_min, min(kappa_mu mu, mu^theta_mu)) (WB06 eq. 7).
 pub(crate) fn reduced_mu(settings: &NlpSettings, mu: f64, smallest: f64) -> f64 {
     (settings.constants.kappa_mu * mu).min(mu.powf(settings.constants.theta_mu)).max(smallest)
-}
-
-/// tau = max(tau_min, 1 - mu) (WB06 eq. 8).
-pub(crate) fn boundary_fraction(settings: &NlpSettings, mu: f64) -> f64 {
-    settings.constants.tau_min.max(1.0 - mu)
 }
 
 /// LOQO rule (Nocedal & Wright eqs. 19.20, 19.21): mu = 0.1 min(0.05 (1 - xi) / xi, 2)^3 * average, xi = min /

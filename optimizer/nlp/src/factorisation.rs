@@ -12,6 +12,7 @@ mod delayed_pivots;
 mod dense_kernels;
 mod front;
 mod front_factor;
+mod kkt_matrix;
 mod kkt_solver;
 mod lazy_solver;
 mod linear_solver;
@@ -29,6 +30,7 @@ mod symbolic_analysis;
 mod thread_pool;
 
 pub(crate) use dense_kernels::{all_finite, largest_magnitude};
+pub(crate) use kkt_matrix::KktMatrix;
 pub(crate) use kkt_solver::{Inertia, KktSolver, MatrixChange};
 pub(crate) use linear_solver::choose;
 pub(crate) use ordering::check_blocks;

@@ -1,6 +1,7 @@
 //! Backtracking filter line search with second-order corrections (WB06 sections 2.3, 2.4).
 
 use crate::barrier;
+use crate::fraction_to_boundary;
 use crate::iterate::{Iterate, SolveSession, StepRecord};
 use crate::line_search_filter::{GAMMA_PHI, GAMMA_THETA, not_above};
 use crate::line_search_state::{MeritReference, Watchdog};
@@ -48,10 +49,10 @@ impl Iterate<'_> {
     /// Searches along the direction and moves to the accepted point; false when the step becomes too small.
     pub(crate) fn line_search(&mut self, session: &mut SolveSession) -> bool {
         let settings = session.settings;
-        let tau = barrier::boundary_fraction(settings, self.mu);
+        let tau = fraction_to_boundary::boundary_fraction(settings, self.mu);
         let mut reference = MeritReference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
         let mut alpha =
-            barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
+            fraction_to_boundary::of_slacks(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
         let mut corrects = true;
         if settings.constants.watchdog_trigger > 0 && self.search.shortened >= 2 * settings.constants.watchdog_trigger {
             self.search.shortened = 0;
@@ -183,7 +184,7 @@ impl Iterate<'_> {
             if solved.refined > settings.constants.residual_limit {
                 return None;
             }
-            step = barrier::fraction_to_boundary(
+            step = fraction_to_boundary::of_slacks(
                 &self.at.slack_lower,
                 &self.at.slack_upper,
                 &self.search.correction.w,
@@ -223,8 +224,8 @@ impl Iterate<'_> {
     /// Moves to the last trial point w + alpha dw and to y + alpha dy, z + alpha_z dz, and evaluates the derivatives
     /// there.
     fn accept(&mut self, session: &mut SolveSession, alpha: f64, tau: f64, trials: usize) {
-        let alpha_dual = barrier::fraction_to_zero(&self.point.zl, &self.direction.zl, tau)
-            .min(barrier::fraction_to_zero(&self.point.zu, &self.direction.zu, tau));
+        let alpha_dual = fraction_to_boundary::of_multipliers(&self.point.zl, &self.direction.zl, tau)
+            .min(fraction_to_boundary::of_multipliers(&self.point.zu, &self.direction.zu, tau));
         let add = |a: &mut [f64], d: &[f64], alpha: f64| {
             for (a, d) in a.iter_mut().zip(d) {
                 *a += alpha * d;

@@ -7,6 +7,7 @@
 
 use crate::barrier;
 use crate::formulation::{EvaluationTally, Formulation, Objective, RowForm, RowVariable};
+use crate::fraction_to_boundary;
 use crate::iterate::{Iterate, IterationEnd, SolveSession};
 use crate::primal_dual::{PrimalDual, largest};
 use crate::settings::{BoundMultiplierStart, NlpSettings};
@@ -152,12 +153,9 @@ pub(crate) fn finish(
             step.zu[j] = (run.mu + run.point.zu[j] * d) / slack_upper[j] - run.point.zu[j];
         }
     }
-    let tau = barrier::boundary_fraction(settings, run.mu);
-    let alpha = barrier::fraction_to_zero(&run.point.zl, &step.zl, tau).min(barrier::fraction_to_zero(
-        &run.point.zu,
-        &step.zu,
-        tau,
-    ));
+    let tau = fraction_to_boundary::boundary_fraction(settings, run.mu);
+    let alpha = fraction_to_boundary::of_multipliers(&run.point.zl, &step.zl, tau)
+        .min(fraction_to_boundary::of_multipliers(&run.point.zu, &step.zu, tau));
     let alpha = if settings.constants.steps_multipliers { alpha } else { 0.0 };
     for j in 0..length {
         run.point.zl[j] += alpha * step.zl[j];

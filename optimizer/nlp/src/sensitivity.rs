@@ -8,10 +8,9 @@
 //! become active or inactive: there it is between the two one-sided derivatives.
 
 use crate::barrier::smallest_mu;
-use crate::factorisation::{self, MatrixChange, check_blocks};
+use crate::factorisation::{self, KktMatrix, MatrixChange, check_blocks};
 use crate::formulation::{Formulation, RowForm};
 use crate::iterate::Iterate;
-use crate::kkt::KktMatrix;
 use crate::newton_system::NewtonSystem;
 use crate::nonlinear_program::NonlinearProgram;
 use crate::primal_dual::PrimalDual;

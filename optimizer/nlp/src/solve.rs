@@ -3,10 +3,9 @@
 use std::time::Instant;
 
 use crate::barrier;
-use crate::factorisation::{self, check_blocks};
+use crate::factorisation::{self, KktMatrix, check_blocks};
 use crate::formulation::{Formulation, RowForm, entries};
 use crate::iterate::{Iterate, IterationEnd, SolveSession, StepRecord};
-use crate::kkt::KktMatrix;
 use crate::newton_system::NewtonSystem;
 use crate::nonlinear_program::NonlinearProgram;
 use crate::primal_dual::PrimalDual;

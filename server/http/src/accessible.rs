@@ -9,7 +9,7 @@ use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
 use gaitwright_service::access::{Permission, Reach};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::job::JobId;
+use gaitwright_service::job::JobId;
 use gaitwright_store::{
     AssessmentId, BackupId, Connection, DeviceId, FeedbackId, LabSessionId, MeasurementFileId, MemberId,
     ReferenceGaitId, SessionId, StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, assessments,

@@ -13,8 +13,7 @@ const SPACE: &str = "Each bound has at most one dimension. The values of a dimen
                      their range. The smallest a4 exceeds the largest a3 by 0.001 or more.";
 const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise scales and `tie_width` are 1e-3 to 1e3 times the \
                        square root of `signal_variance`, and the threshold is at most 10 times that square root. \
-                       `additive_share` and `pairwise_share` add up to at most 1. `expectation_propagation` needs the link \
-                       `probit`.";
+                       `expectation_propagation` needs the link `probit`.";
 const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
 const EMG_FILE: &str = "A file in the format that `format` names, with the columns of the muscles, sampled at 100 Hz or more, with one whole \

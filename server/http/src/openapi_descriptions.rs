@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 /// Component, field with a slash between levels, and the description.
 type Described = (&'static str, &'static str, &'static str);
 
-const LEARNER: [Described; 27] = [
+const LEARNER: [Described; 21] = [
     (
         "LearnerSettings",
         "method",
@@ -28,29 +28,11 @@ const LEARNER: [Described; 27] = [
         "Variance added to the diagonal of the prior covariance, called *GP noise* in the literature.",
     ),
     ("LearnerSettings", "lengthscale_factor", "Factor on the lengthscale of every dimension."),
-    ("LearnerSettings", "additive_share", "Share of the prior variance in functions of one dimension."),
-    (
-        "LearnerSettings",
-        "pairwise_share",
-        "Share of the prior variance in functions of two dimensions. The rest of the variance is in the product kernel of the \
-         literature.",
-    ),
-    (
-        "LearnerSettings",
-        "broad_lengthscale",
-        "Lengthscale of the additive and pairwise parts, as a multiple of the range of each dimension.",
-    ),
     (
         "LearnerSettings",
         "labels",
         "What labels are evidence of: `in_utility`, the utility, as in the literature; `separate`, the feasibility of \
          actions, modelled by a second Gaussian process.",
-    ),
-    ("LearnerSettings", "feasibility_lengthscale_factor", "Factor on every lengthscale of feasibility."),
-    (
-        "LearnerSettings",
-        "feasibility_additive_share",
-        "Share of the prior variance of feasibility in functions of one dimension.",
     ),
     (
         "LearnerSettings",
@@ -67,11 +49,6 @@ const LEARNER: [Described; 27] = [
     ("LearnerSettings", "coactive_noise", "Noise scale of suggestions, in units of utility."),
     ("LearnerSettings", "tie_noise", "Noise scale of ties, in units of utility."),
     ("LearnerSettings", "tie_width", "Difference of utilities below which two gaits feel equal."),
-    (
-        "LearnerSettings",
-        "learn_every",
-        "Number of trials after which lengthscales and preference noise are learned again. Null keeps them as they are set.",
-    ),
     (
         "LearnerSettings",
         "avoidance",

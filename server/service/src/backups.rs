@@ -4,8 +4,8 @@
 //! are neither, and are not in progress, failed.
 
 use crate::error::Error;
+use crate::job::JobState;
 use crate::scheduled_backups::ScheduledBackups;
-use crate::studies::job::JobState;
 use gaitwright_store::audit::{self, Actor, AuditRow};
 use gaitwright_store::{BackupId, Connection, Instant, Store, Writer, backup, commit};
 use serde::Serialize;

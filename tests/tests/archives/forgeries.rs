@@ -60,7 +60,7 @@ pub(super) fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
-pub(super) const FORGERIES: [Forgery; 68] = [
+pub(super) const FORGERIES: [Forgery; 69] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its results differ from its solve report"),
     ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated gait_rmse_rad is 0.01"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "it must be a finite number of at least 0"),
@@ -209,6 +209,11 @@ pub(super) const FORGERIES: [Forgery; 68] = [
         "a learner that is none",
         |r| within(r.first("studies"), "learner", |l| l["ordinal_thresholds"] = json!([])),
         "study",
+    ),
+    (
+        "a learner setting that this version lacks",
+        |r| within(r.first("studies"), "learner", |l| l["additive_share"] = 0.3.into()),
+        "additive_share = 0.3, which this version does not have",
     ),
     ("too many at a time", |r| r.first("studies")["parallel_trials"] = 65.into(), "studies_parallel_trials"),
     (

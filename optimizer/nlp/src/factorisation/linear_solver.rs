@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::delayed_pivots::DelayedPivots;
 use super::front::{PivotKind, RoomForDeferred};
+use super::kkt_matrix::KktMatrix;
 use super::kkt_solver::{Inertia, KktSolver, MatrixChange};
 use super::lazy_solver::LazySolver;
 use super::multifrontal::Multifrontal;
@@ -11,7 +12,6 @@ use super::ordering;
 #[cfg(feature = "supernodal")]
 use super::supernodal::Supernodal;
 use crate::formulation::{Formulation, RowForm};
-use crate::kkt::KktMatrix;
 use crate::settings::{LinearSolver, NlpSettings};
 use crate::status::NlpError;
 

@@ -4,8 +4,8 @@
 //! a variable that it is structurally matched with, so that no supernode starts with an unmatched row, whose diagonal
 //! may be zero. Without blocks the factorisation uses approximate minimum degree.
 
+use super::kkt_matrix::couplings;
 use crate::formulation::{Formulation, RowForm};
-use crate::kkt::couplings;
 use crate::nonlinear_program::EliminationBlocks;
 use crate::status::NlpError;
 

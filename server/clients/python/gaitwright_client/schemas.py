@@ -1286,29 +1286,19 @@ class LabSessionView(_LabSessionViewRequired, total=False):
 class LearnerSettings(TypedDict, total=False):
     """Settings of the learner."""
 
-    # Share of the prior variance in functions of one dimension.
-    additive_share: float
     # Region of avoidance (ROIAL): an action is not proposed if its mean plus this many standard deviations is below the
     # threshold of labels, unless no other action is left. ROIAL uses -0.45. Null disables the region.
     avoidance: Optional[float]
-    # Lengthscale of the additive and pairwise parts, as a multiple of the range of each dimension.
-    broad_lengthscale: float
     # If `partner` is `previous`: number of actions before a batch with which each action of the batch is compared.
     buffer: int
     # Noise scale of suggestions, in units of utility.
     coactive_noise: float
-    # Share of the prior variance of feasibility in functions of one dimension.
-    feasibility_additive_share: float
-    # Factor on every lengthscale of feasibility.
-    feasibility_lengthscale_factor: float
     # Method of approximate inference: `laplace`, a normal distribution at the mode of the posterior;
     # `expectation_propagation`, which needs the link `probit`.
     inference: Literal["laplace", "expectation_propagation"]
     # What labels are evidence of: `in_utility`, the utility, as in the literature; `separate`, the feasibility of
     # actions, modelled by a second Gaussian process.
     labels: Literal["in_utility", "separate"]
-    # Number of trials after which lengthscales and preference noise are learned again. Null keeps them as they are set.
-    learn_every: Optional[int]
     # Factor on the lengthscale of every dimension.
     lengthscale_factor: float
     # Number of trials after which `eubo` searches the whole search space instead of lines.
@@ -1328,9 +1318,6 @@ class LearnerSettings(TypedDict, total=False):
     ordinal_noise: float
     # Threshold between the labels *not converged* and *converged*, in units of utility.
     ordinal_thresholds: list[float]
-    # Share of the prior variance in functions of two dimensions. The rest of the variance is in the product kernel of
-    # the literature.
-    pairwise_share: float
     # Earlier actions with which a new one is compared: `previous`, the other actions of its batch and the last `buffer`
     # actions before the batch; `incumbent`, the best one; `every`, all of them.
     partner: Literal["previous", "incumbent", "every"]

@@ -11,7 +11,7 @@ use axum::response::Response;
 use gaitwright_service::access::Administer;
 use gaitwright_service::backups::{self, Backup};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::job::JobId;
+use gaitwright_service::job::JobId;
 use gaitwright_service::studies::job_status;
 use gaitwright_store::BackupId;
 

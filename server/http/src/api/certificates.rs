@@ -13,8 +13,8 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
+use gaitwright_service::job::JobId;
 use gaitwright_service::studies::certification;
-use gaitwright_service::studies::job::JobId;
 use gaitwright_store::{TrialId, certificates};
 
 /// Get the certificate of a trial

@@ -12,7 +12,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Permission, Read, Run};
-use gaitwright_service::studies::job::{JobId, JobKind, JobState};
+use gaitwright_service::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
 use gaitwright_store::{BorrowedWriter, StudyId, TrialId};
 use serde::{Deserialize, Serialize};

@@ -5,11 +5,11 @@
 use super::command;
 use super::execution::{self, Simulation};
 use super::explanation::{self, ExplanationEffort, ExplanationState};
-use super::job::{JobId, JobState};
 use super::scheduler::Scheduler;
 use crate::access::{Caller, Reach, Right};
 use crate::backups::{self, Backups};
 use crate::error::Error;
+use crate::job::{JobId, JobState};
 use gaitwright_store::audit;
 use gaitwright_store::jobs::{self, OpenSolve};
 use gaitwright_store::trials::{Trial, TrialState};

@@ -24,7 +24,6 @@ mod explainer;
 pub mod explanation;
 pub mod gait_beliefs;
 pub mod history;
-pub mod job;
 pub mod job_status;
 mod jobs_after_solves;
 pub mod lab;

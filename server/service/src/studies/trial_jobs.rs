@@ -3,9 +3,9 @@
 //! Requested trials come first, then those of ended studies. Requests and cancellations are on record, so the jobs
 //! continue after a crash.
 
-use super::job::JobState;
 use super::trial_queue::{RequestOrder, RunningJob, TrialJobState, TrialQueue};
 use crate::error::Error;
+use crate::job::JobState;
 use gait_optimizer::CancelToken;
 use gaitwright_compute::priority::run_below_solves;
 use gaitwright_store::{Store, StoreResult, StudyId, TrialId, consents, trials};

@@ -1,6 +1,6 @@
 //! The queue of jobs of one kind: which jobs are requested, running, cancelled and failed.
 
-use super::job::JobState;
+use crate::job::JobState;
 use gaitwright_store::{StudyId, TrialId};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};

@@ -4,6 +4,7 @@
 mod file;
 mod flags;
 mod known_settings;
+mod setting_origin;
 mod values;
 
 pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
@@ -12,6 +13,7 @@ use super::output::data;
 use file::{parse, read};
 use gaitwright_service::error::Error;
 use known_settings::KNOWN;
+use setting_origin::SettingOrigin;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -22,29 +24,9 @@ const DEFAULT_FILE: &str = "gaitwright.toml";
 /// The environment variable that names another settings file.
 const FILE_VARIABLE: &str = "GAITWRIGHT_CONFIG";
 
-/// The origin of a value.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum ValueOrigin {
-    Flag,
-    Environment(String),
-    File(PathBuf),
-    Default,
-}
-
-impl std::fmt::Display for ValueOrigin {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Flag => write!(f, "flag"),
-            Self::Environment(name) => write!(f, "environment {name}"),
-            Self::File(path) => write!(f, "file {}", path.display()),
-            Self::Default => write!(f, "default"),
-        }
-    }
-}
-
 /// Every setting, as text, with its origin.
 #[derive(Debug)]
-pub(super) struct Settings(BTreeMap<&'static str, (String, ValueOrigin)>);
+pub(super) struct Settings(BTreeMap<&'static str, (String, SettingOrigin)>);
 
 impl Settings {
     /// Reads flags, environment and file.
@@ -66,13 +48,13 @@ impl Settings {
         for &(name, default, _) in KNOWN {
             let variable = format!("GAITWRIGHT_{}", name.to_uppercase());
             let value = if let Some(value) = flags.get(name) {
-                (value, ValueOrigin::Flag)
+                (value, SettingOrigin::Flag)
             } else if let Some(value) = environment(&variable) {
-                (value, ValueOrigin::Environment(variable))
+                (value, SettingOrigin::Environment(variable))
             } else if let Some(value) = file.get(name) {
-                (value.clone(), ValueOrigin::File(path.clone()))
+                (value.clone(), SettingOrigin::File(path.clone()))
             } else {
-                (default.to_owned(), ValueOrigin::Default)
+                (default.to_owned(), SettingOrigin::Default)
             };
             found.insert(name, value);
         }
@@ -89,7 +71,7 @@ impl Settings {
 
     /// The error for a setting, with its origin.
     pub(super) fn refused(&self, name: &str, allowed: &str) -> Error {
-        let origin = self.0.get(name).map_or(&ValueOrigin::Default, |(_, origin)| origin);
+        let origin = self.0.get(name).map_or(&SettingOrigin::Default, |(_, origin)| origin);
         Error::invalid(&format!("{name} ({origin})"), self.text(name), allowed)
     }
 
@@ -143,13 +125,13 @@ mod tests {
         let flags = Flags { record: record.into(), workers: Some(5), ..Flags::default() };
         let found = settings(&flags, &[("GAITWRIGHT_WORKERS", "4"), ("GAITWRIGHT_DATABASE", "env.db")]).unwrap();
         assert_eq!(found.workers().unwrap(), Some(5));
-        assert_eq!(found.0["workers"].1, ValueOrigin::Flag);
+        assert_eq!(found.0["workers"].1, SettingOrigin::Flag);
         assert_eq!(
             found.0["database"],
-            ("env.db".to_owned(), ValueOrigin::Environment("GAITWRIGHT_DATABASE".to_owned()))
+            ("env.db".to_owned(), SettingOrigin::Environment("GAITWRIGHT_DATABASE".to_owned()))
         );
-        assert_eq!(found.0["idle_minutes"], ("15".to_owned(), ValueOrigin::File(file)));
-        assert_eq!(found.0["listen"].1, ValueOrigin::Default);
+        assert_eq!(found.0["idle_minutes"], ("15".to_owned(), SettingOrigin::File(file)));
+        assert_eq!(found.0["listen"].1, SettingOrigin::Default);
         assert_eq!(
             found.session_limits().unwrap(),
             SessionLimits { idle_seconds: 900.0, lifetime_seconds: 12.0 * 3600.0 }

@@ -8,7 +8,7 @@
 //! d: barrier terms, proximal curvature and delta_w of x; e: the eliminated row variables and delta_c of a row,
 //! e_i = sum_k a_k^2 / d_k + delta_c.
 
-use crate::factorisation::all_finite;
+use super::dense_kernels::all_finite;
 use crate::formulation::{Formulation, RowForm, entries};
 
 /// Pattern and values, with the position of each part.
