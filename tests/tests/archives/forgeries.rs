@@ -213,7 +213,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     (
         "a learner setting that this version lacks",
         |r| within(r.first("studies"), "learner", |l| l["additive_share"] = 0.3.into()),
-        "additive_share = 0.3, which this version does not have",
+        "unknown field `additive_share`",
     ),
     ("too many at a time", |r| r.first("studies")["parallel_trials"] = 65.into(), "studies_parallel_trials"),
     (

@@ -23,6 +23,11 @@ BackupId = str
 # Bytes that are not text, such as a picture or an archive.
 Binary = bytes
 
+BlindPairId = str
+
+# Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement.
+BlindPairKind = Literal["new", "repeat"]
+
 # State of the certificate of a gait: `passed`, every check is within its limit, the walker does not fall and the gait
 # is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified; `not_certified`,
 # the gait has no certificate.
@@ -101,12 +106,6 @@ PairAnswer = Literal["a", "b", "no_difference"]
 
 # Who gives the answer.
 PersonSource = Literal["subject", "clinician", "script"]
-
-PresentationId = str
-
-# Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement; `null`, the
-# same gait twice, in older records only.
-PresentationKind = Literal["new", "repeat", "null"]
 
 # A reference gait: joint angles over the gait cycle, the measured person, and the processing.
 ReferenceGaitDocument = dict[str, Any]
@@ -275,7 +274,7 @@ class _AttemptResultRequired(TypedDict):
     # How the solve ended.
     status: SolveStatus
     # Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
-    taken: bool
+    used: bool
     # Name of the worker.
     worker: str
 
@@ -2000,38 +1999,6 @@ class PhasePortrait(TypedDict):
     velocity_rad_s: list[float]
 
 
-class _PresentationRequired(TypedDict):
-    # Whether the rater could have known the allocation.
-    could_have_known: bool
-    # Time at which the pair was drawn.
-    created_at: Instant
-    # Identifier.
-    id: PresentationId
-    # Why it was shown.
-    kind: PresentationKind
-    # Number of the pair for this rater in this study, from 1.
-    number: int
-    # Name of the rater.
-    rater: str
-    # Trial shown first.
-    shown_first: TrialId
-    # Trial shown second.
-    shown_second: TrialId
-    # Identifier of the study.
-    study_id: StudyId
-
-
-class Presentation(_PresentationRequired, total=False):
-    """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
-
-    # Answer in terms of what was shown. Absent if there is none yet.
-    answer: Optional[Judgement]
-    # Time of the answer.
-    answered_at: Optional[Instant]
-    # Earlier presentation that it repeats.
-    repeats: Optional[PresentationId]
-
-
 class _ProblemRequired(TypedDict):
     # What went wrong in this request.
     detail: str
@@ -2110,13 +2077,13 @@ class _RaterReliabilityRequired(TypedDict):
     answered: int
     # Number of "cannot tell" answers.
     cannot_tell: int
-    # Number of presentations in which the rater could have known the allocation. The shares exclude them.
+    # Number of blind pairs in which the rater could have known the allocation. The shares exclude them.
     could_have_known: int
     # Name of the rater.
     rater: str
     # Share of repeated pairs with the same answer as before, among blind answers.
     repeats_agree: Proportion
-    # Number of presentations.
+    # Number of blind pairs.
     shown: int
     # Number of answers that reported a gait as unsafe.
     unsafe_gaits: int
@@ -2540,6 +2507,8 @@ class StridesOnYield(TypedDict):
 class _StudyPlanRequired(TypedDict):
     # Values of bounds that are not tuned.
     base_bounds: Bounds
+    # Height and mass used by solves, independent of later corrections.
+    body: Body
     # Identifier of the device.
     device_id: DeviceId
     # What evaluates trials.
@@ -2579,9 +2548,6 @@ class _StudyPlanRequired(TypedDict):
 class StudyPlan(_StudyPlanRequired, total=False):
     """Set-up of a study."""
 
-    # Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
-    # entered first.
-    body: Optional[Body]
     # Total solve time, s, after which no new trial starts.
     solve_seconds_budget: Optional[float]
     # The study finishes when the best action has not changed over this many results.
@@ -2758,8 +2724,6 @@ class _TrialRequired(TypedDict):
 class Trial(_TrialRequired, total=False):
     """Trial of a study."""
 
-    # Script that evaluates the trial. Absent if the service does.
-    asked_by: Optional[str]
     # Best trial when this one was proposed.
     best_before: Optional[TrialId]
     # Cost of transport of a converged gait, dimensionless.
@@ -2776,6 +2740,8 @@ class Trial(_TrialRequired, total=False):
     objective: Optional[float]
     # All numerical results of the solve.
     report: Optional[SolveReport]
+    # Script that evaluates the trial. Absent if the service does.
+    script: Optional[str]
     # Wall time of the solve, s.
     seconds_total: Optional[float]
     # Time at which a worker first started it.
@@ -2870,11 +2836,43 @@ class UnblindSession(TypedDict):
     reason: str
 
 
+class _UnblindedPairRequired(TypedDict):
+    # Whether the rater could have known the allocation.
+    could_have_known: bool
+    # Time at which the pair was drawn.
+    created_at: Instant
+    # Identifier.
+    id: BlindPairId
+    # Why it was shown.
+    kind: BlindPairKind
+    # Number of the pair for this rater in this study, from 1.
+    number: int
+    # Name of the rater.
+    rater: str
+    # Trial shown first.
+    shown_first: TrialId
+    # Trial shown second.
+    shown_second: TrialId
+    # Identifier of the study.
+    study_id: StudyId
+
+
+class UnblindedPair(_UnblindedPairRequired, total=False):
+    """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
+
+    # Answer in terms of what was shown. Absent if there is none yet.
+    answer: Optional[Judgement]
+    # Time of the answer.
+    answered_at: Optional[Instant]
+    # Earlier pair that it repeats.
+    repeats: Optional[BlindPairId]
+
+
 class UnblindedRater(TypedDict):
     """Pairs of an unblinded rater."""
 
     # All pairs of the rater, in order.
-    pairs: list[Presentation]
+    pairs: list[UnblindedPair]
 
 
 class _UnchangedBoundRequired(TypedDict):
