@@ -84,7 +84,7 @@ pub enum LearnerError {
         levels: usize,
     },
     /// The value is not a level of its dimension.
-    #[error("dimension `{dimension}`: {value} is not a level; the levels are {levels:?}")]
+    #[error("dimension `{dimension}`: {value} is not one of the values {levels:?}")]
     UnknownValue {
         /// Name of the dimension.
         dimension: String,

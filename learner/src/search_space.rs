@@ -43,21 +43,21 @@ impl Dimension {
     fn validate(&self) -> Result<()> {
         let refuse = |reason: String| Err(LearnerError::InvalidDimension { dimension: self.name.clone(), reason });
         if self.values.is_empty() {
-            return refuse("at least one level is needed".into());
+            return refuse("at least one value is needed".into());
         }
         if self.values.len() > MAX_LEVELS {
-            return refuse(format!("it has {} levels; at most {MAX_LEVELS} are allowed", self.values.len()));
+            return refuse(format!("it has {} values; at most {MAX_LEVELS} are allowed", self.values.len()));
         }
         if let Some(value) = self.values.iter().find(|v| v.is_nan() || v.abs() > MAX_LEVEL) {
-            return refuse(format!("a level is {value}; it must be {:e} to {MAX_LEVEL:e}", -MAX_LEVEL));
+            return refuse(format!("a value is {value}; it must be {:e} to {MAX_LEVEL:e}", -MAX_LEVEL));
         }
         if let Some([low, high]) = self.values.array_windows().find(|[low, high]| low >= high) {
-            return refuse(format!("levels must increase, but {high} follows {low}"));
+            return refuse(format!("values must increase, but {high} follows {low}"));
         }
         let steps = self.values.array_windows().map(|[low, high]| high - low);
         let nearest = steps.reduce(f64::min).unwrap_or(1.0);
         if nearest < MIN_STEP {
-            return refuse(format!("two levels are {nearest:e} apart; the smallest distance allowed is {MIN_STEP:e}"));
+            return refuse(format!("two values are {nearest:e} apart; the smallest distance allowed is {MIN_STEP:e}"));
         }
         let (shortest, longest) = match self.values.len() {
             1 => (MIN_STEP, MAX_LEVEL),

@@ -267,7 +267,10 @@ impl LearnerSettings {
             return refuse("avoidance", outside(avoidance, -1e3, 1e3));
         }
         if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
-            return refuse("link", "must be probit for expectation propagation".into());
+            return refuse(
+                "link",
+                r#"is "logistic"; it must be "probit", because inference is "expectation_propagation""#.into(),
+            );
         }
         let farthest = 10.0 * deviation;
         if let Some(&threshold) = self.ordinal_thresholds.iter().find(|t| t.is_nan() || t.abs() > farthest) {

@@ -17,7 +17,7 @@ pub struct Device {
     pub knee_housing_mass_kg: f64,
     /// Moment of inertia of that mass about its own centre, kg m².
     pub knee_housing_inertia_kg_m2: f64,
-    /// Mass of the adapter, midway between human and prosthetic knee, kg.
+    /// Mass of the adapter, which is midway between the human knee and the prosthetic knee, kg.
     pub adapter_mass_kg: f64,
     /// Radius of gyration of the adapter, m.
     pub adapter_gyration_radius_m: f64,
@@ -66,7 +66,7 @@ pub struct Device {
 pub struct DeviceField {
     /// Name with unit, as in the file: `shank_mass_kg`.
     pub name: &'static str,
-    /// Description.
+    /// Description with unit.
     pub meaning: &'static str,
     /// Smallest allowed value.
     pub minimum: f64,
@@ -91,23 +91,26 @@ const AMPRO3_JSON: &str = include_str!("../data/ampro3.json");
 impl Device {
     /// The numeric fields of a device, in the order of the file.
     pub const FIELDS: [DeviceField; 20] = [
-        field("knee_housing_mass_kg", "mass at the prosthetic knee that moves with the thigh", (0.0, 10.0), |d| {
+        field("knee_housing_mass_kg", "mass at the prosthetic knee that moves with the thigh, kg", (0.0, 10.0), |d| {
             d.knee_housing_mass_kg
         }),
         field(
             "knee_housing_inertia_kg_m2",
-            "moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh",
+            "moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh, kg m²",
             (0.0, 0.5),
             |d| d.knee_housing_inertia_kg_m2,
         ),
-        field("adapter_mass_kg", "mass of the adapter, midway between human and prosthetic knee", (0.0, 10.0), |d| {
-            d.adapter_mass_kg
-        }),
-        field("adapter_gyration_radius_m", "radius of gyration of the adapter", (0.0, 0.5), |d| {
+        field(
+            "adapter_mass_kg",
+            "mass of the adapter, which is midway between the human knee and the prosthetic knee, kg",
+            (0.0, 10.0),
+            |d| d.adapter_mass_kg,
+        ),
+        field("adapter_gyration_radius_m", "radius of gyration of the adapter, m", (0.0, 0.5), |d| {
             d.adapter_gyration_radius_m
         }),
-        field("shank_mass_kg", "mass of the prosthetic shank", (0.2, 15.0), |d| d.shank_mass_kg),
-        field("shank_length_m", "distance from knee to ankle", (0.2, 0.6), |d| d.shank_length_m),
+        field("shank_mass_kg", "mass of the prosthetic shank, kg", (0.2, 15.0), |d| d.shank_mass_kg),
+        field("shank_length_m", "distance from knee to ankle, m", (0.2, 0.6), |d| d.shank_length_m),
         field(
             "shank_com_fraction",
             "distance of the shank's centre of mass below the knee, in shank lengths",
@@ -120,24 +123,29 @@ impl Device {
             (0.05, 0.6),
             |d| d.shank_gyration_fraction,
         ),
-        field("foot_mass_kg", "mass of the prosthetic foot with shoe", (0.1, 5.0), |d| d.foot_mass_kg),
-        field("foot_com_forward_m", "distance of the foot's centre of mass ahead of the ankle", (-0.1, 0.2), |d| {
+        field("foot_mass_kg", "mass of the prosthetic foot with shoe, kg", (0.1, 5.0), |d| d.foot_mass_kg),
+        field("foot_com_forward_m", "distance of the foot's centre of mass ahead of the ankle, m", (-0.1, 0.2), |d| {
             d.foot_com_forward_m
         }),
-        field("foot_com_down_m", "distance of the foot's centre of mass below the ankle", (0.0, 0.15), |d| {
+        field("foot_com_down_m", "distance of the foot's centre of mass below the ankle, m", (0.0, 0.15), |d| {
             d.foot_com_down_m
         }),
-        field("foot_inertia_kg_m2", "moment of inertia of the foot about its centre of mass", (1e-4, 0.2), |d| {
-            d.foot_inertia_kg_m2
+        field(
+            "foot_inertia_kg_m2",
+            "moment of inertia of the foot about its centre of mass, kg m²",
+            (1e-4, 0.2),
+            |d| d.foot_inertia_kg_m2,
+        ),
+        field("ankle_height_m", "height of the ankle above the sole, m", (0.01, 0.2), |d| d.ankle_height_m),
+        field("heel_behind_m", "distance of the heel contact behind the ankle, m", (0.01, 0.15), |d| d.heel_behind_m),
+        field("toe_ahead_m", "distance of the toe contact ahead of the ankle, m", (0.05, 0.3), |d| d.toe_ahead_m),
+        field("knee_torque_limit_n_m", "largest knee torque, N m", (1.0, 500.0), |d| d.knee_torque_limit_n_m),
+        field("ankle_torque_limit_n_m", "largest ankle torque, N m", (1.0, 500.0), |d| d.ankle_torque_limit_n_m),
+        field("joint_speed_limit_rad_s", "largest knee and ankle speed, rad/s", (0.5, 50.0), |d| {
+            d.joint_speed_limit_rad_s
         }),
-        field("ankle_height_m", "height of the ankle above the sole", (0.01, 0.2), |d| d.ankle_height_m),
-        field("heel_behind_m", "distance of the heel contact behind the ankle", (0.01, 0.15), |d| d.heel_behind_m),
-        field("toe_ahead_m", "distance of the toe contact ahead of the ankle", (0.05, 0.3), |d| d.toe_ahead_m),
-        field("knee_torque_limit_n_m", "largest knee torque", (1.0, 500.0), |d| d.knee_torque_limit_n_m),
-        field("ankle_torque_limit_n_m", "largest ankle torque", (1.0, 500.0), |d| d.ankle_torque_limit_n_m),
-        field("joint_speed_limit_rad_s", "largest knee and ankle speed", (0.5, 50.0), |d| d.joint_speed_limit_rad_s),
-        field("ankle_min_rad", "plantarflexion stop (dorsiflexion positive)", (-1.2, -0.02), |d| d.ankle_min_rad),
-        field("ankle_max_rad", "dorsiflexion stop", (0.02, 1.2), |d| d.ankle_max_rad),
+        field("ankle_min_rad", "plantarflexion stop, rad (dorsiflexion positive)", (-1.2, -0.02), |d| d.ankle_min_rad),
+        field("ankle_max_rad", "dorsiflexion stop, rad", (0.02, 1.2), |d| d.ankle_max_rad),
     ];
 
     /// The AMPRO3 powered knee-ankle prosthesis. `data/ampro3.json` has the values and their sources.

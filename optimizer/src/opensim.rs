@@ -104,7 +104,7 @@ fn unit_said(what: &str, header: &[&str]) -> Result<Option<AngleUnit>, ModelErro
         match said {
             Some((before, other)) if other != unit => {
                 let (unit, other) = (unit.in_words(), other.in_words());
-                let reason = format!("this line gives angles in {unit}, but line {before} in {other}");
+                let reason = format!("this line gives angles in {unit}, but line {before} gives them in {other}");
                 return Err(malformed(what, line, None, reason));
             }
             _ => said = Some((line, unit)),

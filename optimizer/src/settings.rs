@@ -172,9 +172,7 @@ impl GaitLimits {
             ("friction", self.friction, 0.1, 2.0),
             ("impact_friction", self.impact_friction, 0.1, 2.0),
             ("speed_min_m_s", self.speed_min_m_s, 0.1, 2.5),
-            ("speed_max_m_s", self.speed_max_m_s, self.speed_min_m_s + 1e-3, 3.0),
             ("step_min_m", self.step_min_m, 0.1, 1.2),
-            ("step_max_m", self.step_max_m, self.step_min_m + 1e-3, 1.5),
             ("knee_min_rad", self.knee_min_rad, 0.0, 0.3),
             ("knee_max_rad", self.knee_max_rad, 0.5, 2.4),
             ("hip_max_rad", self.hip_max_rad, 0.2, 2.0),
@@ -196,6 +194,13 @@ impl GaitLimits {
         for (field, value, minimum, maximum) in checks {
             ModelError::check_range(&format!("limits.{field}"), value, minimum, maximum)?;
         }
+        for (field, value, lower, range) in [
+            ("speed_max_m_s", self.speed_max_m_s, "speed_min_m_s", (self.speed_min_m_s + 1e-3, 3.0)),
+            ("step_max_m", self.step_max_m, "step_min_m", (self.step_min_m + 1e-3, 1.5)),
+        ] {
+            let relation = format!("above {lower}");
+            ModelError::check_related_range(&format!("limits.{field}"), value, range, ("", &relation))?;
+        }
         let (low, high) = (self.duration_min_s, self.duration_max_s);
         for (name, minimum, maximum) in [
             ("ds2", low.ds2, high.ds2),
@@ -204,7 +209,8 @@ impl GaitLimits {
             ("ss1", low.ss1, high.ss1),
         ] {
             ModelError::check_range(&format!("limits.duration_min_s.{name}"), minimum, 0.005, 1.0)?;
-            ModelError::check_range(&format!("limits.duration_max_s.{name}"), maximum, minimum + 1e-3, 2.0)?;
+            let (field, relation) = (format!("limits.duration_max_s.{name}"), format!("above duration_min_s.{name}"));
+            ModelError::check_related_range(&field, maximum, (minimum + 1e-3, 2.0), ("", &relation))?;
         }
         Ok(())
     }

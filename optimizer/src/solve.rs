@@ -152,7 +152,9 @@ fn finish(
             Ok(SolveOutcome { other_local_optima: others, ..outcome })
         }
         None => {
-            Err(ModelError::OutOfRange { field: "guesses".to_owned(), value: 0.0, minimum: 1.0, maximum: 1e3 }.into())
+            let field = "number of guesses".to_owned();
+            let (minimum, maximum, unit, relation) = (1.0, 1e3, "", String::new());
+            Err(ModelError::OutOfRange { field, value: 0.0, minimum, maximum, unit, relation }.into())
         }
     }
 }

@@ -41,7 +41,7 @@ impl Subject {
             other => Err(ModelError::Unknown {
                 field: "subject".to_owned(),
                 value: other.to_string(),
-                known: "1 or 2, a subject of the paper. For any other subject, give height and mass".to_owned(),
+                known: "1 or 2, the subjects of the paper. For any other subject, give height and mass".to_owned(),
             }),
         }
     }

@@ -81,6 +81,12 @@ tuned_bounds! {
 }
 
 impl TunedBounds {
+    /// Unit of the bound with this name; empty for any other name.
+    pub fn unit_of(name: &str) -> &'static str {
+        let place = Self::NAMES.iter().position(|known| *known == name);
+        place.and_then(|place| Self::MEANINGS[place].rsplit_once(", ")).map_or("", |(_, unit)| unit)
+    }
+
     /// Sets one bound by name. [`Self::validate`] checks the bounds against each other.
     ///
     /// # Errors
@@ -93,7 +99,7 @@ impl TunedBounds {
                 known: format!("one of {}", Self::NAMES.join(", ")),
             });
         };
-        ModelError::check_range(name, value, Self::RANGES[index].0, Self::RANGES[index].1)?;
+        ModelError::check_related_range(name, value, Self::RANGES[index], (Self::unit_of(name), ""))?;
         *self.slots()[index] = value;
         Ok(())
     }
@@ -132,11 +138,12 @@ impl TunedBounds {
     /// # Errors
     /// [`ModelError::OutOfRange`] with the bound.
     pub fn validate(&self) -> Result<(), ModelError> {
-        for ((name, value), (minimum, maximum)) in Self::NAMES.iter().zip(self.to_array()).zip(Self::RANGES) {
-            ModelError::check_range(name, value, minimum, maximum)?;
+        for ((name, value), range) in Self::NAMES.iter().zip(self.to_array()).zip(Self::RANGES) {
+            ModelError::check_related_range(name, value, range, (Self::unit_of(name), ""))?;
         }
         // The interior-point method needs an interval of hip velocities with an interior.
-        ModelError::check_range("a3", self.a3, Self::RANGES[2].0, self.a4 - 1e-3)?;
+        let below_a4 = (Self::RANGES[2].0, self.a4 - 1e-3);
+        ModelError::check_related_range("a3", self.a3, below_a4, (Self::unit_of("a3"), "below a4"))?;
         Ok(())
     }
 }

@@ -88,7 +88,7 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
         (
             "two units",
             change("inDegrees=yes\n", "inDegrees=yes\ninDegrees = no\n"),
-            "walk.mot, line 6: this line gives angles in radians, but line 5 in degrees",
+            "walk.mot, line 6: this line gives angles in radians, but line 5 gives them in degrees",
         ),
         (
             "wrong unit",

@@ -171,7 +171,7 @@ fn strides_with_gaps_are_dropped() {
     }
     let only_that = HeelStrikes::Given(vec![2.2, 3.3]);
     let refused = read(&text).unwrap().reference("x", &only_that, MeasuredPerson::default()).unwrap_err().to_string();
-    assert!(refused.contains("no stride without gaps above 0.1 s lasts 0.8 to 1.6 s"), "{refused}");
+    assert!(refused.contains("no stride of 0.8 to 1.6 s is free of gaps longer than 0.1 s"), "{refused}");
 }
 
 type Change = fn(&mut ReferenceGait);

@@ -110,7 +110,7 @@ pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(St
         "/".to_owned(),
         format!("/studies/{study}"),
         format!("/studies/{study}/live"),
-        format!("/studies/{study}?sort=a5&order=ascending&state=converged&contains=drawn&page=3"),
+        format!("/studies/{study}?sort=a5&order=ascending&state=converged&text=drawn&page=3"),
         format!("/studies/{study}/belief"),
         "/system".to_owned(),
         format!("/studies/{study}/compare"),

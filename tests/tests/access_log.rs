@@ -215,9 +215,9 @@ async fn log_rows_name_caller_object_and_subject() {
     assert!(rows.iter().all(|row| row.route != "/health"));
 
     // Administrators search it, by page and by program.
-    let found = fetch(&admin, &format!("/api/v1/access-log?subject_id={subject}&contains=EXPORT")).await.items();
+    let found = fetch(&admin, &format!("/api/v1/access-log?subject_id={subject}&text=EXPORT")).await.items();
     assert_eq!(found.as_array().unwrap().len(), 2, "{found}");
-    let page = fetch(&admin, &format!("/access-log?subject={subject}&contains=trials.csv")).await;
+    let page = fetch(&admin, &format!("/access-log?subject={subject}&text=trials.csv")).await;
     assert!(page.status == StatusCode::OK && page.text.contains("trials.csv") && page.text.contains("paper-1"));
     assert_eq!(fetch(&clinician, "/api/v1/access-log").await.status, StatusCode::FORBIDDEN);
     service.stop().await;
@@ -395,7 +395,7 @@ async fn corrected_height_and_mass_apply_to_new_studies_only() {
     let page = fetch(format!("/subjects/{subject}")).await.text;
     assert!(page.contains("misread the scale") && page.contains("1.76 m"), "{page}");
     let trail = fetch("/api/v1/audit?limit=1".to_owned()).await;
-    let audit = fetch("/audit?contains=subject.correct".to_owned()).await.text;
+    let audit = fetch("/audit?text=subject.correct".to_owned()).await.text;
     assert!(audit.contains("misread the scale") && trail.headers[header::CONTENT_TYPE] == "application/json");
     service.stop().await;
 }

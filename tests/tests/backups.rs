@@ -49,14 +49,20 @@ async fn damaged_record_is_not_backed_up_and_a_damaged_backup_is_not_restored() 
         forge(&damaged, sql).await;
         let refused = run(&["backup", "--database", "damaged.db", "copy.db"]);
         let text = String::from_utf8_lossy(&refused.stderr);
-        assert!(!refused.status.success() && text.contains("does not verify") && text.contains(what), "{sql}: {text}");
+        assert!(
+            !refused.status.success() && text.contains("failed verification") && text.contains(what),
+            "{sql}: {text}"
+        );
         let files = cli::files(folder.path());
         assert!(!files.iter().any(|name| name.contains("copy")), "{sql}: {files:?}");
 
         let record = std::fs::read(&database).unwrap();
         let refused = run(&["restore", "--database", name, "damaged.db"]);
         let text = String::from_utf8_lossy(&refused.stderr);
-        assert!(!refused.status.success() && text.contains("does not verify") && text.contains(what), "{sql}: {text}");
+        assert!(
+            !refused.status.success() && text.contains("failed verification") && text.contains(what),
+            "{sql}: {text}"
+        );
         assert_eq!(std::fs::read(&database).unwrap(), record, "{sql}");
     }
     assert!(run(&["restore", "--database", name, "good.db"]).status.success());

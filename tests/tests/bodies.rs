@@ -38,7 +38,7 @@ async fn device_is_copied_from_another_and_errors_appear_at_their_field() {
         ("shank_mass_kg", "99", "is \u{201c}99\u{201d}; it must be 0.2 to 15."),
         ("shank_length_m", "long", "it must be 0.2 to 0.6"),
         ("name", "", "1 to 80 printable characters"),
-        ("colour", "red", "a field of this form"),
+        ("colour", "red", "The form has no field colour."),
     ] {
         let changes = [("name", "light"), (field, value)];
         let refused = service.post_text(&path, FORM, &form(&changes)).await;
@@ -79,7 +79,7 @@ async fn new_studies_use_the_recorded_muscles_of_their_subject() {
         ("sol_max_force_n=1", "\u{201c}soleus: maximum isometric force, N\u{201d} is 1; it must be 50 to 20000."),
         ("sol_max_force_n=much", "a number, or empty"),
         ("sol_knee_lever_m=0.05", "sol does not span the knee"),
-        ("sol_colour=1", "a field of this form"),
+        ("sol_colour=1", "The form has no field sol_colour."),
     ] {
         let refused = service.post_text(&page, FORM, typed).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{typed}");

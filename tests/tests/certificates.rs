@@ -93,7 +93,7 @@ fn commands_solve_certify_and_convert_a_gait() {
     let animation = done(folder, &["convert", "gait.json", "--to", "animation"]);
     assert!(animation.starts_with("<svg") && animation.contains("repeatCount=\"indefinite\""), "{animation}");
     assert!(!animation.contains("NaN") && !animation.contains("var(--"), "{animation}");
-    refused(folder, &["convert", "gait.json", "--to", "mot", "--rate-hz", "0", "--out", "x.mot"], "rate_hz is 0;");
+    refused(folder, &["convert", "gait.json", "--to", "mot", "--rate-hz", "0", "--out", "x.mot"], "--rate-hz is 0;");
     let mut broken = outcome["gait"].clone();
     broken["domains"].as_array_mut().unwrap().pop();
     std::fs::write(folder.join("broken.json"), broken.to_string()).unwrap();

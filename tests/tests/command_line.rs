@@ -27,16 +27,16 @@ fn refused(arguments: &[&str], expected: &str) {
 #[test]
 fn impossible_height_is_refused_with_the_allowed_range() {
     for command in ["tune", "solve"] {
-        refused(&[command, "--height-m", "17.27", "--mass-kg", "65.7"], "height_m is 17.27; it must be 1.4 to 2.2.");
+        refused(&[command, "--height-m", "17.27", "--mass-kg", "65.7"], "--height-m is 17.27; it must be 1.4 to 2.2.");
         refused(&[command, "--height-m", "1.727", "--mass-kg", "6570"], "body_mass_kg is 6570;");
-        refused(&[command, "--height-m", "NaN", "--mass-kg", "65"], "height_m is NaN;");
+        refused(&[command, "--height-m", "NaN", "--mass-kg", "65"], "--height-m is NaN;");
         refused(&[command, "--height-m", "1.727"], "--mass-kg");
     }
 }
 
 #[test]
 fn unknown_subject_is_refused_with_the_known_ones() {
-    refused(&["tune", "--subject", "3"], "subject is \"3\"; it must be 1 or 2");
+    refused(&["tune", "--subject", "3"], "--subject is \"3\"; it must be 1 or 2, the subjects of the paper.");
     refused(&["solve", "--subject", "0"], "it must be 1 or 2");
     refused(&["tune", "--subject", "1", "--height-m", "1.7", "--mass-kg", "70"], "cannot be used with");
 }
@@ -48,15 +48,15 @@ fn malformed_bounds_are_refused_by_name() {
     refused(&["solve", "--bounds", "a1=20,"], "expected NAME=VALUE");
     refused(&["solve", "--bounds", "a5=high"], "the value is not a number");
     refused(&["solve", "--bounds", "a5=0.1,a5=0.2"], "given twice");
-    refused(&["solve", "--bounds", "a1=1000"], "a1 is 1000; it must be 1 to 100.");
-    refused(&["solve", "--bounds", "a3=1.4,a4=1.2"], "a3 is 1.4;");
+    refused(&["solve", "--bounds", "a1=1000"], "a1 is 1000; it must be 1 to 100 rad/s.");
+    refused(&["solve", "--bounds", "a3=1.4,a4=1.2"], "a3 is 1.4; it must be 0.05 to 1.199 m/s, below a4.");
 }
 
 #[test]
 fn other_invalid_arguments_are_refused() {
     for command in ["tune", "solve"] {
         refused(&[command, "--subject", "-1"], "must be 1 or 2");
-        refused(&[command, "--height-m", "-1.7", "--mass-kg", "65"], "height_m is -1.7; it must be 1.4 to 2.2.");
+        refused(&[command, "--height-m", "-1.7", "--mass-kg", "65"], "--height-m is -1.7; it must be 1.4 to 2.2.");
     }
     for number in ["0", "-1", "10001", "many"] {
         refused(&["tune", "--trials", number], "'--trials <NUMBER>': must be a whole number from 1 to 10000");
@@ -73,7 +73,7 @@ fn other_invalid_arguments_are_refused() {
     refused(&["tune", "--muscles", "maybe"], "possible values: on, off");
     refused(&["solve", "--mesh", "4,4"], "four whole numbers");
     refused(&["solve", "--mesh", "0,4,6,6"], "mesh.ds2 is 0;");
-    refused(&["solve", "--tolerance", "5"], "tolerance is 5;");
+    refused(&["solve", "--tolerance", "5"], "--tolerance is 5; it must be 1e-10 to 0.01.");
     refused(&["solve", "--warm", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
     refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
@@ -267,7 +267,7 @@ fn json_arrays_as_input_and_a_dash_as_output_are_refused() {
         assert_eq!(output.status.code(), Some(2), "{flag}: {text}");
         assert!(text.contains("array.json is not "), "{flag}: {text}");
     }
-    refused(&["solve", "--out", "-"], "- is not a file");
+    refused(&["solve", "--out", "-"], "Cannot write to \"-\", which is not a file name. Give a file.");
 }
 
 #[test]

@@ -113,12 +113,12 @@ fn unprocessable_file_is_refused_and_writes_nothing() {
         (&["nowhere.csv", column[0], column[1]], "Cannot read nowhere.csv"),
         (&["walk.csv"], "at least two heel-strike times"),
         (&["walk.csv", "--heel-strike-column", "toe"], "column \"toe\" is missing"),
-        (&["walk.csv", "--heel-strikes-s", "0.4,99"], "heel_strikes_s is 99;"),
+        (&["walk.csv", "--heel-strikes-s", "0.4,99"], "--heel-strikes-s is 99;"),
         (&["walk.csv", column[0], column[1], "--band-high-hz", "500"], "emg.band_high_hz is 500;"),
         (&["walk.csv", column[0], column[1], "--order", "3"], "emg.order is \"3\"; it must be 2, 4, 6 or 8"),
         (&["walk.csv", column[0], column[1], "--channels", "TA"], "must be CHANNEL=COLUMN"),
         (&["walk.csv", column[0], column[1], "--channels", "XX=TA_L"], "RF_L, TA_L, BF_L"),
-        (&["walk.csv", column[0], column[1], "--rate-hz", "NaN"], "rate_hz is NaN;"),
+        (&["walk.csv", column[0], column[1], "--rate-hz", "NaN"], "--rate-hz is NaN;"),
         (&["walk.csv", column[0], column[1], "--cycles", "walk.csv"], "is an input of this command"),
     ] {
         let output = emg(folder.path(), &[arguments, &["--envelopes", "e.csv"]].concat());

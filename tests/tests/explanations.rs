@@ -283,7 +283,7 @@ async fn relaxation_within_the_search_space_is_tried_in_the_same_study() {
     assert_eq!(rows.iter().map(|row| row.object.clone()).collect::<Vec<_>>(), [format!("trial {}", relaxed.id)]);
 
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains(">trial 3</a> has these bounds already") && !page.contains("/relaxed-trial"), "{page}");
+    assert!(page.contains(">trial 3</a> already has these bounds") && !page.contains("/relaxed-trial"), "{page}");
     service.stop().await;
 }
 
@@ -297,7 +297,7 @@ async fn relaxation_outside_the_search_space_is_refused_with_the_reason() {
     let trial = service.trials(study).await.remove(0).id;
     explained(&service, trial).await;
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
-    let reason = "The loosest a5 of this study is 0.032, which is not loose enough.";
+    let reason = "The loosest value of a5 in this study is 0.032 m, which is not loose enough.";
     assert!(page.contains(reason) && page.contains("New study with a5 = 0.03 m"), "{page}");
     assert!(!page.contains("/relaxed-trial"), "{page}");
     let refused = try_relaxation(&service, trial, 0).await;

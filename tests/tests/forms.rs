@@ -583,7 +583,7 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     let send = async |body: &str| service.post_text("/users", FORM, body).await;
     assert!(send("button=add_user&name=K1&role=clinician").await.status.is_success());
     let taken = send("button=add_user&name=K1&role=admin").await;
-    is_page(&taken, StatusCode::CONFLICT, "There is already a user");
+    is_page(&taken, StatusCode::CONFLICT, "A user named");
     for kept in [
         "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",
         "value=\"admin\" selected",

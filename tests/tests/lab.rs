@@ -437,7 +437,9 @@ async fn emg_recordings_are_compared_with_normal_walking_and_can_be_reprocessed(
     for walk in 1..=3 {
         service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": walk})).await;
     }
-    assert!(service.fetch(&format!("{api}/emg-results")).await.json().is_null());
+    let missing = service.fetch(&format!("{api}/emg-results")).await;
+    assert_eq!(missing.status, StatusCode::NOT_FOUND);
+    assert!(missing.json()["detail"].as_str().unwrap().starts_with("There is no EMG result of lab session "));
     assert_eq!(service.post(&format!("{api}/emg-results"), &json!({})).await.status, StatusCode::CONFLICT);
     for (walk, strength) in [(1, 9.0), (2, 1.5), (1, 1.0)] {
         let kept = service.post(&bring, &with_heel(walk, &electromyogram(strength))).await;

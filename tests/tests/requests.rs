@@ -356,7 +356,7 @@ async fn searches_and_keys_are_accepted_if_and_only_if_they_match_the_descriptio
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     for list in ["audit", "access-log"] {
-        let search = async |text: &str| service.fetch(&format!("/api/v1/{list}?contains={text}")).await.status;
+        let search = async |text: &str| service.fetch(&format!("/api/v1/{list}?text={text}")).await.status;
         assert_eq!(search(&"x".repeat(200)).await, StatusCode::OK);
         assert_eq!(search(&"x".repeat(201)).await, StatusCode::BAD_REQUEST);
     }

@@ -179,10 +179,14 @@ async fn finished_study_is_extended_forked_and_compared() {
     let both = service.fetch(&format!("/api/v1/study-comparison?ids={study},{forked}")).await.items();
     assert_eq!((&both[0]["id"], &both[1]["trials"]["total"]), (&json!(study), &json!(5)));
     assert!(both[0]["best_gait_rmse_rad"].is_f64());
-    assert_eq!(
-        service.fetch(&format!("/api/v1/study-comparison?ids={study}")).await.status,
-        StatusCode::UNPROCESSABLE_ENTITY
-    );
+    for ids in [study.to_string(), format!("{study},{study}")] {
+        let refused = service.fetch(&format!("/api/v1/study-comparison?ids={ids}")).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{ids}");
+        assert_eq!(refused.json()["field"], "ids");
+    }
+    let draft = service.study(|new| new.start = false).await;
+    let unsolved = service.fetch(&format!("/api/v1/study-comparison?ids={draft},{study}")).await.items();
+    assert!(unsolved[0]["solve_seconds"].as_f64().unwrap().is_sign_positive(), "{}", unsolved[0]);
     service.stop().await;
 }
 

@@ -164,7 +164,7 @@ impl NlpResult {
 /// A range in words.
 fn range(low: f64, high: f64) -> String {
     match (low == f64::MIN_POSITIVE, high >= f64::MAX) {
-        (true, true) => "any positive number".to_owned(),
+        (true, true) => "a positive number".to_owned(),
         (true, false) => format!("more than 0 and at most {high}"),
         (false, true) => format!("at least {low}"),
         (false, false) => format!("{low} to {high}"),

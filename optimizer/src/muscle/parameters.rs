@@ -16,7 +16,7 @@ pub struct MuscleOverride {
     /// Maximum isometric force, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_force_n: Option<f64>,
-    /// Maximum shortening speed, optimal lengths per second.
+    /// Maximum shortening speed, optimal fibre lengths per second.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_speed: Option<f64>,
     /// Optimal fibre length, m.
@@ -77,7 +77,7 @@ impl MuscleOverride {
         ),
         field(
             "max_speed",
-            "maximum shortening speed, optimal lengths per second",
+            "maximum shortening speed, optimal fibre lengths per second",
             (2.0, 30.0),
             |g| g.max_speed,
             |m| Some(m.max_speed),
@@ -183,10 +183,10 @@ impl MuscleParameters {
                 if let Some(value) = lever
                     && !spans
                 {
-                    return Err(ModelError::Unknown {
+                    return Err(ModelError::MustBeAbsent {
                         field: format!("muscles.{kind}.{}_lever_m", joint.name()),
-                        value: value.to_string(),
-                        known: format!("absent, because {kind} does not span the {}", joint.name()),
+                        value,
+                        reason: format!("{kind} does not span the {}", joint.name()),
                     });
                 }
             }
@@ -274,7 +274,10 @@ mod tests {
         }
         for (text, expected) in [
             (r#"{"ta": {"max_force_n": 1.0}}"#, "muscles.ta.max_force_n is 1; it must be 50 to 20000."),
-            (r#"{"sol": {"knee_lever_m": 0.05}}"#, "muscles.sol.knee_lever_m is \"0.05\"; it must be absent"),
+            (
+                r#"{"sol": {"knee_lever_m": 0.05}}"#,
+                "muscles.sol.knee_lever_m must be absent, because sol does not span the knee.",
+            ),
         ] {
             let refusal = read(text).validate().unwrap_err().to_string();
             assert!(refusal.contains(expected), "{refusal}");

@@ -102,7 +102,8 @@ impl MotionRecording {
         let kept = format!("{} to {} s, without gaps above {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
             let (shortest, longest) = STRIDE_RANGE_S;
-            let reason = format!("no stride without gaps above {LONGEST_GAP_S} s lasts {shortest} to {longest} s");
+            let reason =
+                format!("no stride of {shortest} to {longest} s is free of gaps longer than {LONGEST_GAP_S} s");
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let count = strides.len() as f64;

@@ -124,7 +124,7 @@ mod tests {
             (r#"{"solver": {"bound_push": 0.2, "linear_solver": "ma57"}}"#, "solver.linear_solver: unknown variant"),
             (r#"{"solver": {"bound_relaxation": 1e-3}}"#, "bound_relaxation is 0.001; it must be 0 to 0.000001"),
             (r#"{"solver": {"bound_push": 1}}"#, "bound_push is 1; it must be more than 0 and at most 0.5"),
-            (r#"{"solver": {"hessian_regularisation_first": 0}}"#, "first is 0; it must be any positive number"),
+            (r#"{"solver": {"hessian_regularisation_first": 0}}"#, "first is 0; it must be a positive number"),
             (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial cannot be set here"),
             (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial cannot be set here"),
             (r#"{"solver": {"threads": 2}}"#, "threads cannot be set here"),

@@ -55,8 +55,13 @@ impl ChartAxis {
         self.decimals = 0;
     }
 
-    /// Sets the ticks to these values, with enough decimals to distinguish them.
+    /// Sets the ticks to these values, with enough decimals to distinguish them. The range is widened to hold them, with a margin
+    /// for the dots at its ends.
     pub(super) fn set_ticks(&mut self, ticks: &[f64]) {
+        let (low, high) =
+            ticks.iter().fold((self.from, self.to), |(low, high), tick| (low.min(*tick), high.max(*tick)));
+        let margin = 0.04 * (high - low);
+        (self.from, self.to) = (low - margin, high + margin);
         let decimals = |tick: &f64| tick.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len());
         self.decimals = ticks.iter().map(decimals).max().unwrap_or(0).min(6);
         self.ticks = ticks.to_vec();
@@ -117,6 +122,13 @@ fn decimals_of(step: f64) -> usize {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn range_holds_every_tick_that_is_set() {
+        let mut axis = ChartAxis::over([0.1, 0.3].into_iter(), 8, true);
+        axis.set_ticks(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5]);
+        assert!(axis.ticks.iter().all(|tick| (0.0..=1.0).contains(&axis.place(*tick))), "{axis:?}");
+    }
 
     #[test]
     fn ticks_are_round() {

@@ -55,7 +55,9 @@ of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult:
 of_study!(AssessmentId, "assessment", async |db: &mut Connection, id| StoreResult::Ok(
     assessments::get(db, id).await?.study_id
 ));
-of_study!(MemberId, "member", async |db: &mut Connection, id| StoreResult::Ok(members::get(db, id).await?.study_id));
+of_study!(MemberId, "membership", async |db: &mut Connection, id| StoreResult::Ok(
+    members::get(db, id).await?.study_id
+));
 of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
     StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
 });
@@ -104,7 +106,7 @@ shared!(DeviceId, "device");
 shared!(ReferenceGaitId, "reference gait");
 shared!(UserId, "user");
 shared!(TokenId, "token");
-shared!(SessionId, "session");
+shared!(SessionId, "sign-in session");
 
 /// The study of an object, if the caller can access it. Missing and inaccessible objects are refused with the same
 /// message.

@@ -41,9 +41,16 @@ impl IntoResponse for RefusedRequest {
     }
 }
 
+/// The refusal of a request without a session or a token.
+pub(crate) fn not_signed_in() -> Error {
+    Error::NotSignedIn(
+        "This request requires a session or a token. Sign in, or send `Authorization: Bearer TOKEN`.".to_owned(),
+    )
+}
+
 /// The caller of a request, if it has the right.
 pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller, Error> {
-    let caller = extensions.get::<Caller>().ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
+    let caller = extensions.get::<Caller>().ok_or_else(not_signed_in)?;
     match P::NEEDED {
         Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
             "This requires the right {:?}, which {} does not have. Ask an administrator.",

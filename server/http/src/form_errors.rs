@@ -39,6 +39,11 @@ const LABELS: &[(&str, &str)] = &[
     ("seed", "Seed"),
 ];
 
+/// The refusal of a field that the form does not have.
+pub(crate) fn unknown_field(name: &str) -> FieldError {
+    FieldError::in_words(name, &format!("The form has no field {name}."))
+}
+
 /// A text in quotation marks.
 pub(crate) fn quoted(text: &str) -> String {
     format!("\u{201c}{text}\u{201d}")
@@ -76,7 +81,7 @@ fn near_miss(fault: &FieldError) -> Option<String> {
     }
     let bound = field.rsplit('_').next().unwrap_or_default();
     let place = TunedBounds::NAMES.iter().position(|name| *name == bound)?;
-    let (_, unit) = TunedBounds::MEANINGS[place].rsplit_once(", ")?;
+    let unit = TunedBounds::unit_of(bound);
     let (low, high) = TunedBounds::RANGES[place];
     let radian = 1_f64.to_degrees();
     let meant = match unit {

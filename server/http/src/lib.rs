@@ -30,6 +30,7 @@ mod openapi_binary;
 mod openapi_dependent_rules;
 mod openapi_descriptions;
 mod openapi_rules;
+mod openapi_schemas;
 mod openapi_settings;
 pub mod page_error;
 pub mod pages;

@@ -73,17 +73,22 @@ fn document() -> OpenApi {
 /// # Errors
 /// When it cannot be written as JSON.
 pub(super) fn value() -> Result<Value, serde_json::Error> {
+    Ok(with_missed_rules()?.0)
+}
+
+/// The description, and the rules that apply to nothing in it.
+fn with_missed_rules() -> Result<(Value, Vec<String>), serde_json::Error> {
     let mut value = serde_json::to_value(document())?;
     refer_to_entries(&mut value);
     let mut value = name_pages(value);
-    openapi_rules::state(&mut value);
+    let missed = openapi_rules::state(&mut value);
     let schemas = value["components"]["schemas"].clone();
     for (_, item) in value["paths"].as_object_mut().into_iter().flatten() {
         for (method, operation) in item.as_object_mut().into_iter().flatten() {
             complete(operation, method, &schemas);
         }
     }
-    Ok(value)
+    Ok((value, missed))
 }
 
 /// The description as it is served and committed.
@@ -214,5 +219,16 @@ fn answer_problems(responses: &mut Map<String, Value>) {
         json!({ PROBLEM_JSON: { "schema": { "$ref": format!("{}{}", openapi_rules::SCHEMAS, Problem::name()) } } });
     for (_, response) in responses.iter_mut().filter(|(status, _)| status.starts_with(['4', '5'])) {
         response["content"] = problem.clone();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_missed_rules;
+
+    #[test]
+    fn every_rule_finds_its_component_field_or_parameter() {
+        let missed = with_missed_rules().unwrap().1;
+        assert!(missed.is_empty(), "these rules apply to nothing: {missed:?}");
     }
 }

@@ -1,7 +1,8 @@
 //! Rules that a schema cannot state, because they relate a field to the record, to other fields or to a file. The
 //! description has them in `x-depends` of the field.
 
-use serde_json::{Map, Value, json};
+use super::openapi_schemas::Schemas;
+use serde_json::json;
 
 const GAIT: &str = "A trial of this study with a walkable gait: converged, certified, without a safety report in force. The two trials of \
                     a comparison have different gaits.";
@@ -70,12 +71,9 @@ const RULES: [(&str, &str, &str); 27] = [
 ];
 
 /// Adds the rules to the fields.
-pub(super) fn state(schemas: &mut Map<String, Value>) {
+pub(super) fn state(schemas: &mut Schemas<'_>) {
     for (component, field, rule) in RULES {
-        let property = schemas.get_mut(component).and_then(|schema| schema.get_mut("properties")?.get_mut(field));
-        if let Some(property) = property.and_then(Value::as_object_mut) {
-            property.insert("x-depends".to_owned(), json!(rule));
-        }
+        schemas.add(component, field, &json!({ "x-depends": rule }));
     }
 }
 

@@ -1,6 +1,7 @@
 //! Descriptions of the fields whose schemas come from default values and from tables of fields.
 
-use serde_json::{Map, Value, json};
+use super::openapi_schemas::Schemas;
+use serde_json::json;
 
 /// Component, field with a slash between levels, and the description.
 type Described = (&'static str, &'static str, &'static str);
@@ -151,7 +152,7 @@ const GAIT_SETTINGS: [Described; 51] = [
     (
         "GaitSettings",
         "limits/torso_tolerance_rad",
-        "Minimum half width of the range of torso lean, rad. It applies if a6 is smaller.",
+        "Minimum half-width of the range of torso lean, rad. It applies if a6 is smaller.",
     ),
     ("GaitSettings", "limits/toe_touchdown_m_s", "Minimum downward velocity of the toe at toe strike, m/s."),
     ("GaitSettings", "limits/heel_touchdown_m_s", "Minimum downward velocity of the heel at heel strike, m/s."),
@@ -193,7 +194,7 @@ const GAIT_SETTINGS: [Described; 51] = [
         "regularisation/activation_bend",
         "Weight of the second differences of muscle activations over adjacent nodes of a domain.",
     ),
-    ("GaitSettings", "naturalness", "Naturalness terms beyond the paper."),
+    ("GaitSettings", "naturalness", "Naturalness terms, which the paper does not have."),
     (
         "GaitSettings",
         "naturalness/reference_weight",
@@ -206,7 +207,7 @@ const GAIT_SETTINGS: [Described; 51] = [
         "Minimum share of the weight of the walker on the trailing foot at heel strike of the other foot. It decreases \
          linearly to 0 at toe-off. 0 disables the term.",
     ),
-    ("GaitSettings", "muscles", "Differences of the subject's muscles from the published table."),
+    ("GaitSettings", "muscles", "Muscle values of the subject that differ from the default values."),
 ];
 
 const OTHERS: [Described; 11] = [
@@ -237,12 +238,15 @@ fn all() -> impl Iterator<Item = &'static Described> {
 }
 
 /// Adds the descriptions to the fields.
-pub(super) fn state(schemas: &mut Map<String, Value>) {
+pub(super) fn state(schemas: &mut Schemas<'_>) {
     for (component, field, text) in all() {
-        let place = format!("/properties/{}", field.replace('/', "/properties/"));
-        let schema = schemas.get_mut(*component).and_then(|schema| schema.pointer_mut(&place));
-        if let Some(schema) = schema.and_then(Value::as_object_mut) {
-            schema.insert("description".to_owned(), json!(text));
+        schemas.add(component, field, &json!({ "description": text }));
+    }
+    // Its schema describes the kind of entry as the tag of an enumeration, which has no comment.
+    let entries = schemas.component("FeedbackContent").and_then(|content| content.get_mut("oneOf")?.as_array_mut());
+    for entry in entries.into_iter().flatten() {
+        if let Some(kind) = entry.pointer_mut("/properties/kind") {
+            kind["description"] = json!("Kind of entry.");
         }
     }
 }
@@ -264,13 +268,19 @@ mod tests {
             }
             undescribed(field, &place, found);
         }
+        for (at, part) in schema["oneOf"].as_array().into_iter().flatten().enumerate() {
+            undescribed(part, &format!("{place}[{at}]"), found);
+        }
     }
 
     #[test]
-    fn every_field_is_described() {
+    fn every_component_and_field_is_described() {
         let document = openapi::value().unwrap();
         let mut found = Vec::new();
         for (component, schema) in document["components"]["schemas"].as_object().unwrap() {
+            if schema.get("description").is_none() {
+                found.push(component.clone());
+            }
             undescribed(schema, component, &mut found);
         }
         assert!(found.is_empty(), "{found:?}");

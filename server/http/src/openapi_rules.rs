@@ -6,6 +6,7 @@
 
 use super::openapi_dependent_rules;
 use super::openapi_descriptions;
+use super::openapi_schemas::{Schemas, merge};
 use super::openapi_settings::settings;
 use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
@@ -38,31 +39,36 @@ const NAMES: [(&str, &str, u32); 12] = [
     ("Suggestion", "author", 80),
 ];
 
+/// Parameters with rules.
+const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "token", "ids", "x", "y"];
+
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
 
-/// Adds the rules to the description.
-pub(super) fn state(document: &mut Value) {
+/// Adds the rules to the description. Returns the rules whose component, field or parameter it does not have.
+pub(super) fn state(document: &mut Value) -> Vec<String> {
+    let mut missed = Vec::new();
     let optional = format!("^[^{UNPRINTABLE}]*$");
     let needed = format!(r"^[^{UNPRINTABLE}]*[^\s{UNPRINTABLE}][^{UNPRINTABLE}]*$");
     let one_line = format!(r"^[^\t\r\n{UNPRINTABLE}]*[^\s{UNPRINTABLE}][^\t\r\n{UNPRINTABLE}]*$");
-    if let Some(schemas) = document.pointer_mut("/components/schemas").and_then(Value::as_object_mut) {
+    if let Some(all) = document.pointer_mut("/components/schemas").and_then(Value::as_object_mut) {
+        let schemas = &mut Schemas::of(all);
         for (component, field, longest) in NAMES {
             let rule = json!({ "minLength": 1, "maxLength": longest, "pattern": one_line });
-            add(schemas, component, field, &rule);
+            schemas.add(component, field, &rule);
         }
         for component in ["NewSafetyReview", "Retract"] {
-            add(schemas, component, "author", &json!({ "minLength": 1, "maxLength": 80, "pattern": one_line }));
+            schemas.add(component, "author", &json!({ "minLength": 1, "maxLength": 80, "pattern": one_line }));
         }
         for component in ["NewSafetyReview", "Withdrawal", "NewCorrection", "Unblind", "Retract", "UnblindSession"] {
-            add(schemas, component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
+            schemas.add(component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
         }
-        add(schemas, "NewConsent", "form", &json!({ "pattern": needed }));
-        add(schemas, "Change", "notes", &json!({ "pattern": optional }));
+        schemas.add("NewConsent", "form", &json!({ "pattern": needed }));
+        schemas.add("Change", "notes", &json!({ "pattern": optional }));
         // A comma separates tags in the form.
         let tag = format!(r"^[^,\t\r\n{UNPRINTABLE}]*[^,\s{UNPRINTABLE}][^,\t\r\n{UNPRINTABLE}]*$");
         let tag = json!({ "type": "string", "minLength": 1, "maxLength": 40, "pattern": tag });
-        add(schemas, "Change", "tags", &json!({ "items": tag }));
+        schemas.add("Change", "tags", &json!({ "items": tag }));
         for component in [
             "NewPreference",
             "NewAssessment",
@@ -73,37 +79,37 @@ pub(super) fn state(document: &mut Value) {
             "RecordedWalk",
             "Closing",
         ] {
-            add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
+            schemas.add(component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["Tell", "TransitionReason"] {
-            add(schemas, component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
+            schemas.add(component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["NewSubject", "NewLabSession"] {
-            add(schemas, component, "notes", &json!({ "pattern": optional }));
+            schemas.add(component, "notes", &json!({ "pattern": optional }));
         }
         // A code assigned by the site, without addresses, dates and long numbers.
         let pseudonym = r"^(?!(.*[0-9]){6})[A-Za-z0-9_.:/#+()\-][A-Za-z0-9 _.:/#+()\-]*$";
-        add(schemas, "NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
+        schemas.add("NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
-        add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
+        schemas.add("NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
         let people = json!({
             "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who gives the answer."
         });
-        schemas.insert("PersonSource".to_owned(), people);
+        schemas.insert("PersonSource", people);
         for component in ["NewPreference", "NewAssessment", "NewSafetyReport", "Suggestion"] {
             let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
-            set(schemas, component, "source", one);
+            schemas.set(component, "source", one);
         }
         let answers = json!({ "enum": [
             "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both",
         ] });
         for component in ["RaterAnswer", "NewLabAnswer"] {
-            set(schemas, component, "answer", answers.clone());
+            schemas.set(component, "answer", answers.clone());
         }
         for field in ["gait_rmse_rad", "cost_of_transport"] {
-            add(schemas, "Tell", field, &json!({ "minimum": 0, "exclusiveMaximum": 1e6 }));
+            schemas.add("Tell", field, &json!({ "minimum": 0, "exclusiveMaximum": 1e6 }));
         }
-        if let Some(tell) = schemas.get_mut("Tell").and_then(Value::as_object_mut) {
+        if let Some(tell) = schemas.component("Tell") {
             let reason = json!({ "required": ["reason"], "properties": { "reason": { "pattern": r"\S" } } });
             let rmse =
                 json!({ "required": ["gait_rmse_rad"], "properties": { "gait_rmse_rad": { "type": "number" } } });
@@ -111,55 +117,57 @@ pub(super) fn state(document: &mut Value) {
             tell.insert("then".to_owned(), rmse);
             tell.insert("else".to_owned(), reason);
         }
-        add(schemas, "NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
+        schemas.add("NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
         for component in ["NewReferenceGait", "NewEmg", "NewMotion"] {
-            add(schemas, component, "recording", &json!({ "minLength": 1 }));
+            schemas.add(component, "recording", &json!({ "minLength": 1 }));
         }
-        add(schemas, "NewReferenceGait", "format", &json!({ "default": "opensim" }));
-        add(schemas, "EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
-        add(schemas, "MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
+        schemas.add("NewReferenceGait", "format", &json!({ "default": "opensim" }));
+        schemas.add("EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
+        schemas.add("MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
         state_emg(schemas);
         let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });
-        add(schemas, "Suggestion", "bounds", &bounds);
+        schemas.add("Suggestion", "bounds", &bounds);
         for (field, (least, most)) in
             [("height_m", Subject::HEIGHT_RANGE_M), ("body_mass_kg", Subject::BODY_MASS_RANGE_KG)]
         {
-            add(schemas, "NewReferenceGait", field, &json!({ "minimum": least, "maximum": most }));
+            schemas.add("NewReferenceGait", field, &json!({ "minimum": least, "maximum": most }));
         }
         for component in ["NewStudy", "Fork"] {
-            add(schemas, component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
-            add(schemas, component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
+            schemas.add(component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
+            schemas.add(component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
         }
-        add(schemas, "NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
-        add(schemas, "NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
-        add(schemas, "NewStudy", "priority", &json!({ "minimum": -10, "maximum": 10 }));
-        add(schemas, "NewStudy", "solve_seconds_budget", &json!({ "minimum": 1, "maximum": 1e8 }));
-        add(schemas, "Dimension", "name", &json!({ "enum": TunedBounds::NAMES }));
+        schemas.add("NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
+        schemas.add("NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
+        schemas.add("NewStudy", "priority", &json!({ "minimum": -10, "maximum": 10 }));
+        schemas.add("NewStudy", "solve_seconds_budget", &json!({ "minimum": 1, "maximum": 1e8 }));
+        schemas.add("Dimension", "name", &json!({ "enum": TunedBounds::NAMES }));
         let (least, most) =
             TunedBounds::RANGES.iter().fold((f64::MAX, 0.0_f64), |all, own| (all.0.min(own.0), all.1.max(own.1)));
         let item = json!({ "type": "number", "format": "double", "minimum": least, "maximum": most });
         let values = json!({ "minItems": 1, "maxItems": 1000, "uniqueItems": true, "items": item });
-        add(schemas, "Dimension", "values", &values);
-        add(schemas, "Dimension", "lengthscale", &json!({ "minimum": 1e-15, "maximum": 1e15 }));
-        add(schemas, "SearchSpace", "dimensions", &json!({ "minItems": 1, "maxItems": TunedBounds::NAMES.len() }));
-        close(schemas, "Dimension");
-        close(schemas, "SearchSpace");
+        schemas.add("Dimension", "values", &values);
+        schemas.add("Dimension", "lengthscale", &json!({ "minimum": 1e-15, "maximum": 1e15 }));
+        schemas.add("SearchSpace", "dimensions", &json!({ "minItems": 1, "maxItems": TunedBounds::NAMES.len() }));
+        schemas.close("Dimension");
+        schemas.close("SearchSpace");
         state_bounds(schemas);
         let mut gait = settings(widest_durations(), |s: &GaitSettings| s.validate().err().map(Error::from));
         // The muscles are absent if they have their default values.
         gait["properties"]["muscles"] = json!({ "$ref": format!("{SCHEMAS}MuscleParameters") });
         for (name, schema) in [
             ("GaitSettings", gait),
-            ("SolveOptions", solve_options()),
-            ("LearnerSettings", learner()),
+            ("SolveOptions", solve_options(&mut missed)),
+            ("LearnerSettings", learner(&mut missed)),
             ("MuscleParameters", muscles()),
             ("DeviceDefinition", device(&one_line)),
         ] {
-            put(schemas, name, schema);
+            schemas.put(name, schema);
         }
         openapi_descriptions::state(schemas);
         openapi_dependent_rules::state(schemas);
+        missed.append(&mut schemas.missed);
     }
+    let mut unused: Vec<&str> = PARAMETERS.to_vec();
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
         for (_, item) in paths {
             let operations = item.as_object_mut().into_iter().flatten();
@@ -167,13 +175,16 @@ pub(super) fn state(document: &mut Value) {
                 operations.filter_map(|(_, operation)| operation.get_mut("parameters")?.as_array_mut()).flatten()
             {
                 state_parameter(parameter);
+                unused.retain(|name| parameter["name"] != *name);
             }
         }
     }
+    missed.extend(unused.into_iter().map(|name| format!("parameter {name}")));
+    missed
 }
 
 /// The bounds of an action, and a second schema for requests, where each bound has a default.
-fn state_bounds(schemas: &mut Map<String, Value>) {
+fn state_bounds(schemas: &mut Schemas<'_>) {
     let mut properties = Map::new();
     for (bound, name) in TunedBounds::NAMES.iter().enumerate() {
         let side = if TunedBounds::IS_LOWER[bound] { "Minimum" } else { "Maximum" };
@@ -191,33 +202,32 @@ fn state_bounds(schemas: &mut Map<String, Value>) {
         "required": TunedBounds::NAMES,
         "properties": properties,
     });
-    put(schemas, "Bounds", bounds);
-    let Some(bounds) = schemas.get("Bounds").and_then(Value::as_object) else { return };
-    let mut given = bounds.clone();
+    schemas.put("Bounds", bounds);
+    let Some(mut given) = schemas.component("Bounds").cloned() else { return };
     given.remove("required");
     given.insert("description".to_owned(), json!("Values of bounds. Absent bounds take their default values."));
-    schemas.insert("BaseBounds".to_owned(), Value::Object(given));
+    schemas.insert("BaseBounds", Value::Object(given));
     for (name, usual) in TunedBounds::NAMES.iter().zip(TunedBounds::default().to_array()) {
-        add(schemas, "BaseBounds", name, &json!({ "default": usual }));
+        schemas.add("BaseBounds", name, &json!({ "default": usual }));
     }
-    set(schemas, "NewStudy", "base_bounds", json!({ "$ref": format!("{SCHEMAS}BaseBounds") }));
+    schemas.set("NewStudy", "base_bounds", json!({ "$ref": format!("{SCHEMAS}BaseBounds") }));
 }
 
 /// The ranges of EMG settings at the highest sampling rate; that of a file can narrow them.
-fn state_emg(schemas: &mut Map<String, Value>) {
+fn state_emg(schemas: &mut Schemas<'_>) {
     // The widest range of the upper edge belongs to the lowest lower edge.
     let widest = EmgSettings { band_low_hz: 1.0, ..EmgSettings::default() };
     let found = settings(widest, |s: &EmgSettings| s.validate(1e6).err().map(Error::from));
     for (field, rule) in found["properties"].as_object().into_iter().flatten() {
-        add(schemas, "EmgSettings", field, rule);
+        schemas.add("EmgSettings", field, rule);
     }
     for (field, usual) in
         serde_json::to_value(EmgSettings::default()).unwrap_or_default().as_object().into_iter().flatten()
     {
-        add(schemas, "EmgSettings", field, &json!({ "default": usual }));
+        schemas.add("EmgSettings", field, &json!({ "default": usual }));
     }
-    set(schemas, "EmgSettings", "order", json!({ "type": "integer", "enum": [2, 4, 6, 8], "default": 4 }));
-    close(schemas, "EmgSettings");
+    schemas.set("EmgSettings", "order", json!({ "type": "integer", "enum": [2, 4, 6, 8], "default": 4 }));
+    schemas.close("EmgSettings");
 }
 
 /// Settings whose durations leave each other the widest ranges; `x-depends` has the rule between them. Naturalness terms
@@ -232,20 +242,32 @@ fn widest_durations() -> GaitSettings {
 }
 
 /// The schema of the options of a solve. The choice of a gait is a word, or an object with a percentage.
-fn solve_options() -> Value {
+fn solve_options(missed: &mut Vec<String>) -> Value {
     let of = |options: SolveOptions| settings(options, |s: &SolveOptions| s.validate().err().map(Error::from));
     let mut schema = of(SolveOptions::default());
     let nearest = LocalOptimumChoice::NearestToReference { within_percent: 0.0 };
-    let object =
+    let mut object =
         of(SolveOptions { local_optimum_choice: nearest, ..SolveOptions::default() })["properties"]["local_optimum_choice"].take();
+    for (place, text) in [
+        ("/properties/nearest_to_reference", "Takes the local optimum with the lowest Gait RMSE."),
+        ("/properties/nearest_to_reference/properties/within_percent", "Largest excess over the lowest objective, %."),
+    ] {
+        match object.pointer_mut(place) {
+            Some(part) => part["description"] = json!(text),
+            None => missed.push(format!("SolveOptions.local_optimum_choice{place}")),
+        }
+    }
     let word = json!({ "type": "string", "enum": [LocalOptimumChoice::LowestObjective] });
-    schema["properties"]["local_optimum_choice"] = json!({ "oneOf": [word, object] });
+    match schema.pointer_mut("/properties/local_optimum_choice") {
+        Some(choice) => *choice = json!({ "oneOf": [word, object] }),
+        None => missed.push("SolveOptions.local_optimum_choice".to_owned()),
+    }
     schema
 }
 
 /// The schema of the settings of the learner. Noises and thresholds have ranges in proportion to the signal: stated are
 /// the widest ones, and `x-depends` has the rule.
-fn learner() -> Value {
+fn learner(missed: &mut Vec<String>) -> Value {
     let usual = LearnerSettings::default();
     let with = |signal_variance: f64| {
         let share = signal_variance / usual.signal_variance;
@@ -268,11 +290,16 @@ fn learner() -> Value {
         schema["properties"]["signal_variance"]["minimum"].as_f64(),
         schema["properties"]["signal_variance"]["maximum"].as_f64(),
     );
+    if least.is_none() || most.is_none() {
+        missed.push("LearnerSettings.signal_variance".to_owned());
+    }
     for end in [least, most].into_iter().flatten() {
         widen(&mut schema, &with(end));
     }
-    let thresholds = &mut schema["properties"]["ordinal_thresholds"];
-    (thresholds["minItems"], thresholds["maxItems"]) = (json!(1), json!(1));
+    match schema.pointer_mut("/properties/ordinal_thresholds") {
+        Some(thresholds) => (thresholds["minItems"], thresholds["maxItems"]) = (json!(1), json!(1)),
+        None => missed.push("LearnerSettings.ordinal_thresholds".to_owned()),
+    }
     schema
 }
 
@@ -339,53 +366,6 @@ pub(super) fn has_rules(schema: &Value, schemas: &Value) -> bool {
         Value::Array(parts) => parts.iter().any(|part| has_rules(part, schemas)),
         _ => false,
     }
-}
-
-fn merge(schema: &mut Map<String, Value>, rule: &Value) {
-    for (name, value) in rule.as_object().into_iter().flatten() {
-        schema.insert(name.clone(), value.clone());
-    }
-}
-
-fn property<'a>(
-    schemas: &'a mut Map<String, Value>,
-    component: &str,
-    field: &str,
-) -> Option<&'a mut Map<String, Value>> {
-    schemas.get_mut(component)?.get_mut("properties")?.get_mut(field)?.as_object_mut()
-}
-
-/// Adds rules to a field.
-fn add(schemas: &mut Map<String, Value>, component: &str, field: &str, rule: &Value) {
-    if let Some(schema) = property(schemas, component, field) {
-        merge(schema, rule);
-    }
-}
-
-/// Replaces the schema of a field, and keeps its description.
-fn set(schemas: &mut Map<String, Value>, component: &str, field: &str, mut schema: Value) {
-    let Some(present) = property(schemas, component, field) else { return };
-    let nested = present.get("oneOf").and_then(|parts| parts.get(0)).and_then(|part| part.get("description"));
-    if let (Some(text), Some(new)) = (present.get("description").or(nested), schema.as_object_mut()) {
-        new.insert("description".to_owned(), text.clone());
-    }
-    if let Value::Object(schema) = schema {
-        *present = schema;
-    }
-}
-
-/// States that a component has no other fields.
-fn close(schemas: &mut Map<String, Value>, component: &str) {
-    if let Some(schema) = schemas.get_mut(component).and_then(Value::as_object_mut) {
-        schema.insert("additionalProperties".to_owned(), json!(false));
-    }
-}
-
-/// Replaces the schema of a component, and keeps its description.
-fn put(schemas: &mut Map<String, Value>, component: &str, mut schema: Value) {
-    let Some(present) = schemas.get_mut(component) else { return };
-    schema["description"] = present["description"].take();
-    *present = schema;
 }
 
 /// The schema of a device file; no two devices have one name.

@@ -83,14 +83,15 @@ fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Val
     schema
 }
 
-/// The range in an error: `0.1 to 5` of a field, or `must be 0.1 to 5` of a learner setting.
+/// The range in an error: `0.1 to 5` of a field, or `must be 0.1 to 5` of a learner setting. A unit or a relation to
+/// another field can follow it.
 fn range_in(error: &Error) -> Option<(f64, f64)> {
-    if let Error::Invalid(field) | Error::Unreadable(field) = error {
-        let (least, most) = field.allowed.as_deref()?.split_once(" to ")?;
-        return Some((least.trim().parse().ok()?, most.trim().parse().ok()?));
-    }
     let text = error.to_string();
-    let (least, most) = text.split_once("must be ")?.1.split_once(" to ")?;
+    let range = match error {
+        Error::Invalid(field) | Error::Unreadable(field) => field.allowed.as_deref()?,
+        _ => text.split_once("must be ")?.1,
+    };
+    let (least, most) = range.split_once(" to ")?;
     let most: String = most.chars().take_while(|c| c.is_ascii_digit() || "+-.e".contains(*c)).collect();
     Some((least.trim().parse().ok()?, most.trim_end_matches('.').parse().ok()?))
 }
@@ -103,4 +104,40 @@ fn words_in(error: &Error) -> Vec<String> {
     let words: Vec<String> = words.map(|word| word.trim_matches(['`', '"', ' ']).to_owned()).collect();
     let plain = |word: &String| !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if words.iter().all(plain) { words } else { Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::openapi;
+    use serde_json::Value;
+
+    /// The numbers at any depth whose schema has no range.
+    fn without_range(schema: &Value, place: &str, found: &mut Vec<String>) {
+        let is = |kind: &str| schema["type"] == kind || schema["type"][0] == kind;
+        let has = |end: &str| schema.get(end).is_some();
+        // Counts have no largest value of their own.
+        if (is("number") && !(has("minimum") && has("maximum"))) || (is("integer") && !has("minimum") && !has("enum")) {
+            found.push(place.to_owned());
+        }
+        for (name, field) in schema["properties"].as_object().into_iter().flatten() {
+            without_range(field, &format!("{place}.{name}"), found);
+        }
+        for part in schema["oneOf"].as_array().into_iter().flatten().chain(schema.get("items")) {
+            without_range(part, place, found);
+        }
+    }
+
+    #[test]
+    fn every_number_of_settings_has_the_range_that_its_check_states() {
+        let document = openapi::value().unwrap();
+        let mut found = Vec::new();
+        for component in
+            ["GaitSettings", "SolveOptions", "LearnerSettings", "DeviceDefinition", "MuscleParameters", "EmgSettings"]
+        {
+            let schema = &document["components"]["schemas"][component];
+            assert!(schema["properties"].as_object().is_some_and(|fields| !fields.is_empty()), "{component}");
+            without_range(schema, component, &mut found);
+        }
+        assert!(found.is_empty(), "{found:?}");
+    }
 }

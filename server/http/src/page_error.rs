@@ -75,7 +75,7 @@ pub fn page(template: &impl Template) -> PageResult {
 
 /// Handles addresses without a route.
 pub(crate) async fn no_such_page(uri: Uri) -> Refusal {
-    Refusal(Error::NotFound { what: "address".to_owned(), id: uri.path().to_owned() })
+    Refusal(Error::NoAddress(uri.path().to_owned()))
 }
 
 /// Handles methods that a route does not have.
@@ -97,6 +97,6 @@ mod tests {
     fn page_names_no_identifier_of_a_missing_object() {
         let shown = without_identifier("There is no lab session 01890000-0000-7000-8000-000000000000.");
         assert_eq!(shown.as_deref(), Some("There is no such lab session, or you have no access to it."));
-        assert_eq!(without_identifier("There is no address /nothing."), None);
+        assert_eq!(without_identifier("The address /nothing does not exist."), None);
     }
 }

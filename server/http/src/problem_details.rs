@@ -75,7 +75,7 @@ impl From<&Error> for Problem {
     fn from(error: &Error) -> Self {
         let detail = error.to_string();
         match error {
-            Error::NotFound { .. } => Self::new(ProblemKind::NotFound, detail),
+            Error::NotFound { .. } | Error::NoAddress(_) => Self::new(ProblemKind::NotFound, detail),
             Error::Malformed(_) => Self::new(ProblemKind::Malformed, detail),
             Error::Unreadable(field) => Self::new(ProblemKind::Malformed, detail).of(field),
             Error::UnsupportedMediaType(_) => Self::new(ProblemKind::UnsupportedMediaType, detail),

@@ -101,7 +101,7 @@ impl ProblemKind {
             Self::NotSignedIn => entry(
                 "/problems/not-signed-in",
                 StatusCode::UNAUTHORIZED,
-                "Sign in first",
+                "Not signed in",
                 "The request has no session or token, or the session or token has expired.",
                 "Sign in again, or ask an administrator for a new token and send it as Authorization: Bearer TOKEN.",
             ),

@@ -70,7 +70,8 @@ fn unreadable(path: &str, message: &str, pairs: &Pairs, others: &[&str]) -> Erro
         message,
         field: field.to_owned(),
         value: value.map(Into::into),
-        allowed: Some(allowed),
+        // No value of an unknown parameter is allowed.
+        allowed: (!unknown).then_some(allowed),
     }))
 }
 
@@ -200,5 +201,7 @@ mod tests {
         ] {
             assert_eq!(refusal(query), (field.to_owned(), message.to_owned()));
         }
+        let Err(Error::Unreadable(unknown)) = read::<Asked>(&pairs("number=1&nmber=2").unwrap(), &[]) else { panic!() };
+        assert_eq!(unknown.allowed, None, "no value of an unknown parameter is allowed");
     }
 }

@@ -82,18 +82,16 @@ impl From<FieldError> for Error {
 
 impl From<ModelError> for FieldError {
     fn from(error: ModelError) -> Self {
-        let message = error.to_string();
+        let (message, allowed) = (error.to_string(), error.allowed());
         match error {
-            ModelError::OutOfRange { field, value, minimum, maximum } => {
-                Self { field, value: Some(value.into()), allowed: Some(format!("{minimum} to {maximum}")), message }
+            ModelError::OutOfRange { field, value, .. } | ModelError::MustBeAbsent { field, value, .. } => {
+                Self { field, value: Some(value.into()), allowed, message }
             }
-            ModelError::Unknown { field, value, known } => {
-                Self { field, value: Some(value.into()), allowed: Some(known), message }
-            }
+            ModelError::Unknown { field, value, .. } => Self { field, value: Some(value.into()), allowed, message },
             ModelError::Malformed { what, .. } => {
                 // The message has line and column of a file; the field is that of the request.
                 let field = what.split_once(", line ").map_or(what.as_str(), |(field, _)| field).to_owned();
-                Self { field, value: None, allowed: None, message }
+                Self { field, value: None, allowed, message }
             }
         }
     }
@@ -110,6 +108,9 @@ pub enum Error {
         /// Its identifier, as given.
         id: String,
     },
+    /// The request names an address that does not exist.
+    #[error("The address {0} does not exist.")]
+    NoAddress(String),
     /// The request cannot be read.
     #[error("{0}")]
     Malformed(String),

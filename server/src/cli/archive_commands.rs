@@ -26,6 +26,7 @@ pub(super) struct Export {
     #[arg(value_parser = study)]
     study: StudyId,
     /// New file for the archive.
+    #[arg(value_name = "FILE")]
     to: PathBuf,
     #[command(flatten)]
     pub(super) record: RecordFlags,
@@ -53,7 +54,8 @@ impl Export {
 
 #[derive(Debug, Args)]
 pub(super) struct Import {
-    /// Archive made by `gaitwright export`.
+    /// Archive made by `gaitwright export` or downloaded from the service.
+    #[arg(value_name = "FILE")]
     from: PathBuf,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
@@ -78,6 +80,7 @@ impl Import {
 #[derive(Debug, Args)]
 pub(super) struct NewKey {
     /// New file for the private key, which only its owner can read.
+    #[arg(value_name = "FILE")]
     to: PathBuf,
 }
 

@@ -11,6 +11,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct Backup {
     /// New file for the backup.
+    #[arg(value_name = "FILE")]
     to: PathBuf,
     #[command(flatten)]
     pub(super) record: RecordFlags,
@@ -32,7 +33,8 @@ impl Backup {
 
 #[derive(Debug, Args)]
 pub(super) struct Restore {
-    /// Backup made by `gaitwright backup`.
+    /// Backup made by `gaitwright backup` or by the service.
+    #[arg(value_name = "FILE")]
     from: PathBuf,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,

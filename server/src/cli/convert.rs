@@ -1,6 +1,7 @@
 //! `gaitwright convert`: converts a gait for other programs. Not to controller files: only the record knows safety
 //! reports.
 
+use super::flag_names::of_flags;
 use super::flag_numbers::number;
 use super::gait_file::read_gait_file;
 use super::out_file::OutFile;
@@ -32,7 +33,7 @@ pub(super) struct Convert {
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
     /// Target format.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, value_name = "FORMAT")]
     to: TargetFormat,
     /// Sampling rate of `mot`, 10 to 5000.
     #[arg(long, value_name = "HZ", default_value = "200", value_parser = number, allow_negative_numbers = true)]
@@ -48,7 +49,9 @@ impl Convert {
         let out = OutFile::instead_of_stdout(self.out.as_deref(), &[&self.gait])?;
         let text = match self.to {
             TargetFormat::Csv => gait_csv(&gait),
-            TargetFormat::Mot => motion_file(&gait, self.rate_hz)?,
+            TargetFormat::Mot => {
+                motion_file(&gait, self.rate_hz).map_err(|error| of_flags(error, &[("rate_hz", "--rate-hz")]))?
+            }
             TargetFormat::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),
             TargetFormat::Animation => gait_charts::animation(WalkerFigure::new(&gait)?).svg(),
         };

@@ -1,6 +1,7 @@
 //! `gaitwright emg`: processes EMG recordings to muscle activity over the gait cycle.
 
 use super::flag_choices::{EMG_FORMATS, one_of};
+use super::flag_names::of_flags;
 use super::flag_numbers::{filter_order, number};
 use super::out_file::OutFile;
 use super::output::data;
@@ -34,7 +35,7 @@ pub(super) struct Emg {
     /// Column of right heel strikes in both files: a switch under the heel, or the vertical force under the foot.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["heel_strikes_s", "normal_heel_strikes_s"])]
     heel_strike_column: Option<String>,
-    /// Value of that column above which the foot is on the ground.
+    /// Value of the --heel-strike-column, in the unit of the column, above which the foot is on the ground.
     #[arg(long, value_name = "NUMBER", default_value = "0.5", value_parser = number, allow_negative_numbers = true)]
     heel_strike_threshold: f64,
     /// Times of right heel strikes in the recording, as in 0.41,1.52,2.63.
@@ -103,15 +104,21 @@ struct EmgResults {
 impl Emg {
     pub(super) fn run(self) -> Result<(), Error> {
         let settings = self.filters.settings();
-        let (recording, strikes) = self.read(&self.recording, &self.heel_strikes_s)?;
-        let envelopes = recording.envelopes(&settings)?;
+        let (recording, strikes) = self.read(&self.recording, (&self.heel_strikes_s, "--heel-strikes-s"))?;
+        let filters = [
+            ("emg.band_low_hz", "--band-low-hz"),
+            ("emg.band_high_hz", "--band-high-hz"),
+            ("emg.envelope_hz", "--envelope-hz"),
+            ("emg.order", "--order"),
+        ];
+        let envelopes = recording.envelopes(&settings).map_err(|error| of_flags(error, &filters))?;
         let measured = recording.cycles(&strikes, &settings)?;
         let activity = match &self.normal {
             Some(path) => {
-                let (normal, strikes) = self.read(path, &self.normal_heel_strikes_s)?;
+                let (normal, strikes) = self.read(path, (&self.normal_heel_strikes_s, "--normal-heel-strikes-s"))?;
                 if normal == recording {
                     let allowed = "a recording other than the one being processed";
-                    return Err(Error::invalid("normal", path.display().to_string(), allowed));
+                    return Err(Error::invalid("--normal", path.display().to_string(), allowed));
                 }
                 Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?
             }
@@ -135,7 +142,7 @@ impl Emg {
         }
     }
 
-    fn read(&self, path: &Path, heel_strikes_s: &[f64]) -> Result<(EmgRecording, Vec<f64>), Error> {
+    fn read(&self, path: &Path, (heel_strikes_s, flag): (&[f64], &str)) -> Result<(EmgRecording, Vec<f64>), Error> {
         let reading = EmgReading {
             format: self.format,
             rate_hz: self.rate_hz,
@@ -145,7 +152,15 @@ impl Emg {
             heel_strike_threshold: self.heel_strike_threshold,
             ..EmgReading::default()
         };
-        let (recording, strikes) = reading.read(&path.display().to_string(), &read(path)?)?;
+        let flags = [
+            ("rate_hz", "--rate-hz"),
+            ("reading.rate_hz", "--rate-hz"),
+            ("reading.channels", "--channels"),
+            ("heel_strikes_s", flag),
+            ("reading.heel_strikes_s", flag),
+        ];
+        let found = reading.read(&path.display().to_string(), &read(path)?);
+        let (recording, strikes) = found.map_err(|error| of_flags(error, &flags))?;
         recording.check_channels()?;
         Ok((recording, strikes))
     }

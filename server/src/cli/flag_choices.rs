@@ -12,7 +12,7 @@ pub(super) const JOINT_ANGLE_FORMATS: [FlagChoice; 3] = [
     ("opensim", "OpenSim motion or storage file (.mot, .sto) of a gait model"),
     (
         "camargo",
-        "The `data` table of an `ik` file from the data set Camargo 2021, exported as CSV with MATLAB's writetable",
+        "The `data` table of an `ik` file from the Camargo 2021 data set, exported as CSV with MATLAB's writetable",
     ),
     (
         "csv",

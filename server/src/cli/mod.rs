@@ -11,6 +11,7 @@ mod database_file;
 mod doctor;
 mod emg;
 mod flag_choices;
+mod flag_names;
 mod flag_numbers;
 mod gait_file;
 mod lineage;
@@ -80,7 +81,7 @@ enum Command {
     Serve(serve::Serve),
     /// Run solves on this machine for a service on another machine, through a NATS broker.
     Worker(worker::Worker),
-    /// Run an unattended study in which Gait RMSE, not a person, decides the comparisons.
+    /// Run an unattended study in which Gait RMSE, not a person, answers the comparisons.
     ///
     /// If the record has an unfinished study with the same settings, continues it instead of creating another one.
     Tune(tune::Tune),
@@ -92,19 +93,19 @@ enum Command {
     Sweep(sweep::Sweep),
     /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
     Certify(certify::Certify),
-    /// Simulate walks with a gait on uneven ground, under laboratory controllers.
+    /// Simulate walks with a gait on level and uneven ground, under laboratory controllers.
     Simulate(simulate::Simulate),
     /// Convert a gait to a table, an OpenSim motion or a picture.
     Convert(convert::Convert),
     /// Compute a reference gait from a recording of joint angles.
     Reference(reference::Reference),
-    /// Process an EMG recording: envelopes, mean cycles, EMG RMSE, average activation.
+    /// Process an EMG recording: envelopes, mean cycles, EMG RMSE, average activity.
     Emg(emg::Emg),
     /// Verify the integrity of a record.
     Audit(audit::Audit),
     /// Show the settings of the service.
     Config(config::Config),
-    /// Check the machine, the settings and the record. Exits with 1 if anything is wrong.
+    /// Check the machine, the settings and the record. Exits with status 1 if anything is wrong.
     ///
     /// The output is meant for bug reports: it contains no subject data and no secrets.
     Doctor(doctor::Doctor),

@@ -25,7 +25,7 @@ impl OutFile {
     /// [`Error::Malformed`] with the reason when it cannot.
     pub(super) fn open(path: &Path, inputs: &[&Path]) -> Result<Self, Error> {
         if path == Path::new("-") {
-            return Err(failed(path, "- is not a file"));
+            return Err(Error::Malformed("Cannot write to \"-\", which is not a file name. Give a file.".to_owned()));
         }
         let known = path.canonicalize().ok();
         if let (Some(known), Some(input)) = (&known, inputs.iter().find(|i| i.canonicalize().ok() == known)) {
@@ -54,7 +54,8 @@ impl OutFile {
     /// [`Error::Malformed`] with the reason when it cannot.
     pub(super) fn instead_of_stdout(path: Option<&Path>, inputs: &[&Path]) -> Result<Option<Self>, Error> {
         if path == Some(Path::new("-")) {
-            return Err(Error::Malformed("- is not a file. Omit --out to write to standard output.".to_owned()));
+            let why = "Cannot write to \"-\", which is not a file name. Omit --out to write to standard output.";
+            return Err(Error::Malformed(why.to_owned()));
         }
         path.map(|path| Self::open(path, inputs)).transpose()
     }

@@ -1,5 +1,6 @@
 //! Flags of the gait problem, warm-start files and cancellation, shared by `solve` and `sweep`.
 
+use super::flag_names::of_flags;
 use super::flag_numbers::{iterations, number};
 use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
 use super::output::tell;
@@ -86,6 +87,16 @@ pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> 
     if let Some((_, builtin)) = ReferenceGait::all_builtin()?.into_iter().find(|(name, _)| path.as_os_str() == *name) {
         return Ok(builtin);
     }
+    if let Err(error) = std::fs::metadata(path)
+        && error.kind() == std::io::ErrorKind::NotFound
+    {
+        let names: Vec<&str> = ReferenceGait::all_builtin()?.into_iter().map(|(name, _)| name).collect();
+        return Err(Error::Malformed(format!(
+            "There is no reference gait {}: give {} or a file. (No such file or directory)",
+            path.display(),
+            names.join(", ")
+        )));
+    }
     read_document(path, "a reference gait", |read: &ReferenceGait| Ok(read.validate()?))
 }
 
@@ -137,7 +148,9 @@ impl ProblemFlags {
         let mut options = SolveOptions { time_limit_s: self.time_limit_s, ..self.files.options()? };
         options.tolerance = self.tolerance.unwrap_or(options.tolerance);
         options.max_iterations = self.max_iterations.unwrap_or(options.max_iterations);
-        options.validate()?;
+        let flags =
+            [("tolerance", "--tolerance"), ("max_iterations", "--max-iterations"), ("time_limit_s", "--time-limit-s")];
+        options.validate().map_err(|error| of_flags(error, &flags))?;
         Ok(options)
     }
 

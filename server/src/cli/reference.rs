@@ -1,6 +1,7 @@
 //! `gaitwright reference`: computes a reference gait from a recording.
 
 use super::flag_choices::{ANGLE_UNITS, HEEL_STRIKES, JOINT_ANGLE_FORMATS, one_of};
+use super::flag_names::of_flags;
 use super::flag_numbers::number;
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -24,12 +25,12 @@ pub(super) struct Reference {
     /// Unit of angles, if the header of an OpenSim file does not state it.
     #[arg(long, value_parser = one_of::<Unit>(ANGLE_UNITS))]
     unit: Option<Unit>,
-    /// Column of the vertical force under the right foot (default with --forces: ground_force_vy, or Treadmill_R_vy for
-    /// Camargo 2021).
+    /// Column of the vertical force under the right foot (default with --forces: ground_force_vy, or Treadmill_R_vy
+    /// with --format camargo).
     #[arg(long, value_name = "NAME")]
     force_column: Option<String>,
-    /// Separate file with the force column: an OpenSim file, or the fp table as CSV with --format camargo. Both files
-    /// must have the same time axis.
+    /// Separate file with the force column: an OpenSim file or, with --format camargo, the `fp` table as CSV. Both
+    /// files must have the same time axis.
     #[arg(long, value_name = "FILE")]
     forces: Option<PathBuf>,
     /// How to find right heel strikes.
@@ -64,7 +65,14 @@ impl Reference {
             body_mass_kg: self.mass_kg,
         };
         let forces = self.forces.as_ref().map_or_else(String::new, |path| path.display().to_string());
-        let reference = new.definition(&self.recording.display().to_string(), &forces)?;
+        let flags = [
+            ("name", "--name"),
+            ("heel_strikes_s", "--heel-strikes-s"),
+            ("height_m", "--height-m"),
+            ("body_mass_kg", "--mass-kg"),
+        ];
+        let reference = new.definition(&self.recording.display().to_string(), &forces);
+        let reference = reference.map_err(|error| of_flags(error, &flags))?;
         let inputs: Vec<&Path> =
             [Some(&self.recording), self.forces.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
         let out = OutFile::instead_of_stdout(self.out.as_deref(), &inputs)?;

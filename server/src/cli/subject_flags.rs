@@ -1,5 +1,6 @@
 //! Flags for the subject and the variant.
 
+use super::flag_names::of_flags;
 use super::flag_numbers::{number, subject};
 use clap::{Args, ValueEnum};
 use gait_optimizer::Subject;
@@ -22,10 +23,12 @@ pub(super) struct SubjectFlags {
 impl SubjectFlags {
     /// The subject, validated.
     pub(super) fn subject(&self) -> Result<Subject, Error> {
-        Ok(match (self.height_m, self.mass_kg) {
-            (Some(height), Some(mass)) => Subject::new(height, mass)?,
-            _ => Subject::builtin(self.subject.unwrap_or(1))?,
-        })
+        let subject = match (self.height_m, self.mass_kg) {
+            (Some(height), Some(mass)) => Subject::new(height, mass),
+            _ => Subject::builtin(self.subject.unwrap_or(1)),
+        };
+        let flags = [("height_m", "--height-m"), ("body_mass_kg", "--mass-kg"), ("subject", "--subject")];
+        subject.map_err(|error| of_flags(error, &flags))
     }
 }
 

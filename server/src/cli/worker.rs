@@ -29,7 +29,7 @@ pub(super) struct Worker {
     /// Number of solves that run in parallel (default: number of cores).
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
-    /// Name of this worker in the record (default: host and process).
+    /// Name of this worker in the record (default: host name and process ID).
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 }
@@ -52,7 +52,7 @@ impl Worker {
         let (url, queue) = settings.nats()?.ok_or_else(missing)?;
         let name = self.name.unwrap_or_else(|| format!("{} {}", host(), std::process::id()));
         if name.is_empty() || name.chars().count() > 200 {
-            return Err(Error::invalid("name", name, "1 to 200 characters long"));
+            return Err(Error::invalid("--name", name, "1 to 200 characters long"));
         }
         let size = cores_or(self.workers);
         let solver = Arc::new(GaitSolver);

@@ -48,7 +48,7 @@ pub enum StoreError {
     /// A newer version of the program wrote the file.
     #[error(
         "The database {} has schema version {found}, but this program supports versions up to {known}. Nothing was changed. Use \
-         a newer gaitwright.",
+         a newer version of gaitwright.",
         path.display()
     )]
     NewerSchema {
@@ -86,7 +86,7 @@ pub enum StoreError {
     },
     /// The database file or its log was deleted, replaced or truncated while the record was open.
     #[error(
-        "The record {} accepts no changes, because {what} while it was open. Changes that were already acknowledged may be lost \
+        "The record {} accepts no changes. While it was open, {what}. Changes that were already acknowledged may be lost \
          when the process ends. Stop the service, then run `gaitwright audit verify`.",
         path.display()
     )]
@@ -100,7 +100,7 @@ pub enum StoreError {
     #[error(
         "The record {} ends with row {found} of {table}, but its anchor {} lists row {seen}, so acknowledged changes are missing. \
          Nothing was changed. Put the missing log or a newer copy in place. If this copy \
-         is the right one, restore it (`gaitwright restore`); to verify it alone, give an empty second anchor (--anchor '').",
+         is the right one, restore it (`gaitwright restore`); to verify it without a second anchor, give an empty name (`--anchor ''`).",
         record.display(), anchor.display()
     )]
     CutOff {
@@ -119,7 +119,7 @@ pub enum StoreError {
     #[error(
         "Row {seq} of {table} in the record {} differs from the one that its anchor {} lists: its history was rewritten, or this \
          is another record. Nothing was changed. If this record is the right one, restore it (`gaitwright restore`); \
-         to verify it alone, give an empty second anchor (--anchor '').",
+         to verify it without a second anchor, give an empty name (`--anchor ''`).",
         record.display(), anchor.display()
     )]
     Rewritten {
@@ -178,7 +178,7 @@ pub enum StoreError {
     },
     /// A record or a backup is damaged, so it was not copied.
     #[error(
-        "{} does not verify, so it was not copied and nothing was changed. {reason} Use a record or a backup that \
+        "{} failed verification, so it was not copied and nothing was changed. {reason} Use a record or a backup that \
          `gaitwright audit verify` finds intact.",
         path.display()
     )]
@@ -190,7 +190,8 @@ pub enum StoreError {
     },
     /// A restore was killed before it was complete.
     #[error(
-        "A restore of {} was interrupted. Start the service or run `gaitwright restore` again, which finishes or undoes it.",
+        "A restore of {} was interrupted. Start the service or run `gaitwright restore` again; either finishes or undoes the \
+         restore.",
         path.display()
     )]
     RestoreInterrupted {

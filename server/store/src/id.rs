@@ -10,8 +10,8 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 macro_rules! identifier {
-    ($name:ident, $what:literal) => {
-        #[doc = concat!("Identifier of a ", $what, ".")]
+    ($(#[$($attribute:tt)*])* $name:ident) => {
+        $(#[$($attribute)*])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
         #[serde(transparent)]
         #[schema(value_type = String, format = Uuid)]
@@ -66,26 +66,86 @@ macro_rules! identifier {
     };
 }
 
-identifier!(SubjectId, "subject");
-identifier!(DeviceId, "device");
-identifier!(ReferenceGaitId, "reference gait");
-identifier!(StudyId, "study");
-identifier!(TrialId, "trial");
-identifier!(FeedbackId, "feedback row");
-identifier!(JobId, "job");
-identifier!(BackupId, "backup");
-identifier!(UserId, "user");
-identifier!(TokenId, "token");
-identifier!(MemberId, "membership in a study");
-identifier!(SessionId, "session of a user");
-identifier!(BlindPairId, "blind pair");
-identifier!(AssessmentId, "assessment");
-identifier!(SafetyReportId, "safety report");
-identifier!(SafetyReviewId, "safety review");
-identifier!(LabSessionId, "lab session");
-identifier!(MeasurementFileId, "measurement file of a lab session");
-identifier!(ControllerFileDownloadId, "download of a controller file");
-identifier!(EmgResultId, "result of EMG processing");
+identifier!(
+    /// Identifier of a subject.
+    SubjectId
+);
+identifier!(
+    /// Identifier of a device.
+    DeviceId
+);
+identifier!(
+    /// Identifier of a reference gait.
+    ReferenceGaitId
+);
+identifier!(
+    /// Identifier of a study.
+    StudyId
+);
+identifier!(
+    /// Identifier of a trial.
+    TrialId
+);
+identifier!(
+    /// Identifier of an entry of the feedback of a study.
+    FeedbackId
+);
+identifier!(
+    /// Identifier of a job.
+    JobId
+);
+identifier!(
+    /// Identifier of a backup.
+    BackupId
+);
+identifier!(
+    /// Identifier of a user.
+    UserId
+);
+identifier!(
+    /// Identifier of a token.
+    TokenId
+);
+identifier!(
+    /// Identifier of a membership in a study.
+    MemberId
+);
+identifier!(
+    /// Identifier of a sign-in session of a user.
+    SessionId
+);
+identifier!(
+    /// Identifier of a blind pair.
+    BlindPairId
+);
+identifier!(
+    /// Identifier of an assessment.
+    AssessmentId
+);
+identifier!(
+    /// Identifier of a safety report.
+    SafetyReportId
+);
+identifier!(
+    /// Identifier of a safety review.
+    SafetyReviewId
+);
+identifier!(
+    /// Identifier of a lab session.
+    LabSessionId
+);
+identifier!(
+    /// Identifier of a measurement file of a lab session.
+    MeasurementFileId
+);
+identifier!(
+    /// Identifier of a controller file of a lab session.
+    ControllerFileDownloadId
+);
+identifier!(
+    /// Identifier of a result of EMG processing.
+    EmgResultId
+);
 
 macro_rules! holds_safety_reports {
     ($($name:ident),*) => {

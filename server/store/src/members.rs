@@ -115,7 +115,10 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Me
 /// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: MemberId) -> StoreResult<Member> {
     let row = sqlx::query(AssertSqlSafe(format!("{MEMBERS} where m.id = ?"))).bind(id).fetch_optional(db).await?;
-    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "member", id: id.to_string() })
+    row.as_ref()
+        .map(from_row)
+        .transpose()?
+        .ok_or_else(|| StoreError::Missing { what: "membership", id: id.to_string() })
 }
 
 /// Adds a member.

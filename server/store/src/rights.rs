@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// A right of a user or a token: `read`, everything except blinded data; `run`, create, start, pause and stop studies,
-/// plan lab sessions, and evaluate trials by scripts; `answer`, give preferences without blinding, and review safety
-/// reports; `rate`, compare gaits blind, and record walks and answers in lab sessions; `device`, fetch the controller
-/// files of walks; `administer`, manage users and tokens, unblind, read the audit trail and make backups. The scopes of
-/// a token are rights other than `administer`.
+/// A right of a user or a token: `read`, see everything except blinded data; `run`, create, start, pause and stop
+/// studies, plan lab sessions, and evaluate trials by scripts; `answer`, give preferences without blinding, and review
+/// safety reports; `rate`, compare gaits blind, and record walks and answers in lab sessions; `device`, fetch the
+/// controller files of walks; `administer`, manage users and tokens, unblind, read the audit trail and make backups.
+/// The scopes of a token are rights other than `administer`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Right {
-    /// Read everything except blinded data.
+    /// See everything except blinded data.
     Read,
     /// Create, start, pause and stop studies; evaluate trials by scripts.
     Run,

@@ -307,7 +307,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
                 r.add("feedback", row.clone());
             }
         },
-        "has answered this comparison already",
+        "has already answered this comparison",
     ),
     (
         "an answer from before its trials",

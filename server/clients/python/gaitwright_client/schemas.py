@@ -13,24 +13,27 @@ AccessKind = Literal["view", "export", "refused"]
 # What a person states instead of a preference between two gaits.
 AssessmentAnswer = Literal["cannot_tell", "unsafe_a", "unsafe_b", "unsafe_both"]
 
+# Identifier of an assessment.
 AssessmentId = str
 
 # What exactly was changed; its fields depend on the kind of change.
 AuditDetail = dict[str, Any]
 
+# Identifier of a backup.
 BackupId = str
 
 # Bytes that are not text, such as a picture or an archive.
 Binary = bytes
 
+# Identifier of a blind pair.
 BlindPairId = str
 
 # Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement.
 BlindPairKind = Literal["new", "repeat"]
 
-# State of the certificate of a gait: `passed`, every check is within its limit, the walker does not fall and the gait
-# is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified; `not_certified`,
-# the gait has no certificate.
+# State of the certificate of a gait: `passed`, every checked value is within its limit, the walker does not fall and
+# the gait is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified;
+# `not_certified`, the gait has no certificate.
 CertificateState = Literal["passed", "failed", "being_certified", "not_certified"]
 
 # Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
@@ -42,11 +45,13 @@ ConsentKind = Literal["given", "withdrawn"]
 # The file that the controller of a device reads. It describes its own fields.
 ControllerFile = dict[str, Any]
 
+# Identifier of a device.
 DeviceId = str
 
 # What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report outcomes.
 Evaluation = Literal["optimizer", "script"]
 
+# Identifier of an entry of the feedback of a study.
 FeedbackId = str
 
 # Who answers comparisons: `automatic`, Gait RMSE answers every comparison; `human`, people answer, and the study waits
@@ -68,7 +73,7 @@ JobKind = Literal["backup", "certificate", "execution_report", "explanation", "s
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 # File format of a recording of joint angles: `opensim`, a motion or storage file (.mot, .sto) of a gait model;
-# `camargo`, the `data` table of an `ik` file from the data set Camargo 2021 as CSV; `csv`, a CSV file as `/help/data-
+# `camargo`, the `data` table of an `ik` file from the Camargo 2021 data set, as CSV; `csv`, a CSV file as `/help/data-
 # files` describes it.
 JointAngleFormat = Literal["opensim", "camargo", "csv"]
 
@@ -78,12 +83,14 @@ Judgement = Literal[
     "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
 ]
 
+# Identifier of a lab session.
 LabSessionId = str
 
 # State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `closed`, the
 # session accepts no more data.
 LabSessionState = Literal["planned", "under_way", "closed"]
 
+# Identifier of a measurement file of a lab session.
 MeasurementFileId = str
 
 # Format of a measurement file: `csv`, comma-separated values with column names in the first line; `opensim`, a motion
@@ -93,6 +100,7 @@ MeasurementFormat = Literal["csv", "opensim"]
 # Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
 MeasurementKind = Literal["emg", "motion"]
 
+# Identifier of a membership in a study.
 MemberId = str
 
 # Kind of member.
@@ -110,13 +118,14 @@ PersonSource = Literal["subject", "clinician", "script"]
 # A reference gait: joint angles over the gait cycle, the measured person, and the processing.
 ReferenceGaitDocument = dict[str, Any]
 
+# Identifier of a reference gait.
 ReferenceGaitId = str
 
-# A right of a user or a token: `read`, everything except blinded data; `run`, create, start, pause and stop studies,
-# plan lab sessions, and evaluate trials by scripts; `answer`, give preferences without blinding, and review safety
-# reports; `rate`, compare gaits blind, and record walks and answers in lab sessions; `device`, fetch the controller
-# files of walks; `administer`, manage users and tokens, unblind, read the audit trail and make backups. The scopes of a
-# token are rights other than `administer`.
+# A right of a user or a token: `read`, see everything except blinded data; `run`, create, start, pause and stop
+# studies, plan lab sessions, and evaluate trials by scripts; `answer`, give preferences without blinding, and review
+# safety reports; `rate`, compare gaits blind, and record walks and answers in lab sessions; `device`, fetch the
+# controller files of walks; `administer`, manage users and tokens, unblind, read the audit trail and make backups. The
+# scopes of a token are rights other than `administer`.
 Right = Literal["read", "run", "answer", "rate", "device", "administer"]
 
 # Role of a user: `admin` has every right; `clinician` runs studies and gives preferences; `rater` compares gaits blind
@@ -126,10 +135,13 @@ Role = Literal["admin", "clinician", "rater"]
 # Decision of a safety review: `walkable`, the gait is cleared for walking; `unsafe`, it remains marked as unsafe.
 SafetyDecision = Literal["walkable", "unsafe"]
 
+# Identifier of a safety report.
 SafetyReportId = str
 
+# Identifier of a safety review.
 SafetyReviewId = str
 
+# Identifier of a sign-in session of a user.
 SessionId = str
 
 # Input for `gaitwright solve --problem`: subject, device, bounds, settings, reference gait, limits and warm start.
@@ -153,6 +165,7 @@ StartedFrom = Literal["cold", "warm", "cold_after_warm"]
 # stride.
 Strikes = Literal["force", "kinematics", "ends"]
 
+# Identifier of a study.
 StudyId = str
 
 # State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer from a
@@ -160,10 +173,13 @@ StudyId = str
 # a user or a program.
 StudyState = Literal["draft", "running", "waiting", "paused", "finished", "stopped"]
 
+# Identifier of a subject.
 SubjectId = str
 
+# Identifier of a token.
 TokenId = str
 
+# Identifier of a trial.
 TrialId = str
 
 # State of a trial. `queued` and `running` trials are open. `converged` and `not_converged` are results; `failed`
@@ -173,6 +189,7 @@ TrialState = Literal["queued", "running", "converged", "not_converged", "failed"
 # Unit of angles.
 Unit = Literal["degrees", "radians"]
 
+# Identifier of a user.
 UserId = str
 
 
@@ -219,7 +236,7 @@ class ActiveConstraint(TypedDict):
     place: str
 
 
-class Answered(TypedDict):
+class AnswerReceipt(TypedDict):
     """Confirmation of a rater's answer. The response is stored, and sent again if the request is repeated. It omits
     the gaits and the answer, because others who can read the study must not learn which gait was shown on which
     side.
@@ -260,9 +277,9 @@ class _AssessmentRequired(TypedDict):
 class Assessment(_AssessmentRequired, total=False):
     """A recorded assessment."""
 
-    # Preference that was derived from it, if any.
+    # Preference that was derived from it. Null if there is none.
     feedback_id: Optional[FeedbackId]
-    # Retraction, if it was retracted.
+    # Retraction. Null if the assessment was not retracted.
     retraction: Optional[Retraction]
 
 
@@ -371,8 +388,19 @@ class BoundAtLimit(TypedDict):
     value: float
 
 
+class BoundValue(TypedDict):
+    """A tuned bound with its given value."""
+
+    # Name of the bound.
+    bound: str
+    # What it limits, with its unit.
+    meaning: str
+    # Value of the bound in the problem.
+    value: float
+
+
 class Bounds(TypedDict):
-    """The tuned bounds of one action."""
+    """Values of the bounds a1 to a8."""
 
     # Maximum coordinate velocity, rad/s.
     a1: float
@@ -399,7 +427,7 @@ class _CertificateRequired(TypedDict):
     failures: list[str]
     # Version of this layout and of its checks.
     format_version: int
-    # Whether every check is within its limit, the walker does not fall, and the gait is stable.
+    # Whether every checked value is within its limit, the walker does not fall, and the gait is stable.
     passed: bool
 
 
@@ -410,11 +438,12 @@ class Certificate(_CertificateRequired, total=False):
     certified: Optional[CertifiedGait]
     # How the simulation ended early; null if it did not.
     fall: Optional[str]
-    # The stride-to-stride map with a free hip velocity (zero dynamics).
+    # The stride-to-stride map with a free hip velocity (zero dynamics). Null if the simulation ended early, or if the
+    # map could not be computed.
     free_hip_return_map: Optional[ReturnMap]
     # Largest pushes from which the walker recovers. Null if the gait is not stable.
     pushes: Optional[Pushes]
-    # The stride-to-stride map.
+    # The stride-to-stride map. Null if the simulation ended early.
     return_map: Optional[ReturnMap]
 
 
@@ -488,7 +517,7 @@ class Change(TypedDict, total=False):
     notes: Optional[str]
     # Number of trials that run in parallel.
     parallel_trials: Optional[int]
-    # Priority, -10 to 10. Higher values run first.
+    # Priority, -10 to 10. Studies with a higher priority run first.
     priority: Optional[int]
     # Tags, at most 10 of at most 40 characters. They replace the present ones.
     tags: Optional[list[str]]
@@ -503,10 +532,10 @@ class Closing(TypedDict, total=False):
 
 class _ConflictRequired(TypedDict):
     # The bounds. Empty if the fixed constraints conflict with each other.
-    bounds: list[GivenBound]
+    bounds: list[BoundValue]
     # Number of starting points of the search.
     starts: int
-    # Whether a solve gave up. If so, infeasibility is not certain.
+    # Whether a solve ended undecided, such as `stalled` or `time_limit`. If so, infeasibility is not certain.
     undecided: bool
     # Violations in the motion closest to feasibility that the search found, with all other tuned bounds at their
     # loosest, worst first.
@@ -534,7 +563,7 @@ class Consent(TypedDict):
     created_at: Instant
     # Consent or withdrawal.
     kind: ConsentKind
-    # For consent, the name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
+    # For consent, the name and version of the signed form. For a withdrawal, the reason, or `none given`.
     note: str
     # Sequence number.
     seq: int
@@ -556,7 +585,7 @@ class ControllerFileDownload(TypedDict):
 class Correction(TypedDict):
     """Correction of height and mass."""
 
-    # Who corrected it.
+    # Who made the correction.
     actor: str
     # Corrected body mass, kg.
     body_mass_kg: float
@@ -603,16 +632,16 @@ class _FeedbackRowRequired(TypedDict):
 
 
 class FeedbackRow(_FeedbackRowRequired, total=False):
-    """Entry of the feedback log."""
+    """An entry of the feedback of a study."""
 
-    # Retraction, if it was retracted.
+    # Retraction. Null if the entry was not retracted.
     retraction: Optional[Retraction]
 
 
 class CreatedPreference(FeedbackRow):
     """Recorded preference."""
 
-    # Other people's answers to the same comparison; at most the newest twenty.
+    # Identifiers of other people's preferences about the same two gaits, at most the twenty newest.
     other_answers: list[FeedbackId]
 
 
@@ -632,9 +661,9 @@ class _TokenRequired(TypedDict):
 class Token(_TokenRequired, total=False):
     """Token of a program, without its secret."""
 
-    # Time of expiry. Absent if it does not expire.
+    # Time of expiry. Null if it does not expire.
     expires_at: Optional[Instant]
-    # Time of revocation, if it was revoked.
+    # Time of revocation. Null if it is not revoked.
     revoked_at: Optional[Instant]
 
 
@@ -650,9 +679,9 @@ class CycleActivity(TypedDict):
 
     # Name of the channel.
     channel: str
-    # Mean over strides.
+    # Mean over strides, relative to the peak of walk 1.
     mean: list[float]
-    # Standard deviation over strides; zero for one stride.
+    # Standard deviation over strides, relative to the peak of walk 1; zero for one stride.
     standard_deviation: list[float]
     # Number of strides.
     strides: int
@@ -672,37 +701,38 @@ class Device(TypedDict):
 
 
 class _DeviceDefinitionRequired(TypedDict):
-    # Radius of gyration of the adapter.
+    # Radius of gyration of the adapter, m.
     adapter_gyration_radius_m: float
-    # Mass of the adapter, midway between human and prosthetic knee.
+    # Mass of the adapter, which is midway between the human knee and the prosthetic knee, kg.
     adapter_mass_kg: float
-    # Height of the ankle above the sole.
+    # Height of the ankle above the sole, m.
     ankle_height_m: float
-    # Dorsiflexion stop.
+    # Dorsiflexion stop, rad.
     ankle_max_rad: float
-    # Plantarflexion stop (dorsiflexion positive).
+    # Plantarflexion stop, rad (dorsiflexion positive).
     ankle_min_rad: float
-    # Largest ankle torque.
+    # Largest ankle torque, N m.
     ankle_torque_limit_n_m: float
     # Whether the subject also carries their own shank and foot, with the knee bent, as with a bypass adapter.
     carried_limb: bool
-    # Distance of the foot's centre of mass below the ankle.
+    # Distance of the foot's centre of mass below the ankle, m.
     foot_com_down_m: float
-    # Distance of the foot's centre of mass ahead of the ankle.
+    # Distance of the foot's centre of mass ahead of the ankle, m.
     foot_com_forward_m: float
-    # Moment of inertia of the foot about its centre of mass.
+    # Moment of inertia of the foot about its centre of mass, kg m².
     foot_inertia_kg_m2: float
-    # Mass of the prosthetic foot with shoe.
+    # Mass of the prosthetic foot with shoe, kg.
     foot_mass_kg: float
-    # Distance of the heel contact behind the ankle.
+    # Distance of the heel contact behind the ankle, m.
     heel_behind_m: float
-    # Largest knee and ankle speed.
+    # Largest knee and ankle speed, rad/s.
     joint_speed_limit_rad_s: float
-    # Moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh.
+    # Moment of inertia, about its own centre of mass, of the part at the prosthetic knee that moves with the thigh, kg
+    # m².
     knee_housing_inertia_kg_m2: float
-    # Mass at the prosthetic knee that moves with the thigh.
+    # Mass at the prosthetic knee that moves with the thigh, kg.
     knee_housing_mass_kg: float
-    # Largest knee torque.
+    # Largest knee torque, N m.
     knee_torque_limit_n_m: float
     # Unique name.
     name: str
@@ -710,11 +740,11 @@ class _DeviceDefinitionRequired(TypedDict):
     shank_com_fraction: float
     # Radius of gyration of the shank about its centre of mass, in shank lengths.
     shank_gyration_fraction: float
-    # Distance from knee to ankle.
+    # Distance from knee to ankle, m.
     shank_length_m: float
-    # Mass of the prosthetic shank.
+    # Mass of the prosthetic shank, kg.
     shank_mass_kg: float
-    # Distance of the toe contact ahead of the ankle.
+    # Distance of the toe contact ahead of the ankle, m.
     toe_ahead_m: float
 
 
@@ -728,11 +758,12 @@ class DeviceDefinition(_DeviceDefinitionRequired, total=False):
 class Dimension(TypedDict):
     """One tuned bound of a search space."""
 
-    # How far apart two values can be while their gaits are still expected to have similar utility.
+    # How far apart two values can be, in the unit of the bound, while their gaits are still expected to have similar
+    # utility.
     lengthscale: float
     # Name of the bound.
     name: Literal["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]
-    # Its values, ascending.
+    # Values of the bound, in its unit, ascending.
     values: list[float]
 
 
@@ -748,7 +779,7 @@ class EmgReading(TypedDict, total=False):
     format: MeasurementFormat
     # Column of a switch under the right heel, or of the vertical force under the right foot.
     heel_strike_column: Optional[str]
-    # Value of that column above which the foot is on the ground.
+    # Value of `heel_strike_column`, in the unit of the column, above which the foot is on the ground.
     heel_strike_threshold: float
     # Times of right heel strikes, s, on the time axis of the file. If empty, they are detected in `heel_strike_column`.
     heel_strikes_s: list[float]
@@ -831,7 +862,7 @@ class ExecutionReport(_ExecutionReportRequired, total=False):
 
 
 class Extend(TypedDict):
-    """A larger trial budget."""
+    """A larger number of trials."""
 
     # Total number of trials. Must exceed the current budget.
     trial_budget: int
@@ -842,6 +873,7 @@ class FeedbackContentLabel(TypedDict):
 
     # Category: 0 for not converged, 1 for converged.
     category: int
+    # Kind of entry.
     kind: Literal["label"]
     # Identifier of the trial.
     trial: TrialId
@@ -850,6 +882,7 @@ class FeedbackContentLabel(TypedDict):
 class FeedbackContentPreference(TypedDict):
     """One trial is better than another."""
 
+    # Kind of entry.
     kind: Literal["preference"]
     # Worse trial.
     loser: TrialId
@@ -864,12 +897,14 @@ class FeedbackContentTie(TypedDict):
     a: TrialId
     # The other trial.
     b: TrialId
+    # Kind of entry.
     kind: Literal["tie"]
 
 
 class FeedbackContentSuggestion(TypedDict):
     """An action would have been better than a trial."""
 
+    # Kind of entry.
     kind: Literal["suggestion"]
     # Trial that it would have been better than.
     over: TrialId
@@ -895,7 +930,7 @@ class Fork(TypedDict, total=False):
 
 
 class StickFigure(TypedDict):
-    """Positions of the body at an instant: forward and up, m."""
+    """Points of the body at an instant as forward and upward coordinates, m."""
 
     # Hip.
     hip: list[float]
@@ -1001,7 +1036,7 @@ class GaitSettingsLimits(TypedDict, total=False):
     step_min_m: float
     # Minimum downward velocity of the toe at toe strike, m/s.
     toe_touchdown_m_s: float
-    # Minimum half width of the range of torso lean, rad. It applies if a6 is smaller.
+    # Minimum half-width of the range of torso lean, rad. It applies if a6 is smaller.
     torso_tolerance_rad: float
 
 
@@ -1019,7 +1054,7 @@ class GaitSettingsMesh(TypedDict, total=False):
 
 
 class GaitSettingsNaturalness(TypedDict, total=False):
-    """Naturalness terms beyond the paper."""
+    """Naturalness terms, which the paper does not have."""
 
     # Weight of the squared distance from the joint angles of the reference gait, relative to the cost of transport. 0
     # disables the term.
@@ -1055,23 +1090,12 @@ class GaitSettings(TypedDict, total=False):
     limits: GaitSettingsLimits
     # Number of mesh intervals of each kind of domain.
     mesh: GaitSettingsMesh
-    # Differences of the subject's muscles from the published table.
+    # Muscle values of the subject that differ from the default values.
     muscles: MuscleParameters
-    # Naturalness terms beyond the paper.
+    # Naturalness terms, which the paper does not have.
     naturalness: GaitSettingsNaturalness
     # Regularisation of the objective. Each weight multiplies the time integral of a square.
     regularisation: GaitSettingsRegularisation
-
-
-class GivenBound(TypedDict):
-    """A tuned bound with its given value."""
-
-    # Name of the bound.
-    bound: str
-    # What it limits, with its unit.
-    meaning: str
-    # Value of the bound in the problem.
-    value: float
 
 
 class GridStep(TypedDict):
@@ -1083,8 +1107,8 @@ class GridStep(TypedDict):
     gait_rmse_rad: float
     # Whether the same constraints stay active up to this value, to first order.
     keeps_active: bool
-    # The next stricter value of the search space, or the next looser one if the bound is already at its strictest
-    # value.
+    # The next stricter value of the search space, in the unit of the bound, or the next looser one if the bound is
+    # already at its strictest value.
     to: float
 
 
@@ -1113,7 +1137,7 @@ class _ImportRequired(TypedDict):
 class Import(_ImportRequired, total=False):
     """Import of a study."""
 
-    # Public key of the signer. Absent for an unsigned archive.
+    # Public key of the signer. Null for an unsigned archive.
     signed_by: Optional[str]
 
 
@@ -1129,7 +1153,7 @@ class Iteration(TypedDict):
 
     # Barrier parameter.
     barrier: float
-    # Largest violation of a scaled row.
+    # Largest violation of a scaled constraint.
     constraint_violation: float
     # Largest entry of the dual infeasibility.
     dual_infeasibility: float
@@ -1139,8 +1163,9 @@ class Iteration(TypedDict):
     iteration: int
     # Objective of the phase.
     objective: float
-    # `tracking` or `muscle_tracking`, of the reference gait without or with muscles; `plain_cost` or `cost`,
-    # minimisation of the cost of transport without or with muscles; `inter_node`, minimisation with tightened bounds.
+    # Phase of the solve: `tracking` and `muscle_tracking`, tracking of the reference gait without and with muscles;
+    # `plain_cost`, minimisation of the cost of transport without muscles, before that with muscles; `cost`,
+    # minimisation of the cost of transport; `inter_node`, minimisation with tightened bounds.
     phase: str
     # Primal step length.
     step: float
@@ -1183,7 +1208,7 @@ class JointRelaxation(TypedDict):
     solves: int
     # Number of starting points of the search at the `not_with` values.
     starts: int
-    # Whether a solve at the `not_with` values gave up. If so, infeasibility is not certain.
+    # Whether a solve at the `not_with` values ended undecided. If so, infeasibility is not certain.
     undecided: bool
 
 
@@ -1220,22 +1245,22 @@ class _LabSessionProgressRequired(TypedDict):
 class LabSessionProgress(_LabSessionProgressRequired, total=False):
     """Session as shown in the lab, without anything that reveals a gait."""
 
-    # Current answer of the subject.
+    # Current answer of the subject. Null if there is none.
     answer: Optional[LabAnswer]
-    # Number to send with the answer. Absent before the last walk and after an answer.
+    # Number to send with the answer. Null before the last walk and after an answer.
     answer_number: Optional[int]
-    # Time at which the last walk was recorded.
+    # Time at which the last walk was recorded. Null before the first walk.
     last_recorded: Optional[Instant]
-    # Number to send with a report of an unsafe walk. Absent until the subject may have walked with the device.
+    # Number to send with a report of an unsafe walk. Null until the subject may have walked with the device.
     report_number: Optional[int]
-    # Next walk, 1 to 3. Absent after the last walk and in a closed session.
+    # Next walk, 1 to 3. Null after the last walk and in a closed session.
     walk: Optional[int]
 
 
 class LabSessionStep(TypedDict):
     """Completed step of a session."""
 
-    # Who did it.
+    # Who completed the step.
     actor: str
     # Time of the step.
     created_at: Instant
@@ -1247,7 +1272,7 @@ class _LabSessionViewRequired(TypedDict):
     # Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
     # and then imported.
     allocation_included: bool
-    # Who fetched controller files of the walks.
+    # Downloads of the controller files of the walks.
     controller_files: list[ControllerFileDownload]
     # Time of planning.
     created_at: Instant
@@ -1274,11 +1299,11 @@ class _LabSessionViewRequired(TypedDict):
 class LabSessionView(_LabSessionViewRequired, total=False):
     """Lab session, without blinded data."""
 
-    # Current answer of the subject. Absent if there is none.
+    # Current answer of the subject. Null if there is none.
     answer: Optional[LabAnswer]
-    # Who closed the session, and when.
+    # Who closed the session, and when. Null while it is open.
     closed: Optional[LabSessionStep]
-    # Who unblinded the session, when and why. Absent while it is blinded.
+    # Who unblinded the session, when and why. Null while it is blinded.
     unblinded: Optional[LabSessionStep]
 
 
@@ -1337,7 +1362,7 @@ class LearnerSettings(TypedDict, total=False):
 
 
 class LegPoints(TypedDict):
-    """Joint positions of one leg: forward and up, m."""
+    """Points of one leg as forward and upward coordinates, m."""
 
     # Ankle.
     ankle: list[float]
@@ -1379,13 +1404,6 @@ class LinearAlgebra(TypedDict):
     substitutions: int
 
 
-class Link(TypedDict):
-    """One-time sign-in link."""
-
-    # Path of the link, which is shown once and valid for a day.
-    path: str
-
-
 class _MeRequired(TypedDict):
     # Name of the user or the token.
     name: str
@@ -1420,7 +1438,7 @@ class _MeasurementFileRequired(TypedDict):
 class MeasurementFile(_MeasurementFileRequired, total=False):
     """Measurement file, without its content."""
 
-    # Name of the file, if it is known.
+    # Name of the file. Null if unknown.
     file_name: Optional[str]
 
 
@@ -1442,7 +1460,7 @@ class _MemberRequired(TypedDict):
 class Member(_MemberRequired, total=False):
     """Member of a study."""
 
-    # Role of a user. Absent for a token.
+    # Role of a user. Null for a token.
     role: Optional[Role]
 
 
@@ -1458,9 +1476,9 @@ class _MilestoneRequired(TypedDict):
 class Milestone(_MilestoneRequired, total=False):
     """The recommendation after one iteration of the study."""
 
-    # Cost of transport of the best trial.
+    # Cost of transport of the best trial. Null if the script that evaluated the trial did not report it.
     cost_of_transport: Optional[float]
-    # Gait RMSE of the best trial, rad. Absent if it did not converge.
+    # Gait RMSE of the best trial, rad. Null if the script that evaluated the trial did not report it.
     gait_rmse_rad: Optional[float]
 
 
@@ -1525,7 +1543,7 @@ class MuscleParametersGas(TypedDict, total=False):
     knee_lever_m: Optional[float]
     # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # Maximum shortening speed, optimal lengths per second.
+    # Maximum shortening speed, optimal fibre lengths per second.
     max_speed: Optional[float]
     # Optimal fibre length, m.
     optimal_length_m: Optional[float]
@@ -1540,7 +1558,7 @@ class MuscleParametersGlu(TypedDict, total=False):
     hip_lever_m: Optional[float]
     # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # Maximum shortening speed, optimal lengths per second.
+    # Maximum shortening speed, optimal fibre lengths per second.
     max_speed: Optional[float]
     # Optimal fibre length, m.
     optimal_length_m: Optional[float]
@@ -1557,7 +1575,7 @@ class MuscleParametersHam(TypedDict, total=False):
     knee_lever_m: Optional[float]
     # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # Maximum shortening speed, optimal lengths per second.
+    # Maximum shortening speed, optimal fibre lengths per second.
     max_speed: Optional[float]
     # Optimal fibre length, m.
     optimal_length_m: Optional[float]
@@ -1572,7 +1590,7 @@ class MuscleParametersHfl(TypedDict, total=False):
     hip_lever_m: Optional[float]
     # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # Maximum shortening speed, optimal lengths per second.
+    # Maximum shortening speed, optimal fibre lengths per second.
     max_speed: Optional[float]
     # Optimal fibre length, m.
     optimal_length_m: Optional[float]
@@ -1587,7 +1605,7 @@ class MuscleParametersSol(TypedDict, total=False):
     ankle_lever_m: Optional[float]
     # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # Maximum shortening speed, optimal lengths per second.
+    # Maximum shortening speed, optimal fibre lengths per second.
     max_speed: Optional[float]
     # Optimal fibre length, m.
     optimal_length_m: Optional[float]
@@ -1602,7 +1620,7 @@ class MuscleParametersTa(TypedDict, total=False):
     ankle_lever_m: Optional[float]
     # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # Maximum shortening speed, optimal lengths per second.
+    # Maximum shortening speed, optimal fibre lengths per second.
     max_speed: Optional[float]
     # Optimal fibre length, m.
     optimal_length_m: Optional[float]
@@ -1617,7 +1635,7 @@ class MuscleParametersVas(TypedDict, total=False):
     knee_lever_m: Optional[float]
     # Maximum isometric force, N.
     max_force_n: Optional[float]
-    # Maximum shortening speed, optimal lengths per second.
+    # Maximum shortening speed, optimal fibre lengths per second.
     max_speed: Optional[float]
     # Optimal fibre length, m.
     optimal_length_m: Optional[float]
@@ -1663,7 +1681,8 @@ class NewAssessment(_NewAssessmentRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
+    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    # `clinician` for any other user.
     source: Optional[PersonSource]
 
 
@@ -1709,7 +1728,7 @@ class NewExecutionReport(TypedDict, total=False):
 
 
 class _NewLabAnswerRequired(TypedDict):
-    # The answer. First is walk 2, second is walk 3. `retracted` is reserved for the service.
+    # The answer. First is walk 2, second is walk 3.
     answer: Literal["first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
     # Number of the answer: `answer_number` or, for a report of an unsafe walk, `report_number` of the session. An
     # answer that is sent twice counts once.
@@ -1724,9 +1743,9 @@ class NewLabAnswer(_NewLabAnswerRequired, total=False):
 
 
 class _NewLabSessionRequired(TypedDict):
-    # Converged trial with one of the two gaits.
+    # Trial with gait A, which must be walkable.
     trial_a: TrialId
-    # Converged trial with the other gait.
+    # Trial with gait B, which must be walkable.
     trial_b: TrialId
 
 
@@ -1776,7 +1795,8 @@ class NewPreference(_NewPreferenceRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
+    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    # `clinician` for any other user.
     source: Optional[PersonSource]
 
 
@@ -1796,7 +1816,7 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
     # `Treadmill_R_vy` for Camargo 2021.
     force_column: Optional[str]
     # Content of a separate file with the force column: an OpenSim file, or the `fp` table that belongs to an `ik` table
-    # of Camargo 2021. Both files must have the same time axis.
+    # of the Camargo 2021 data set. Both files must have the same time axis.
     forces: Optional[str]
     # File format of the recording.
     format: JointAngleFormat
@@ -1824,7 +1844,8 @@ class NewSafetyReport(TypedDict, total=False):
     author: Optional[str]
     # What happened, at most 2000 characters.
     note: str
-    # Who reports: `subject`, `clinician` or `script`. The default depends on the kind of caller.
+    # Who reports: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    # `clinician` for any other user.
     source: Optional[PersonSource]
 
 
@@ -1873,7 +1894,7 @@ class NewStudy(_NewStudyRequired, total=False):
     name: Optional[str]
     # Number of trials that run in parallel.
     parallel_trials: int
-    # Priority, -10 to 10. Higher values run first.
+    # Priority, -10 to 10. Studies with a higher priority run first.
     priority: int
     # Reference gait for Gait RMSE. By default `falisse-2019`, even if others have been imported.
     reference_gait_id: Optional[ReferenceGaitId]
@@ -1958,7 +1979,7 @@ class _OpenSolveRequired(TypedDict):
 class OpenSolve(_OpenSolveRequired, total=False):
     """A solve that has not ended."""
 
-    # End of the lease, unless it is renewed.
+    # End of the lease, unless it is renewed. Null while the solve is queued.
     lease_until: Optional[Instant]
     # Worker that has it. Null while it is queued.
     worker: Optional[str]
@@ -2052,14 +2073,14 @@ class Proportion(_ProportionRequired, total=False):
 class Pushes(TypedDict):
     """Largest changes in the hip's forward velocity from which the walker recovers, m/s."""
 
-    # Backwards.
+    # Backwards, m/s.
     backwards_m_s: float
-    # Forwards.
+    # Forwards, m/s.
     forwards_m_s: float
 
 
 class _RaterAnswerRequired(TypedDict):
-    # The answer. `retracted` is reserved for the service.
+    # The answer.
     answer: Literal["first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"]
 
 
@@ -2092,13 +2113,13 @@ class _RaterReliabilityRequired(TypedDict):
 class RaterReliability(_RaterReliabilityRequired, total=False):
     """Reliability of a rater in a study."""
 
-    # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Absent
-    # until the rater is unblinded, because it would reveal allocations.
+    # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Null until
+    # the rater is unblinded, because it would reveal allocations.
     first_preferred: Optional[Proportion]
 
 
 class _RecommendedRequired(TypedDict):
-    # Action as bounds.
+    # The action: values of the bounds a1 to a8, tuned or fixed.
     bounds: Bounds
     # Number of the trial.
     number: int
@@ -2109,9 +2130,9 @@ class _RecommendedRequired(TypedDict):
 class Recommended(_RecommendedRequired, total=False):
     """Recommended action."""
 
-    # Cost of transport of the trial.
+    # Cost of transport of the trial. Null if the script that evaluated the trial did not report it.
     cost_of_transport: Optional[float]
-    # Gait RMSE of the trial, rad.
+    # Gait RMSE of the trial, rad. Null if the script that evaluated the trial did not report it.
     gait_rmse_rad: Optional[float]
 
 
@@ -2122,7 +2143,9 @@ class _RecommendationRequired(Recommended):
     certifying: bool
     # Reasons if the certificate failed.
     failures: list[str]
+    # Name of the study.
     study: str
+    # Identifier of the study.
     study_id: StudyId
 
 
@@ -2131,7 +2154,7 @@ class Recommendation(_RecommendationRequired, total=False):
 
     # The newest execution report of its gait. Null if nobody requested one.
     execution_report: Optional[ExecutionReport]
-    # If the certificate failed, the best action whose gait passed.
+    # If the certificate failed, the best action whose gait passed. Null if there is none.
     passing: Optional[Recommended]
 
 
@@ -2168,7 +2191,8 @@ class _ReferenceGaitMatchRequired(TypedDict):
 class ReferenceGaitMatch(_ReferenceGaitMatchRequired, total=False):
     """A reference gait and the distance between the measured person and a subject."""
 
-    # `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait does not state height and mass.
+    # Distance to the reference gait, without a unit: `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`, with the difference in
+    # height dh and in body mass dm. Null if the reference gait does not state height and mass.
     distance: Optional[float]
 
 
@@ -2187,7 +2211,7 @@ _RelaxationRequired = TypedDict(
         "solves": "int",
         # Number of starting points of the search at the `not_with` value. 0 if unknown.
         "starts": "int",
-        # Whether the solve at the `not_with` value gave up. If so, infeasibility is not certain.
+        # Whether the solve at the `not_with` value ended undecided. If so, infeasibility is not certain.
         "undecided": "bool",
     },
 )
@@ -2267,7 +2291,7 @@ class Retraction(TypedDict):
 class ReturnMap(TypedDict):
     """Stability of a gait, from the stride-to-stride map."""
 
-    # Resolution of the finite differences.
+    # Resolution of the finite differences: the change of `largest_by_differences` by the last extrapolation.
     differences_resolve: float
     # Largest component of the difference between the gait's initial state and the fixed point, rad and rad/s.
     fixed_point_distance: float
@@ -2343,12 +2367,12 @@ class _SensitivityToBoundRequired(TypedDict):
     bound: str
     # Derivatives of the results of the gait.
     derivatives: ResultDerivatives
-    # Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
-    # is null if there is no limit in that direction.
+    # Lowest and highest value of the bound, in its unit: in between, the active constraints stay the same, to first
+    # order. An end is null if there is no limit in that direction.
     interval: list[Optional[float]]
     # Whether a constraint is about to become active or inactive, in which case the derivatives on the two sides differ.
     is_weakly_active: bool
-    # Value of the bound.
+    # Value of the bound, in its unit.
     value: float
 
 
@@ -2375,12 +2399,19 @@ class _SessionRequired(TypedDict):
 
 
 class Session(_SessionRequired, total=False):
-    """Session of a user."""
+    """Sign-in session of a user."""
 
-    # Client address at sign-in.
+    # Client address at sign-in. Null if unknown.
     address: Optional[str]
-    # User agent of the browser.
+    # User agent of the browser. Null if unknown.
     browser: Optional[str]
+
+
+class SignInLink(TypedDict):
+    """One-time sign-in link."""
+
+    # Path of the link, which is shown once and valid for a day.
+    path: str
 
 
 class _SolveAttemptRequired(TypedDict):
@@ -2406,25 +2437,29 @@ class SolveAttempt(_SolveAttemptRequired, total=False):
     """One attempt within a solve, from one starting point."""
 
     # Number of the local optimum in which it ended, counted from 1; null if it did not converge.
-    basin: Optional[int]
+    local_optimum: Optional[int]
 
 
-class SolveOptionsBasinChoiceNearestToReference(TypedDict):
+class SolveOptionsLocalOptimumChoiceNearestToReference(TypedDict):
+    """Takes the local optimum with the lowest Gait RMSE."""
+
+    # Largest excess over the lowest objective, %.
     within_percent: float
 
 
-class SolveOptionsBasinChoice(TypedDict):
-    nearest_to_reference: SolveOptionsBasinChoiceNearestToReference
+class SolveOptionsLocalOptimumChoice(TypedDict):
+    # Takes the local optimum with the lowest Gait RMSE.
+    nearest_to_reference: SolveOptionsLocalOptimumChoiceNearestToReference
 
 
 class SolveOptions(TypedDict, total=False):
     """Options of the solver: limits, tolerance, initial guesses and retries."""
 
-    # Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the
-    # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.
-    basin_choice: Union[Literal["lowest_objective"], SolveOptionsBasinChoice]
     # Minimum number of initial guesses of a cold start.
     initial_guesses: int
+    # Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the
+    # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.
+    local_optimum_choice: Union[Literal["lowest_objective"], SolveOptionsLocalOptimumChoice]
     # Maximum number of iterations in each phase of a solve. Phases that track the reference gait are limited to 200.
     max_iterations: int
     # Whether a cold start tries further initial guesses until one converges.
@@ -2447,13 +2482,13 @@ class _SolveReportRequired(TypedDict):
     cost_of_transport: float
     # Durations of the eight domains, s.
     durations_s: list[float]
-    # Number of equality rows.
+    # Number of equality constraints.
     equalities: int
     # Parts of Gait RMSE: torso, `hip_L`, `knee_L`, `ankle_L`, `hip_R`.
     gait_rmse_parts_rad: list[float]
     # Gait RMSE: sum over the five human coordinates, rad.
     gait_rmse_rad: float
-    # Number of inequality rows.
+    # Number of inequality constraints.
     inequalities: int
     # Interior-point iterations over all phases.
     iterations: int
@@ -2526,7 +2561,7 @@ class _StudyPlanRequired(TypedDict):
     name: str
     # Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     parallel_trials: int
-    # Priority, -10 to 10. Higher values run first.
+    # Priority, -10 to 10. Studies with a higher priority run first.
     priority: int
     # Identifier of the reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
@@ -2567,7 +2602,7 @@ class _StudyRequired(StudyPlan):
     state: StudyState
     # Reason for the state; may be empty.
     state_reason: str
-    # Tags, by which people find the study.
+    # Tags for finding the study.
     tags: list[str]
     # Time of the last change.
     updated_at: Instant
@@ -2576,10 +2611,10 @@ class _StudyRequired(StudyPlan):
 class Study(_StudyRequired, total=False):
     """A tuning run for one subject: its set-up and state."""
 
-    # Time at which the study was archived. Lists leave out archived studies unless they are asked for; `GET
-    # /studies?archived=true` lists them.
+    # Time at which the study was archived. Null if it is not archived. Lists leave out archived studies unless they are
+    # asked for; `GET /api/v1/studies?archived=true` lists them.
     archived_at: Optional[Instant]
-    # Parent, if the study is a fork.
+    # Parent, if the study is a fork; otherwise null.
     forked_from: Optional[StudyId]
 
 
@@ -2590,14 +2625,8 @@ class StudyAccess(TypedDict):
     restricted: bool
 
 
-class StudyActionReason(TypedDict, total=False):
-    """Reason for a command."""
-
-    # Reason, at most 2000 characters.
-    reason: str
-
-
 class _StudyComparisonRequired(TypedDict):
+    # Identifier of the study.
     id: StudyId
     # Whether gaits are computed with muscles.
     muscles: bool
@@ -2609,29 +2638,34 @@ class _StudyComparisonRequired(TypedDict):
     seed: int
     # Total time of all solves, s.
     solve_seconds: float
+    # State of the study.
     state: StudyState
+    # Numbers of trials by state.
     trials: TrialCounts
 
 
 class StudyComparison(_StudyComparisonRequired, total=False):
     """Study in a comparison."""
 
-    # Action of the recommended trial.
+    # Action of the recommended trial. Null if there is no recommendation.
     best_action: Optional[Bounds]
-    # Cost of transport of the recommended trial.
+    # Cost of transport of the recommended trial. Null if there is no recommendation, or if the script that evaluated
+    # the trial did not report it.
     best_cost_of_transport: Optional[float]
-    # Gait RMSE of the recommended trial, rad. Null in every row if the compared studies have different reference gaits,
-    # because values against different reference gaits cannot be compared.
+    # Gait RMSE of the recommended trial, rad. Null if there is no recommendation, or if the script that evaluated the
+    # trial did not report it. Null in every row if the compared studies have different reference gaits, because values
+    # against different reference gaits cannot be compared.
     best_gait_rmse_rad: Optional[float]
-    # Number of the recommended trial.
+    # Number of the recommended trial. Null if there is no recommendation.
     best_trial: Optional[int]
 
 
 class StudyView(Study):
     """Study with its possible commands."""
 
-    # Commands that are possible in the current state.
+    # Commands that are possible in the current state: `start`, `pause`, `resume`, `stop`, `extend`.
     possible: list[str]
+    # Numbers of trials by state.
     trials: TrialCounts
 
 
@@ -2667,14 +2701,15 @@ class Suggestion(_SuggestionRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
+    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    # `clinician` for any other user.
     source: Optional[PersonSource]
 
 
 class SurvivedPushes(TypedDict):
     """Largest pushes in a fixed, increasing series that the walker survives without other disturbances."""
 
-    # Backwards, N s.
+    # Backwards, N s; 0 if it survives none.
     backwards_n_s: float
     # Forwards, N s; 0 if it survives none.
     forwards_n_s: float
@@ -2698,8 +2733,15 @@ class Tell(_TellRequired, total=False):
     reason: str
 
 
+class TransitionReason(TypedDict, total=False):
+    """Reason for a command."""
+
+    # Reason, at most 2000 characters.
+    reason: str
+
+
 class _TrialRequired(TypedDict):
-    # Action as bounds.
+    # The action: values of the bounds a1 to a8, tuned or fixed.
     action: Bounds
     # Index of the action in the search space.
     action_index: int
@@ -2717,38 +2759,40 @@ class _TrialRequired(TypedDict):
     state: TrialState
     # Identifier of the study to which the trial belongs.
     study_id: StudyId
-    # Most violated rows, worst first.
+    # Most violated constraints, worst first.
     violations: list[Violation]
 
 
 class Trial(_TrialRequired, total=False):
     """Trial of a study."""
 
-    # Best trial when this one was proposed.
+    # Best trial when this one was proposed. Null if there was none.
     best_before: Optional[TrialId]
-    # Cost of transport of a converged gait, dimensionless.
+    # Cost of transport of a converged gait, dimensionless. Null without one, and if the script that evaluated the trial
+    # did not report it.
     cost_of_transport: Optional[float]
-    # Time at which it ended.
+    # Time at which it ended. Null while it is open.
     finished_at: Optional[Instant]
-    # Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
+    # Gait RMSE of a converged gait, rad. Null without one, and if the script that evaluated the trial did not report
+    # it. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Optional[float]
-    # Interior-point iterations.
+    # Number of interior-point iterations. Null without a completed solve.
     iterations: Optional[int]
-    # Largest violation, scaled.
+    # Largest violation, scaled. Null without a completed solve.
     max_violation: Optional[float]
-    # Objective of the solve.
+    # Objective of the solve. Null without a completed solve.
     objective: Optional[float]
-    # All numerical results of the solve.
+    # All numerical results of the solve. Null without a completed solve.
     report: Optional[SolveReport]
-    # Script that evaluates the trial. Absent if the service does.
+    # Script that evaluates the trial. Null if the service does.
     script: Optional[str]
-    # Wall time of the solve, s.
+    # Wall time of the solve, s. Null without a completed solve.
     seconds_total: Optional[float]
-    # Time at which a worker first started it.
+    # Time at which a worker first started it. Null before.
     started_at: Optional[Instant]
-    # How the solve ended.
+    # How the solve ended. Null without a completed solve.
     status: Optional[SolveStatus]
-    # Trial whose gait is the warm start. Absent for a cold start.
+    # Trial whose gait is the warm start. Null for a cold start.
     warm_started_from: Optional[TrialId]
 
 
@@ -2770,6 +2814,7 @@ class TrialCounts(TypedDict):
 class TrialExecutionReport(TypedDict):
     """Execution report of a gait."""
 
+    # Time of creation.
     created_at: Instant
     # Version of the program that made it.
     program: str
@@ -2777,6 +2822,7 @@ class TrialExecutionReport(TypedDict):
     report: ExecutionReport
     # How many walks were complete, as a sentence.
     sentence: str
+    # Trial of the gait.
     trial_id: TrialId
 
 
@@ -2788,6 +2834,7 @@ class TrialExplanation(TypedDict):
     # Conflicts between tuned bounds: the first one, and others if relaxing a single bound does not resolve it. Empty in
     # older explanations.
     conflicts: list[Conflict]
+    # Time of creation.
     created_at: Instant
     # Whether the search for a conflict found a gait with the given bounds, which the solve had missed.
     gait_found: bool
@@ -2803,6 +2850,7 @@ class TrialExplanation(TypedDict):
     status: SolveStatus
     # Effect of relaxing several bounds together, if no single one helps.
     together: list[JointRelaxation]
+    # Explained trial.
     trial_id: TrialId
     # Violations of the last iterate, worst first.
     violations: list[Violation]
@@ -2817,6 +2865,7 @@ class TrialSensitivities(TypedDict):
     cost_of_transport: float
     # The sensitivities in sentences.
     sentences: list[str]
+    # Trial of the gait.
     trial_id: TrialId
 
 
@@ -2860,11 +2909,11 @@ class _UnblindedPairRequired(TypedDict):
 class UnblindedPair(_UnblindedPairRequired, total=False):
     """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
 
-    # Answer in terms of what was shown. Absent if there is none yet.
+    # Answer in terms of what was shown. Null if there is none yet.
     answer: Optional[Judgement]
-    # Time of the answer.
+    # Time of the answer. Null if there is none yet.
     answered_at: Optional[Instant]
-    # Earlier pair that it repeats.
+    # Earlier pair that it repeats. Null if it is not a repeat.
     repeats: Optional[BlindPairId]
 
 
@@ -2883,9 +2932,9 @@ class _UnchangedBoundRequired(TypedDict):
 class UnchangedBound(_UnchangedBoundRequired, total=False):
     """A tuned bound and the range of its values for which a gait remains a solution."""
 
-    # Smallest value. Null if every smaller one leaves the gait as it is.
+    # Smallest value, in the unit of the bound. Null if every smaller one leaves the gait as it is.
     least: Optional[float]
-    # Largest value. Null if every larger one leaves the gait as it is.
+    # Largest value, in the unit of the bound. Null if every larger one leaves the gait as it is.
     most: Optional[float]
 
 
@@ -2905,23 +2954,23 @@ class _UserRequired(TypedDict):
 class User(_UserRequired, total=False):
     """A person who signs in: administrator, clinician or rater."""
 
-    # Time at which the user was disabled, if disabled.
+    # Time at which the user was disabled. Null if the user is not disabled.
     disabled_at: Optional[Instant]
 
 
 class Violation(TypedDict):
-    """A violated row of the gait problem."""
+    """A violated constraint of the gait problem."""
 
     # Amount of the violation.
     amount: float
-    # The row in words: domain, node, constraint, component.
+    # The constraint in words: domain, node, constraint, component.
     row: str
     # Unit of the amount.
     unit: str
 
 
 class _WalkActivityRequired(TypedDict):
-    # Mean of each channel over the cycle.
+    # Mean of each channel over the cycle, relative to the peak of walk 1.
     averages: list[float]
     # Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
     # the peak of walk 1.
@@ -2949,25 +2998,26 @@ class WalkModel(TypedDict):
 
 
 class _WalkViewRequired(TypedDict):
-    # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
-    after_unblinding: bool
     # Number of the walk, 1 to 3.
     number: int
+    # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
+    recorded_after_unblinding: bool
 
 
 class WalkView(_WalkViewRequired, total=False):
     """Walk of a session."""
 
-    # Condition of the walk. Absent while it is blinded.
+    # Condition of the walk. Null while it is blinded.
     condition: Optional[Condition]
-    # Who recorded the walk, and when.
+    # Who recorded the walk, and when. Null if it is not recorded yet.
     recorded: Optional[LabSessionStep]
 
 
 class WalksOnGround(TypedDict):
     """Simulated walks on one kind of ground."""
 
-    # Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can make.
+    # Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
+    # produce.
     ankle_rate_limited_share: float
     # Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
     ankle_saturated_share: float
@@ -2983,7 +3033,8 @@ class WalksOnGround(TypedDict):
     ground_height_m: float
     # Walks that ended with a halt: the walker took no further step.
     halted: int
-    # Share of the time in which the controller demanded a faster change of the knee torque than the actuator can make.
+    # Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
+    # produce.
     knee_rate_limited_share: float
     # Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
     knee_saturated_share: float
@@ -2996,7 +3047,7 @@ class WalksOnGround(TypedDict):
 class Withdrawal(TypedDict):
     """A withdrawal of consent."""
 
-    # Reason, if the subject gave one.
+    # Reason, 1 to 2000 characters, or `none given` if the subject gave none.
     reason: str
 
 

@@ -16,7 +16,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub(super) struct AccessLogFilter {
     #[serde(default)]
-    contains: SearchText,
+    text: SearchText,
     subject_id: Option<SubjectId>,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct AccessLogFilter {
     operation_id = "list_access_log",
     tag = "operation",
     params(
-        ("contains" = Option<String>, Query, max_length = 200, description = "Text to find in the kind, actor, address, object, study or pseudonym"),
+        ("text" = Option<String>, Query, max_length = 200, description = "Text to find in the kind, actor, address, object, study or pseudonym"),
         ("subject_id" = Option<SubjectId>, Query, description = "Only rows of this subject")
     ),
     responses((status = 200, description = "A page", body = Page<AccessRow>)),
@@ -41,8 +41,8 @@ pub(super) async fn list(
     paging: Paging<i64, AccessLogFilter>,
 ) -> Result<Json<Page<AccessRow>>, Refusal> {
     app.access.log.write(app.store(), true).await?;
-    let AccessLogFilter { contains, subject_id } = &paging.filter;
+    let AccessLogFilter { text, subject_id } = &paging.filter;
     let mut reader = app.read().await?;
-    let rows = access_log::page(&mut reader, contains.as_str(), *subject_id, paging.after, paging.to_read()).await?;
+    let rows = access_log::page(&mut reader, text.as_str(), *subject_id, paging.after, paging.to_read()).await?;
     Ok(Json(paging.page(rows, |row| row.seq)?.map(AccessRow::from)))
 }

@@ -16,7 +16,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub(super) struct AuditFilter {
     #[serde(default)]
-    contains: SearchText,
+    text: SearchText,
 }
 
 /// List the audit trail
@@ -27,7 +27,7 @@ pub(super) struct AuditFilter {
     path = "/audit",
     operation_id = "list_audit_trail",
     tag = "operation",
-    params(("contains" = Option<String>, Query, max_length = 200, description = "Text to find in the actor, the kind of change or the object")),
+    params(("text" = Option<String>, Query, max_length = 200, description = "Text to find in the actor, the kind of change or the object")),
     responses((status = 200, description = "A page", body = Page<AuditRow>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -36,7 +36,7 @@ pub(super) async fn list(
     State(app): State<AppState>,
     paging: Paging<i64, AuditFilter>,
 ) -> Result<Json<Page<AuditRow>>, Refusal> {
-    let contains = paging.filter.contains.as_str();
-    let rows = audit::page(&mut *app.read().await?, contains, paging.after, paging.to_read()).await?;
+    let text = paging.filter.text.as_str();
+    let rows = audit::page(&mut *app.read().await?, text, paging.after, paging.to_read()).await?;
     Ok(Json(paging.page(rows, |row| row.seq)?.map(AuditRow::from)))
 }

@@ -124,11 +124,13 @@ pub(super) async fn motion(
     // The error must not reveal the trial, the subject or the device.
     motion.map(|figures| Json(BlindMotion { figures })).map_err(|error| {
         tracing::error!(%error, "cannot show a gait to a rater");
-        Refusal(Error::NotFound { what: "motion of the comparison".to_owned(), id: "with this token".to_owned() })
+        Refusal(Error::NotFound { what: "motion of the blind pair".to_owned(), id: "with this token".to_owned() })
     })
 }
 
 /// Answer a blind pair
+///
+/// The first answer to a pair counts. A safety report takes effect at once.
 #[utoipa::path(
     post,
     path = "/blind-pairs/{token}/answer",

@@ -34,6 +34,7 @@ pub(super) struct ComparisonQuery {
 /// Study in a comparison.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct StudyComparison {
+    /// Identifier of the study.
     id: StudyId,
     /// Name of the study.
     name: String,
@@ -43,17 +44,21 @@ pub(super) struct StudyComparison {
     seed: u64,
     /// Reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId,
+    /// State of the study.
     state: StudyState,
+    /// Numbers of trials by state.
     trials: TrialCounts,
-    /// Number of the recommended trial.
+    /// Number of the recommended trial. Null if there is no recommendation.
     best_trial: Option<u32>,
-    /// Action of the recommended trial.
+    /// Action of the recommended trial. Null if there is no recommendation.
     #[schema(value_type = Option<study_plan_schemas::Bounds>)]
     best_action: Option<TunedBounds>,
-    /// Gait RMSE of the recommended trial, rad. Null in every row if the compared studies have different reference gaits,
-    /// because values against different reference gaits cannot be compared.
+    /// Gait RMSE of the recommended trial, rad. Null if there is no recommendation, or if the script that evaluated the
+    /// trial did not report it. Null in every row if the compared studies have different reference gaits, because
+    /// values against different reference gaits cannot be compared.
     best_gait_rmse_rad: Option<f64>,
-    /// Cost of transport of the recommended trial.
+    /// Cost of transport of the recommended trial. Null if there is no recommendation, or if the script that evaluated
+    /// the trial did not report it.
     best_cost_of_transport: Option<f64>,
     /// Total time of all solves, s.
     solve_seconds: f64,
@@ -67,7 +72,7 @@ pub(super) struct StudyComparison {
     path = "/study-comparison",
     operation_id = "list_study_comparisons",
     tag = "studies",
-    params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of studies")),
+    params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of different studies")),
     responses((status = 200, description = "One row for each study", body = Page<StudyComparison>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -83,10 +88,13 @@ pub(super) async fn get(
             Error::invalid("ids", which.ids.as_str(), &format!("2 to {MOST} comma-separated identifiers")).into()
         );
     }
-    let mut rows = Vec::with_capacity(named.len());
+    let mut rows: Vec<StudyComparison> = Vec::with_capacity(named.len());
     for id in named {
         let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "the identifier of a study"))?;
         let id = id.accessible(&mut *app.read().await?, authorized.caller.reach()).await?;
+        if rows.iter().any(|row| row.id == id) {
+            return Err(Error::invalid("ids", which.ids.as_str(), "identifiers of different studies").into());
+        }
         rows.push(row(&mut app, id).await?);
     }
     if rows.windows(2).any(|pair| pair[0].reference_gait_id != pair[1].reference_gait_id) {
@@ -123,6 +131,7 @@ async fn row(app: &mut AppState, id: StudyId) -> Result<StudyComparison, Refusal
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        // `sum` of nothing is -0.0.
+        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).fold(0.0, |all, own| all + own),
     })
 }

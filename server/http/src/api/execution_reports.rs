@@ -24,6 +24,7 @@ use utoipa::ToSchema;
 /// Execution report of a gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct TrialExecutionReport {
+    /// Trial of the gait.
     trial_id: TrialId,
     /// How many walks were complete, as a sentence.
     sentence: String,
@@ -31,6 +32,7 @@ pub(super) struct TrialExecutionReport {
     report: ExecutionReport,
     /// Version of the program that made it.
     program: String,
+    /// Time of creation.
     created_at: Instant,
 }
 

@@ -24,6 +24,7 @@ use utoipa::ToSchema;
 /// Infeasibility explanation of a trial.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct TrialExplanation {
+    /// Explained trial.
     trial_id: TrialId,
     /// The explanation in sentences.
     sentences: Vec<String>,
@@ -46,6 +47,7 @@ pub(super) struct TrialExplanation {
     program: String,
     /// SHA-256 of the trial's `problem.json`.
     problem_sha256: String,
+    /// Time of creation.
     created_at: Instant,
 }
 

@@ -20,8 +20,8 @@ pub struct Health {
 
 /// Check that the service is healthy
 ///
-/// Succeeds if the database responds. Needs no sign-in, and therefore reveals nothing about solves, from which a rater could
-/// infer the effect of an answer.
+/// Succeeds if the database responds. Requires no sign-in. It reveals nothing about solves, because a rater could infer
+/// the effect of an answer from them.
 #[utoipa::path(
     get,
     path = "/health",

@@ -120,7 +120,7 @@ pub(super) struct WalkQuery {
     tag = "lab",
     params(
         ("id" = LabSessionId, Path, description = "Identifier of the lab session"),
-        ("walk" = u8, Query, description = "2 or 3. Walk 1 is without the device"),
+        ("walk" = u8, Query, description = "Number of the walk, 2 or 3. Walk 1 is without the device"),
         ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")
     ),
     responses((status = 200, description = "Controller file", body = documents::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
@@ -249,6 +249,8 @@ pub(super) async fn session_progress(
 }
 
 /// Record a walk
+///
+/// Walks are recorded in order. A recorded walk cannot be undone.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/walks",
@@ -300,6 +302,8 @@ pub(super) async fn answer(
 }
 
 /// Retract the answer of the subject
+///
+/// Possible until the session is closed or unblinded. A safety report cannot be retracted.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/retract-answer",

@@ -47,7 +47,7 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |recording| recording.id)?.map(MeasurementFile::from)))
 }
 
-/// Get a measurement file
+/// Get the description of a measurement file
 #[utoipa::path(
     get,
     path = "/measurement-files/{id}",
@@ -210,22 +210,24 @@ pub(super) async fn process(
 
 /// Get the processed EMG
 ///
-/// The newest result. After unblinding, includes the muscle activity of the model.
+/// The newest result. After unblinding, includes the muscle activity of the model. Without a result, the status is 404.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/emg-results",
     operation_id = "get_emg_results",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
-    responses((status = 200, description = "Newest result, or null", body = Option<EmgView>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Newest result", body = EmgView), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn result(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
-) -> Result<Json<Option<EmgView>>, Refusal> {
-    Ok(Json(lab::emg(app.store_mut(), id).await?.map(EmgView::from)))
+) -> Result<Json<EmgView>, Refusal> {
+    let found = lab::emg(app.store_mut(), id).await?;
+    let missing = || Error::NotFound { what: "EMG result of lab session".to_owned(), id: id.to_string() };
+    Ok(Json(found.ok_or_else(missing)?.into()))
 }
 
 /// Get limit cycles

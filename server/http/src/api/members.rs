@@ -111,6 +111,8 @@ pub(super) async fn get(
 }
 
 /// Remove a study member
+///
+/// Ends the membership, which remains on record.
 #[utoipa::path(
     post,
     path = "/study-members/{id}/remove",

@@ -129,11 +129,14 @@ pub(super) async fn get(
 pub(super) struct CreatedPreference {
     #[serde(flatten)]
     row: FeedbackRow,
-    /// Other people's answers to the same comparison; at most the newest twenty.
+    /// Identifiers of other people's preferences about the same two gaits, at most the twenty newest.
     other_answers: Vec<FeedbackId>,
 }
 
 /// Record a preference
+///
+/// Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author has one
+/// answer to two gaits; to change it, retract it first.
 #[utoipa::path(
     post,
     path = "/studies/{id}/preferences",

@@ -30,7 +30,9 @@ use utoipa::ToSchema;
 /// Best action of a study.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Recommendation {
+    /// Identifier of the study.
     study_id: StudyId,
+    /// Name of the study.
     study: String,
     #[serde(flatten)]
     best: Recommended,
@@ -38,7 +40,7 @@ pub(super) struct Recommendation {
     certificate: CertificateState,
     /// Reasons if the certificate failed.
     failures: Vec<String>,
-    /// If the certificate failed, the best action whose gait passed.
+    /// If the certificate failed, the best action whose gait passed. Null if there is none.
     passing: Option<Recommended>,
     /// The newest execution report of its gait. Null if nobody requested one.
     execution_report: Option<ExecutionReport>,
@@ -53,12 +55,12 @@ struct Recommended {
     trial_id: TrialId,
     /// Number of the trial.
     number: u32,
-    /// Action as bounds.
+    /// The action: values of the bounds a1 to a8, tuned or fixed.
     #[schema(value_type = study_plan_schemas::Bounds)]
     bounds: TunedBounds,
-    /// Gait RMSE of the trial, rad.
+    /// Gait RMSE of the trial, rad. Null if the script that evaluated the trial did not report it.
     gait_rmse_rad: Option<f64>,
-    /// Cost of transport of the trial.
+    /// Cost of transport of the trial. Null if the script that evaluated the trial did not report it.
     cost_of_transport: Option<f64>,
 }
 

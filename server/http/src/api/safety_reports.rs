@@ -33,6 +33,9 @@ pub(super) struct SafetyReport {
     author: String,
     /// Time of the report.
     created_at: Instant,
+    /// What was reported. Empty for reports of raters and of subjects in blinded lab sessions, whose notes could tell which
+    /// gait was shown first.
+    note: String,
     /// Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. If so, the
     /// gait must not be used for walking.
     in_force: bool,
@@ -43,9 +46,9 @@ pub(super) struct SafetyReport {
 impl From<ReportedGait> for SafetyReport {
     fn from(report: ReportedGait) -> Self {
         let id = report.id();
-        let ReportedGait { trial, by, at, review, .. } = report;
+        let ReportedGait { trial, by, at, note, review, source: _ } = report;
         let in_force = review.as_ref().is_none_or(|review| review.decision == SafetyDecision::Unsafe);
-        Self { id, trial_id: trial, author: by, created_at: at, in_force, review: review.map(Into::into) }
+        Self { id, trial_id: trial, author: by, created_at: at, note, in_force, review: review.map(Into::into) }
     }
 }
 

@@ -18,6 +18,7 @@ use utoipa::ToSchema;
 /// Sensitivities of a gait with respect to the tuned bounds.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct TrialSensitivities {
+    /// Trial of the gait.
     trial_id: TrialId,
     /// The sensitivities in sentences.
     sentences: Vec<String>,
@@ -32,14 +33,14 @@ pub(super) struct TrialSensitivities {
 struct SensitivityToBound {
     /// Name of the bound.
     bound: &'static str,
-    /// Value of the bound.
+    /// Value of the bound, in its unit.
     value: f64,
     /// The active constraints that it sets. Empty if small changes of the bound change nothing.
     active: Vec<ActiveConstraint>,
     /// Derivatives of the results of the gait.
     derivatives: ResultDerivatives,
-    /// Lowest and highest value of the bound between which the active constraints stay the same, to first order. An end
-    /// is null if there is no limit in that direction.
+    /// Lowest and highest value of the bound, in its unit: in between, the active constraints stay the same, to first
+    /// order. An end is null if there is no limit in that direction.
     #[schema(value_type = Vec<Option<f64>>, min_items = 2, max_items = 2)]
     interval: (Option<f64>, Option<f64>),
     /// Whether a constraint is about to become active or inactive, in which case the derivatives on the two sides
@@ -52,8 +53,8 @@ struct SensitivityToBound {
 /// One step of a bound in the search space, and the first-order changes in the results.
 #[derive(Debug, Serialize, ToSchema)]
 struct GridStep {
-    /// The next stricter value of the search space, or the next looser one if the bound is already at its strictest
-    /// value.
+    /// The next stricter value of the search space, in the unit of the bound, or the next looser one if the bound is
+    /// already at its strictest value.
     to: f64,
     /// Change in the mechanical cost of transport.
     cost_of_transport: f64,

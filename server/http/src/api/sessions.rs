@@ -1,4 +1,4 @@
-//! REST: sessions of users.
+//! REST: sign-in sessions of users.
 
 use crate::AppState;
 use crate::accessible::Id;
@@ -15,15 +15,15 @@ use gaitwright_service::error::Error;
 use gaitwright_store::{Instant, SessionId, sessions};
 use std::cmp::Reverse;
 
-/// List sessions
+/// List sign-in sessions
 ///
-/// Active sessions of the caller, or of all users for an administrator, newest first.
+/// Active sign-in sessions of the caller, or of all users for an administrator, newest first.
 #[utoipa::path(
     get,
     path = "/sessions",
     operation_id = "list_sessions",
     tag = "access",
-    responses((status = 200, description = "Sessions", body = Page<Session>)),
+    responses((status = 200, description = "Sign-in sessions", body = Page<Session>)),
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn list(
@@ -44,16 +44,16 @@ pub(super) async fn list(
     Ok(Json(paging.cut(live, at)?.map(Session::from)))
 }
 
-/// End a session
+/// End a sign-in session
 ///
-/// Ends a session of the caller or, for an administrator, of any user.
+/// Ends a sign-in session of the caller or, for an administrator, of any user.
 #[utoipa::path(
     post,
     path = "/sessions/{id}/end",
     operation_id = "end_session",
     tag = "access",
     params(("id" = SessionId, Path, description = "Identifier of the sign-in session")),
-    responses((status = 200, description = "Ended session", body = Session)),
+    responses((status = 200, description = "Ended sign-in session", body = Session)),
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn end(
@@ -68,7 +68,7 @@ pub(super) async fn end(
     let session = sessions::get(&mut writer, id)
         .await?
         .filter(|session| request.caller.may(Right::Administer) || request.caller.user == Some(session.user_id));
-    let session = session.ok_or_else(|| Error::NotFound { what: "session".to_owned(), id: id.to_string() })?;
+    let session = session.ok_or_else(|| Error::NotFound { what: "sign-in session".to_owned(), id: id.to_string() })?;
     sign_in::end(&mut writer, &request.actor, &session).await?;
     request.done(&app, writer, &Session::from(session)).await
 }

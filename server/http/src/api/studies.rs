@@ -27,8 +27,9 @@ use utoipa::ToSchema;
 pub(super) struct StudyView {
     #[serde(flatten)]
     study: Study,
+    /// Numbers of trials by state.
     trials: TrialCounts,
-    /// Commands that are possible in the current state.
+    /// Commands that are possible in the current state: `start`, `pause`, `resume`, `stop`, `extend`.
     possible: Vec<&'static str>,
 }
 
@@ -153,13 +154,15 @@ pub(super) struct TransitionReason {
 }
 
 /// Start a study
+///
+/// Possible while the study is `draft`.
 #[utoipa::path(
     post,
     path = "/studies/{id}/start",
     operation_id = "start_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: the reason"),
     responses((status = 200, description = "Started study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -181,7 +184,7 @@ pub(super) async fn start(
     operation_id = "pause_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: the reason"),
     responses((status = 200, description = "Paused study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -195,13 +198,15 @@ pub(super) async fn pause(
 }
 
 /// Resume a study
+///
+/// Possible while the study is `paused`.
 #[utoipa::path(
     post,
     path = "/studies/{id}/resume",
     operation_id = "resume_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: the reason"),
     responses((status = 200, description = "Resumed study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -223,7 +228,7 @@ pub(super) async fn resume(
     operation_id = "stop_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: why"),
+    request_body(content = TransitionReason, description = "Optional: the reason"),
     responses((status = 200, description = "Stopped study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

@@ -129,7 +129,7 @@ pub(super) async fn consent(
 
 /// Withdraw consent
 ///
-/// Stops every study of the subject. The data of the subject are kept, but nothing can be added to them, shown or
+/// Stops every study of the subject. The subject's data are kept, but they can no longer be extended, shown or
 /// exported.
 #[utoipa::path(
     post,

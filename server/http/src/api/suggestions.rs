@@ -41,7 +41,7 @@ pub(super) async fn of_study(
 
 /// Record a suggestion
 ///
-/// The learner uses it like a preference. Retract it with `POST /preferences/{id}/retract`.
+/// The learner uses it like a preference. Retract it with `POST /api/v1/preferences/{id}/retract`.
 #[utoipa::path(
     post,
     path = "/studies/{id}/suggestions",

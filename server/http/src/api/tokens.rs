@@ -88,6 +88,8 @@ pub(super) async fn create(
 }
 
 /// Revoke a token
+///
+/// A revoked token can no longer be used.
 #[utoipa::path(
     post,
     path = "/tokens/{id}/revoke",

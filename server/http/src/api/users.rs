@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::authorization::SignedIn;
+use crate::authorization::{SignedIn, not_signed_in};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
@@ -13,7 +13,6 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Administer, Right, Role};
-use gaitwright_service::error::Error;
 use gaitwright_store::{UserId, users};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -41,7 +40,7 @@ pub(super) struct Me {
     security(("token" = []), ("session" = [])),
 )]
 pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> {
-    let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
+    let caller = caller.ok_or_else(not_signed_in)?;
     let rights = Right::ALL.into_iter().filter(|right| caller.may(*right)).collect();
     Ok(Json(Me { name: caller.name, role: caller.role, rights }))
 }
@@ -139,7 +138,7 @@ pub(super) async fn link(
 
 /// Disable a user
 ///
-/// Ends the user's sessions, and revokes the user's links and tokens.
+/// Ends the user's sign-in sessions, and revokes the user's links and tokens.
 #[utoipa::path(
     post,
     path = "/users/{id}/disable",

@@ -64,13 +64,13 @@ pub(crate) enum Believed {
 pub(crate) async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
     let too_many = |what: String| {
         Ok(Believed::Absent(format!(
-            "This page is not available for studies with {what} or more, because the computation would take too long."
+            "This page is not available for studies with {what}, because the computation would take too long."
         )))
     };
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     if trials::counts(&mut reader, id).await?.total as usize >= MANY {
-        return too_many(format!("{MANY} trials"));
+        return too_many(format!("{MANY} trials or more"));
     }
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
@@ -80,7 +80,7 @@ pub(crate) async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed
         return Ok(Believed::Absent(why.to_owned()));
     }
     if answers > MOST_ANSWERS {
-        return too_many(format!("{MOST_ANSWERS} answers"));
+        return too_many(format!("more than {MOST_ANSWERS} answers"));
     }
     let beliefs = app.beliefs.clone();
     let think =

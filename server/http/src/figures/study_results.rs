@@ -9,7 +9,7 @@ use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::TrialCounts;
-use gaitwright_store::{Connection, StudyId, consents, feedback, reference_gaits, studies, subjects, trials};
+use gaitwright_store::{Connection, StudyId, consents, devices, feedback, reference_gaits, studies, subjects, trials};
 
 /// How many of the newest trials of a large study are drawn.
 const NEWEST: u32 = 200;
@@ -23,6 +23,8 @@ pub(crate) fn have_one_reference_gait(studies: &[&StudySnapshot]) -> bool {
 pub(crate) struct StudyResults {
     pub(crate) snapshot: StudySnapshot,
     pub(crate) subject: String,
+    /// Name of the device.
+    pub(crate) device: String,
     /// Name of the reference gait.
     pub(crate) reference_gait: String,
     pub(crate) counts: TrialCounts,
@@ -35,6 +37,7 @@ impl StudyResults {
         let study = studies::get(db, id).await?;
         consents::may_be_shown(db, id).await?;
         let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
+        let device = devices::get(db, study.plan.device_id).await?.name;
         let reference_gait = reference_gaits::get(db, study.plan.reference_gait_id).await?.name;
         let counts = trials::counts(db, id).await?;
         let snapshot = if counts.total as usize >= MANY {
@@ -43,7 +46,7 @@ impl StudyResults {
             StudySnapshot::read(db, study).await?
         };
         let feedback = feedback::count(db, id).await? as usize;
-        Ok(Self { snapshot, subject, reference_gait, counts, feedback })
+        Ok(Self { snapshot, subject, device, reference_gait, counts, feedback })
     }
 
     pub(crate) fn outcome(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<StudyOutcome, Error> {

@@ -20,7 +20,7 @@ const PAGE: u32 = 100;
 pub(super) struct AccessLogQuery {
     before: Option<i64>,
     #[serde(default)]
-    contains: String,
+    text: String,
     subject: Option<SubjectId>,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct AccessLogQuery {
 struct AccessLogPage {
     rows: Vec<AccessRow>,
     older: Option<i64>,
-    contains: String,
+    text: String,
     /// The subject whose rows are shown: identifier and pseudonym.
     subject: Option<(SubjectId, String)>,
 }
@@ -39,7 +39,7 @@ impl AccessLogPage {
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn before(&self, row: &i64) -> String {
         let subject = self.subject.as_ref().map(|(id, _)| ("subject", id.to_string()));
-        let mut chosen = vec![("before", row.to_string()), ("contains", self.contains.clone())];
+        let mut chosen = vec![("before", row.to_string()), ("text", self.text.clone())];
         chosen.extend(subject);
         format!("/access-log?{}", serde_urlencoded::to_string(chosen).unwrap_or_default())
     }
@@ -57,11 +57,10 @@ pub(super) async fn get(
         Some(id) => Some((id, subjects::get(&mut reader, id).await?.pseudonym)),
         None => None,
     };
-    let mut rows =
-        access_log::page(&mut reader, choice.contains.trim(), choice.subject, choice.before, PAGE + 1).await?;
+    let mut rows = access_log::page(&mut reader, choice.text.trim(), choice.subject, choice.before, PAGE + 1).await?;
     drop(reader);
     let more = rows.len() > PAGE as usize;
     rows.truncate(PAGE as usize);
     let older = rows.last().filter(|_| more).map(|row| row.seq);
-    page(&AccessLogPage { rows, older, contains: choice.contains, subject })
+    page(&AccessLogPage { rows, older, text: choice.text, subject })
 }

@@ -22,7 +22,7 @@ pub(super) struct AuditQuery {
     verify: bool,
     /// Text that the rows contain.
     #[serde(default)]
-    contains: String,
+    text: String,
 }
 
 #[derive(Template)]
@@ -31,7 +31,7 @@ struct AuditPage {
     rows: Vec<AuditRow>,
     older: Option<i64>,
     checked: Option<ChainCheck>,
-    contains: String,
+    text: String,
 }
 
 impl AuditPage {
@@ -53,7 +53,7 @@ impl AuditPage {
     /// The link to older rows with the same search.
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn before(&self, row: &i64) -> String {
-        let query = serde_urlencoded::to_string([("contains", self.contains.as_str())]).unwrap_or_default();
+        let query = serde_urlencoded::to_string([("text", self.text.as_str())]).unwrap_or_default();
         format!("/audit?before={row}&{query}")
     }
 
@@ -76,10 +76,10 @@ pub(super) async fn get(
     Params(choice): Params<AuditQuery>,
 ) -> PageResult {
     let mut reader = app.read().await?;
-    let mut rows = audit::page(&mut reader, choice.contains.trim(), choice.before, PAGE + 1).await?;
+    let mut rows = audit::page(&mut reader, choice.text.trim(), choice.before, PAGE + 1).await?;
     let more = rows.len() > PAGE as usize;
     rows.truncate(PAGE as usize);
     let older = rows.last().filter(|_| more).map(|row| row.seq);
     let checked = if choice.verify { Some(audit::verify(&mut reader).await?) } else { None };
-    page(&AuditPage { rows, older, checked, contains: choice.contains })
+    page(&AuditPage { rows, older, checked, text: choice.text })
 }

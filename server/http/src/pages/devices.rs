@@ -126,10 +126,8 @@ pub(super) async fn post(
 /// The device with the entries. A changed value loses its source, which belongs to the old value.
 fn changed(before: &Definition, fields: &FormFields) -> Result<Definition, Error> {
     let known = |name: &str| Definition::FIELDS.iter().any(|field| field.name == name);
-    if let Some((name, value)) =
-        fields.iter().find(|(name, _)| !known(name) && !matches!(name.as_str(), "name" | "carried_limb"))
-    {
-        return Err(Error::invalid(name, value.as_str(), "a field of this form"));
+    if let Some(name) = fields.keys().find(|name| !known(name) && !matches!(name.as_str(), "name" | "carried_limb")) {
+        return Err(form_errors::unknown_field(name).into());
     }
     let mut values = Map::new();
     let mut sources = before.sources.clone();

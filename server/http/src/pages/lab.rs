@@ -166,7 +166,7 @@ struct MeasuredActivity {
     walks: Vec<String>,
     /// The walks that are compared with the walk without the device.
     compared: Vec<String>,
-    /// Muscle, its EMG RMSE in the walks that are compared, its average activation in each walk.
+    /// Muscle, its EMG RMSE in the walks that are compared, its average activity in each walk.
     rows: Vec<(String, Vec<String>, Vec<String>)>,
     /// Walk, measured muscle, muscle of the model, RMS difference, correlation.
     model: Vec<[String; 5]>,

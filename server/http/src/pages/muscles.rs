@@ -149,7 +149,7 @@ fn read(fields: &FormFields) -> Result<MuscleParameters, Error> {
         let part = field.split_once('_').filter(|(kind, name)| {
             KINDS.iter().any(|(known, _)| known == kind) && MuscleOverride::FIELDS.iter().any(|f| f.name == *name)
         });
-        let (kind, name) = part.ok_or_else(|| Error::invalid(field, text.as_str(), "a field of this form"))?;
+        let (kind, name) = part.ok_or_else(|| form_errors::unknown_field(field))?;
         let value: f64 = text.trim().parse().map_err(|_| Error::invalid(field, text.as_str(), "a number, or empty"))?;
         let of_kind = document.entry(kind).or_insert_with(|| json!({}));
         if let Value::Object(of_kind) = of_kind {

@@ -2,7 +2,7 @@
 
 use super::unsent_form::{SignInPage, Unsent, send_now};
 use crate::authentication::{browser_cookie, browser_of, cookie, session_of};
-use crate::authorization::SignedIn;
+use crate::authorization::{SignedIn, not_signed_in};
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format;
@@ -227,7 +227,7 @@ async fn account_of(
     caller: Option<&Caller>,
     headers: &HeaderMap,
 ) -> Result<(AccountPage, User, Actor), Error> {
-    let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
+    let caller = caller.ok_or_else(not_signed_in)?;
     let id = caller.user.ok_or_else(|| Error::conflict("No user is signed in, so there is no account."))?;
     let mut reader = app.read().await?;
     let user = users::get(&mut reader, id).await?;
@@ -302,8 +302,8 @@ pub(super) async fn end_session(
     SignedIn(caller): SignedIn,
     Form(form): Form<SessionToEnd>,
 ) -> Result<Response, PageError> {
-    let caller = caller.ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
-    let missing = || Error::NotFound { what: "session".to_owned(), id: form.id.clone() };
+    let caller = caller.ok_or_else(not_signed_in)?;
+    let missing = || Error::NotFound { what: "sign-in session".to_owned(), id: form.id.clone() };
     let id = form.id.parse().map_err(|_| missing())?;
     let (mut writer, _) = app.write_access().await?;
     let session = sessions::get(&mut writer, id).await?;

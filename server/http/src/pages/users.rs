@@ -247,7 +247,7 @@ async fn apply(writer: &mut Writer, caller: &Caller, origin: &str, form: &UsersF
         }
         "end_session" => {
             let id: SessionId = form.id()?;
-            let missing = || Error::NotFound { what: "session".to_owned(), id: id.to_string() };
+            let missing = || Error::NotFound { what: "sign-in session".to_owned(), id: id.to_string() };
             let session = sessions::get(writer, id).await?.ok_or_else(missing)?;
             sign_in::end(writer, actor, &session).await?;
             Ok(done(format!("Ended a session of {}.", session.user_name)))

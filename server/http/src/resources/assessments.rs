@@ -26,11 +26,11 @@ pub(crate) struct Assessment {
     author: String,
     /// Free text.
     note: String,
-    /// Preference that was derived from it, if any.
+    /// Preference that was derived from it. Null if there is none.
     feedback_id: Option<FeedbackId>,
     /// Time of recording.
     created_at: Instant,
-    /// Retraction, if it was retracted.
+    /// Retraction. Null if the assessment was not retracted.
     retraction: Option<Retraction>,
 }
 

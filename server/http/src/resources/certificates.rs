@@ -12,7 +12,7 @@ pub(crate) struct Certificate {
     format_version: u32,
     /// The gait that was checked; null if it is malformed.
     certified: Option<CertifiedGait>,
-    /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
+    /// Whether every checked value is within its limit, the walker does not fall, and the gait is stable.
     passed: bool,
     /// Reasons if it failed; otherwise empty.
     failures: Vec<String>,
@@ -20,9 +20,10 @@ pub(crate) struct Certificate {
     checks: Vec<CertificateCheck>,
     /// How the simulation ended early; null if it did not.
     fall: Option<String>,
-    /// The stride-to-stride map.
+    /// The stride-to-stride map. Null if the simulation ended early.
     return_map: Option<ReturnMap>,
-    /// The stride-to-stride map with a free hip velocity (zero dynamics).
+    /// The stride-to-stride map with a free hip velocity (zero dynamics). Null if the simulation ended early, or if the
+    /// map could not be computed.
     free_hip_return_map: Option<ReturnMap>,
     /// Largest pushes from which the walker recovers. Null if the gait is not stable.
     pushes: Option<Pushes>,
@@ -170,7 +171,7 @@ pub(crate) struct ReturnMap {
     largest: f64,
     /// Largest modulus of the multipliers, from finite differences of simulated domains.
     largest_by_differences: f64,
-    /// Resolution of the finite differences.
+    /// Resolution of the finite differences: the change of `largest_by_differences` by the last extrapolation.
     differences_resolve: f64,
     /// Fraction of a proportional change of all velocities that remains after one stride.
     speed_kept: f64,
@@ -224,9 +225,9 @@ impl From<certificate::Multiplier> for Multiplier {
 /// Largest changes in the hip's forward velocity from which the walker recovers, m/s.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Pushes {
-    /// Forwards.
+    /// Forwards, m/s.
     forwards_m_s: f64,
-    /// Backwards.
+    /// Backwards, m/s.
     backwards_m_s: f64,
 }
 

@@ -12,9 +12,9 @@ use utoipa::ToSchema;
 pub(crate) struct CycleActivity {
     /// Name of the channel.
     channel: String,
-    /// Mean over strides.
+    /// Mean over strides, relative to the peak of walk 1.
     mean: Vec<f64>,
-    /// Standard deviation over strides; zero for one stride.
+    /// Standard deviation over strides, relative to the peak of walk 1; zero for one stride.
     standard_deviation: Vec<f64>,
     /// Number of strides.
     #[schema(value_type = u64)]
@@ -80,7 +80,7 @@ pub(crate) struct WalkActivity {
     /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
     /// the peak of walk 1.
     channels: Vec<CycleActivity>,
-    /// Mean of each channel over the cycle.
+    /// Mean of each channel over the cycle, relative to the peak of walk 1.
     averages: Vec<f64>,
     /// EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
     emg_rmse: Option<EmgRmse>,

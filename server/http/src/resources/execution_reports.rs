@@ -81,10 +81,10 @@ pub(crate) struct WalksOnGround {
     /// Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
     ankle_saturated_share: f64,
     /// Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
-    /// make.
+    /// produce.
     knee_rate_limited_share: f64,
     /// Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
-    /// make.
+    /// produce.
     ankle_rate_limited_share: f64,
 }
 
@@ -143,7 +143,7 @@ impl From<execution::StridesOnYield> for StridesOnYield {
 pub(crate) struct SurvivedPushes {
     /// Forwards, N s; 0 if it survives none.
     forwards_n_s: f64,
-    /// Backwards, N s.
+    /// Backwards, N s; 0 if it survives none.
     backwards_n_s: f64,
     /// Largest push of the series, N s.
     largest_tried_n_s: f64,

@@ -6,7 +6,7 @@ use gaitwright_store::{FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Entry of the feedback log.
+/// An entry of the feedback of a study.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct FeedbackRow {
     /// Sequence number.
@@ -29,7 +29,7 @@ pub(crate) struct FeedbackRow {
     could_have_known: bool,
     /// Time of recording.
     created_at: Instant,
-    /// Retraction, if it was retracted.
+    /// Retraction. Null if the entry was not retracted.
     retraction: Option<Retraction>,
 }
 

@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 pub(crate) struct Import {
     /// SHA-256 of the archive.
     file_sha256: String,
-    /// Public key of the signer. Absent for an unsigned archive.
+    /// Public key of the signer. Null for an unsigned archive.
     signed_by: Option<String>,
     /// Whether the import required a signature by that key.
     trusted: bool,

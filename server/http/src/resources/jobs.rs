@@ -15,7 +15,7 @@ pub(crate) struct OpenSolve {
     losses: u32,
     /// Worker that has it. Null while it is queued.
     worker: Option<String>,
-    /// End of the lease, unless it is renewed.
+    /// End of the lease, unless it is renewed. Null while the solve is queued.
     lease_until: Option<Instant>,
     /// Time of queueing.
     created_at: Instant,

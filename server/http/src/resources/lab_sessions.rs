@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 pub(crate) struct LabSessionStep {
     /// Reason or note.
     note: String,
-    /// Who did it.
+    /// Who completed the step.
     actor: String,
     /// Time of the step.
     created_at: Instant,
@@ -48,9 +48,9 @@ impl From<allocations::ControllerFileDownload> for ControllerFileDownload {
 pub(crate) struct WalkView {
     /// Number of the walk, 1 to 3.
     number: u8,
-    /// Condition of the walk. Absent while it is blinded.
+    /// Condition of the walk. Null while it is blinded.
     condition: Option<Condition>,
-    /// Who recorded the walk, and when.
+    /// Who recorded the walk, and when. Null if it is not recorded yet.
     recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
     recorded_after_unblinding: bool,
@@ -82,16 +82,16 @@ pub(crate) struct LabSessionView {
     notes: String,
     /// The three walks.
     walks: Vec<WalkView>,
-    /// Current answer of the subject. Absent if there is none.
+    /// Current answer of the subject. Null if there is none.
     answer: Option<AnswerView>,
-    /// Who unblinded the session, when and why. Absent while it is blinded.
+    /// Who unblinded the session, when and why. Null while it is blinded.
     unblinded: Option<LabSessionStep>,
     /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
     /// and then imported.
     allocation_included: bool,
-    /// Who fetched controller files of the walks.
+    /// Downloads of the controller files of the walks.
     controller_files: Vec<ControllerFileDownload>,
-    /// Who closed the session, and when.
+    /// Who closed the session, and when. Null while it is open.
     closed: Option<LabSessionStep>,
     /// Who planned the session.
     planned_by: String,

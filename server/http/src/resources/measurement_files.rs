@@ -16,7 +16,7 @@ pub(crate) struct MeasurementFile {
     walk: u8,
     /// Kind of measurement.
     kind: MeasurementKind,
-    /// Name of the file, if it is known.
+    /// Name of the file. Null if unknown.
     file_name: Option<String>,
     /// SHA-256 of the file.
     raw_sha256: String,

@@ -17,7 +17,7 @@ pub(crate) struct Member {
     kind: MemberKind,
     /// Name of the user or the token.
     name: String,
-    /// Role of a user. Absent for a token.
+    /// Role of a user. Null for a token.
     role: Option<Role>,
     /// Who added the member.
     added_by: String,

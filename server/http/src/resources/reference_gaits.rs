@@ -33,7 +33,8 @@ impl From<reference_gaits::ReferenceGait> for ReferenceGait {
 pub(crate) struct ReferenceGaitMatch {
     /// The reference gait.
     reference_gait: ReferenceGait,
-    /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait does not state height and mass.
+    /// Distance to the reference gait, without a unit: `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`, with the difference in
+    /// height dh and in body mass dm. Null if the reference gait does not state height and mass.
     distance: Option<f64>,
 }
 

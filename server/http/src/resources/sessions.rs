@@ -4,7 +4,7 @@ use gaitwright_store::{Instant, SessionId, UserId, sessions};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Session of a user.
+/// Sign-in session of a user.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Session {
     /// Identifier. It is not the value of the session cookie.
@@ -19,9 +19,9 @@ pub(crate) struct Session {
     seen_at: Instant,
     /// Whether the user signed in with a one-time link rather than a password.
     by_link: bool,
-    /// Client address at sign-in.
+    /// Client address at sign-in. Null if unknown.
     address: Option<String>,
-    /// User agent of the browser.
+    /// User agent of the browser. Null if unknown.
     browser: Option<String>,
 }
 

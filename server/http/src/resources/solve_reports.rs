@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum SolveStatus {
-    /// Every row and bound is satisfied.
+    /// Every constraint is satisfied.
     Converged,
     /// A local minimum of the violation: no gait near it.
     Infeasible,
@@ -100,10 +100,10 @@ pub(crate) struct SolveReport {
     /// Number of variables.
     #[schema(value_type = u64)]
     variables: usize,
-    /// Number of equality rows.
+    /// Number of equality constraints.
     #[schema(value_type = u64)]
     equalities: usize,
-    /// Number of inequality rows.
+    /// Number of inequality constraints.
     #[schema(value_type = u64)]
     inequalities: usize,
     /// Mean walking speed, m/s.
@@ -180,9 +180,9 @@ impl From<gait_optimizer::SolveReport> for SolveReport {
 pub(crate) struct UnchangedBound {
     /// Name of the bound.
     bound: String,
-    /// Smallest value. Null if every smaller one leaves the gait as it is.
+    /// Smallest value, in the unit of the bound. Null if every smaller one leaves the gait as it is.
     least: Option<f64>,
-    /// Largest value. Null if every larger one leaves the gait as it is.
+    /// Largest value, in the unit of the bound. Null if every larger one leaves the gait as it is.
     most: Option<f64>,
 }
 
@@ -297,10 +297,10 @@ impl From<gait_optimizer::LinearAlgebra> for LinearAlgebra {
     }
 }
 
-/// A violated row of the gait problem.
+/// A violated constraint of the gait problem.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Violation {
-    /// The row in words: domain, node, constraint, component.
+    /// The constraint in words: domain, node, constraint, component.
     row: String,
     /// Amount of the violation.
     amount: f64,
@@ -322,13 +322,14 @@ pub(crate) struct Iteration {
     /// Number of the iteration over all phases.
     #[schema(value_type = u64)]
     iteration: usize,
-    /// `tracking` or `muscle_tracking`, of the reference gait without or with muscles; `plain_cost` or `cost`, minimisation of the
-    /// cost of transport without or with muscles; `inter_node`, minimisation with tightened bounds.
+    /// Phase of the solve: `tracking` and `muscle_tracking`, tracking of the reference gait without and with muscles;
+    /// `plain_cost`, minimisation of the cost of transport without muscles, before that with muscles; `cost`,
+    /// minimisation of the cost of transport; `inter_node`, minimisation with tightened bounds.
     #[schema(value_type = String)]
     phase: SolvePhase,
     /// Objective of the phase.
     objective: f64,
-    /// Largest violation of a scaled row.
+    /// Largest violation of a scaled constraint.
     constraint_violation: f64,
     /// Largest entry of the dual infeasibility.
     dual_infeasibility: f64,

@@ -4,7 +4,7 @@ use gait_optimizer::gait::stick_figure;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Positions of the body at an instant: forward and up, m.
+/// Points of the body at an instant as forward and upward coordinates, m.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct StickFigure {
     /// Time from the start of the stride, s.
@@ -28,7 +28,7 @@ impl From<stick_figure::StickFigure> for StickFigure {
     }
 }
 
-/// Joint positions of one leg: forward and up, m.
+/// Points of one leg as forward and upward coordinates, m.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct LegPoints {
     /// Knee.

@@ -16,7 +16,7 @@ pub(crate) struct Study {
     /// Set-up of the study.
     #[serde(flatten)]
     plan: StudyPlan,
-    /// Parent, if the study is a fork.
+    /// Parent, if the study is a fork; otherwise null.
     forked_from: Option<StudyId>,
     /// State of the study.
     state: StudyState,
@@ -24,12 +24,12 @@ pub(crate) struct Study {
     state_reason: String,
     /// Revision, which increases with each change.
     revision: i64,
-    /// Tags, by which people find the study.
+    /// Tags for finding the study.
     tags: Vec<String>,
     /// Free-text notes.
     notes: String,
-    /// Time at which the study was archived. Lists leave out archived studies unless they are asked for; `GET
-    /// /studies?archived=true` lists them.
+    /// Time at which the study was archived. Null if it is not archived. Lists leave out archived studies unless they
+    /// are asked for; `GET /api/v1/studies?archived=true` lists them.
     archived_at: Option<Instant>,
     /// Time of creation.
     created_at: Instant,
@@ -114,7 +114,7 @@ pub(crate) struct StudyPlan {
     repeat_results: bool,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     parallel_trials: u32,
-    /// Priority, -10 to 10. Higher values run first.
+    /// Priority, -10 to 10. Studies with a higher priority run first.
     priority: i32,
     /// Seed for all random draws except allocations.
     seed: u64,

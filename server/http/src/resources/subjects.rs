@@ -40,7 +40,7 @@ pub(crate) struct Correction {
     body_mass_kg: f64,
     /// Reason for the correction.
     reason: String,
-    /// Who corrected it.
+    /// Who made the correction.
     actor: String,
     /// Time of the correction.
     created_at: Instant,
@@ -60,7 +60,7 @@ pub(crate) struct Consent {
     seq: i64,
     /// Consent or withdrawal.
     kind: ConsentKind,
-    /// For consent, the name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
+    /// For consent, the name and version of the signed form. For a withdrawal, the reason, or `none given`.
     note: String,
     /// Who recorded it.
     actor: String,

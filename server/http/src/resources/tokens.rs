@@ -18,9 +18,9 @@ pub(crate) struct Token {
     created_by: String,
     /// Time of creation.
     created_at: Instant,
-    /// Time of expiry. Absent if it does not expire.
+    /// Time of expiry. Null if it does not expire.
     expires_at: Option<Instant>,
-    /// Time of revocation, if it was revoked.
+    /// Time of revocation. Null if it is not revoked.
     revoked_at: Option<Instant>,
 }
 

@@ -21,45 +21,46 @@ pub(crate) struct Trial {
     /// Index of the action in the search space.
     #[schema(value_type = u64)]
     action_index: ActionIndex,
-    /// Action as bounds.
+    /// The action: values of the bounds a1 to a8, tuned or fixed.
     #[schema(value_type = study_plan_schemas::Bounds)]
     action: TunedBounds,
     /// Reason for the trial.
     reason: String,
-    /// Best trial when this one was proposed.
+    /// Best trial when this one was proposed. Null if there was none.
     best_before: Option<TrialId>,
-    /// Trial whose gait is the warm start. Absent for a cold start.
+    /// Trial whose gait is the warm start. Null for a cold start.
     warm_started_from: Option<TrialId>,
-    /// Script that evaluates the trial. Absent if the service does.
+    /// Script that evaluates the trial. Null if the service does.
     script: Option<String>,
     /// State of the trial.
     state: TrialState,
-    /// How the solve ended.
+    /// How the solve ended. Null without a completed solve.
     status: Option<SolveStatus>,
-    /// Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
-    /// iterate.
+    /// Gait RMSE of a converged gait, rad. Null without one, and if the script that evaluated the trial did not report
+    /// it. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Option<f64>,
-    /// Cost of transport of a converged gait, dimensionless.
+    /// Cost of transport of a converged gait, dimensionless. Null without one, and if the script that evaluated the
+    /// trial did not report it.
     cost_of_transport: Option<f64>,
-    /// Objective of the solve.
+    /// Objective of the solve. Null without a completed solve.
     objective: Option<f64>,
-    /// Largest violation, scaled.
+    /// Largest violation, scaled. Null without a completed solve.
     max_violation: Option<f64>,
-    /// Interior-point iterations.
+    /// Number of interior-point iterations. Null without a completed solve.
     iterations: Option<u32>,
-    /// Wall time of the solve, s.
+    /// Wall time of the solve, s. Null without a completed solve.
     seconds_total: Option<f64>,
-    /// All numerical results of the solve.
+    /// All numerical results of the solve. Null without a completed solve.
     report: Option<SolveReport>,
-    /// Most violated rows, worst first.
+    /// Most violated constraints, worst first.
     violations: Vec<Violation>,
     /// Human-readable message about how the trial ended; may be empty.
     message: String,
     /// Time of proposal.
     created_at: Instant,
-    /// Time at which a worker first started it.
+    /// Time at which a worker first started it. Null before.
     started_at: Option<Instant>,
-    /// Time at which it ended.
+    /// Time at which it ended. Null while it is open.
     finished_at: Option<Instant>,
 }
 

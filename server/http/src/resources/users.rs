@@ -16,7 +16,7 @@ pub(crate) struct User {
     role: Role,
     /// Whether the user has a password. Otherwise only one-time links work.
     has_password: bool,
-    /// Time at which the user was disabled, if disabled.
+    /// Time at which the user was disabled. Null if the user is not disabled.
     disabled_at: Option<Instant>,
     /// Time of creation.
     created_at: Instant,

@@ -50,7 +50,7 @@ pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<
     let token = tokens::insert(writer, name, &secret::hash(&secret), &new.scopes, actor, ends)
         .await
         .on_constraint(NAME_UNIQUE, || {
-            Error::conflict(format!("There is already a token {name:?}. Choose another name."))
+            Error::conflict(format!("A token named {name:?} already exists. Choose another name."))
         })?;
     let detail = json!({ "name": name, "scopes": new.scopes });
     audit::append(writer, actor, "token.make", &format!("token {}", token.id), &detail).await?;

@@ -34,7 +34,7 @@ pub struct NewUser {
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if a user has this name or one of the same person.
 pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewUser) -> Result<User, Error> {
     let name = printable::name("name", &new.name, 80)?;
-    let taken = |by: &str| Error::conflict(format!("There is already a user {by:?}. Choose another name."));
+    let taken = |by: &str| Error::conflict(format!("A user named {by:?} already exists. Choose another name."));
     if let Some(same) = users::all(writer).await?.iter().find(|user| printable::is_same_name(&user.name, name)) {
         return Err(taken(&same.name));
     }

@@ -49,7 +49,8 @@ pub struct Answer {
     pub trial_b: TrialId,
     /// Which gait is better.
     pub answer: PairAnswer,
-    /// Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
+    /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    /// `clinician` for any other user.
     #[serde(default)]
     pub source: Option<Source>,
     /// Name or pseudonym of the author. Defaults to the caller's name.

@@ -24,7 +24,8 @@ pub struct NewAssessment {
     pub trial_b: TrialId,
     /// The answer. To state which gait is better, record a preference instead.
     pub answer: AssessmentAnswer,
-    /// Who answers: `subject`, `clinician` or `script`. The default depends on the kind of caller.
+    /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    /// `clinician` for any other user.
     #[serde(default)]
     pub source: Option<Source>,
     /// Name or pseudonym of the author. Defaults to the caller's name.

@@ -16,15 +16,15 @@ use utoipa::ToSchema;
 /// The most gaits that are certified in search of one that passes.
 pub const MOST_CERTIFIED: usize = 10;
 
-/// State of the certificate of a gait: `passed`, every check is within its limit, the walker does not fall and the gait
-/// is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified; `not_certified`,
-/// the gait has no certificate.
+/// State of the certificate of a gait: `passed`, every checked value is within its limit, the walker does not fall and
+/// the gait is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified;
+/// `not_certified`, the gait has no certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CertificateState {
-    /// Every quantity is within its limit, and the gait is stable.
+    /// Every checked value is within its limit, the walker does not fall, and the gait is stable.
     Passed,
-    /// A quantity exceeds its limit, or the gait is unstable.
+    /// The certificate did not pass.
     Failed,
     /// The gait is being certified.
     BeingCertified,

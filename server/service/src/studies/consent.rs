@@ -23,7 +23,7 @@ pub struct NewConsent {
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Withdrawal {
-    /// Reason, if the subject gave one.
+    /// Reason, 1 to 2000 characters, or `none given` if the subject gave none.
     #[schema(min_length = 1, max_length = 2000)]
     pub reason: String,
 }

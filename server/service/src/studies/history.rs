@@ -21,9 +21,9 @@ pub struct Milestone {
     pub trial_id: TrialId,
     /// Number of the best trial.
     pub number: u32,
-    /// Gait RMSE of the best trial, rad. Absent if it did not converge.
+    /// Gait RMSE of the best trial, rad. Null if the script that evaluated the trial did not report it.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport of the best trial.
+    /// Cost of transport of the best trial. Null if the script that evaluated the trial did not report it.
     pub cost_of_transport: Option<f64>,
 }
 

@@ -40,7 +40,7 @@ impl StudyTransition {
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Start => "start",
-            Self::Ask => "wait for a preference in",
+            Self::Ask => "ask for an answer in",
             Self::Answered => "continue",
             Self::Pause => "pause",
             Self::Resume => "resume",

@@ -200,7 +200,7 @@ pub(super) async fn suggest(
         grounds.admit(trial).map_err(|reason| refuse(format!("the bounds of a walkable gait. {reason}")))?;
         if is_same_gait(trial, over) {
             return Err(refuse(format!(
-                "the bounds of a different gait, but trial {} has these bounds and the same gait",
+                "the bounds of a different gait; trial {} already has these bounds, and its gait is that of the trial",
                 trial.number
             )));
         }

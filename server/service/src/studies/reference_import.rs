@@ -24,7 +24,7 @@ pub(super) const FORCES: &str = "forces";
 const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 
 /// File format of a recording of joint angles: `opensim`, a motion or storage file (.mot, .sto) of a gait model;
-/// `camargo`, the `data` table of an `ik` file from the data set Camargo 2021 as CSV; `csv`, a CSV file as
+/// `camargo`, the `data` table of an `ik` file from the Camargo 2021 data set, as CSV; `csv`, a CSV file as
 /// `/help/data-files` describes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -32,7 +32,7 @@ pub enum JointAngleFormat {
     /// OpenSim motion or storage file (.mot, .sto) of a gait model.
     #[default]
     Opensim,
-    /// The `data` table of an `ik` file from the data set Camargo 2021, exported as CSV with MATLAB's writetable.
+    /// The `data` table of an `ik` file from the Camargo 2021 data set, exported as CSV with MATLAB's writetable.
     Camargo,
     /// CSV: time_s, torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad; optionally knee_R_rad, right_force_n.
     Csv,
@@ -91,7 +91,7 @@ pub struct NewReferenceGait {
     #[serde(default)]
     pub force_column: Option<String>,
     /// Content of a separate file with the force column: an OpenSim file, or the `fp` table that belongs to an `ik`
-    /// table of Camargo 2021. Both files must have the same time axis.
+    /// table of the Camargo 2021 data set. Both files must have the same time axis.
     #[serde(default)]
     pub forces: Option<String>,
     /// How to find right heel strikes if `heel_strikes_s` is empty.

@@ -43,7 +43,10 @@ pub enum NoRelaxedTrial {
     #[error("This study does not tune {0}.")]
     NotTuned(String),
     /// The search space has no value that is loose enough.
-    #[error("The loosest {bound} of this study is {loosest}, which is not loose enough.")]
+    #[error(
+        "The loosest value of {bound} in this study is {loosest} {}, which is not loose enough.",
+        TunedBounds::unit_of(bound)
+    )]
     OutsideSearchSpace {
         /// The bound.
         bound: String,
@@ -51,7 +54,7 @@ pub enum NoRelaxedTrial {
         loosest: f64,
     },
     /// A trial has these bounds already.
-    #[error("Trial {number} of this study has these bounds already.")]
+    #[error("Trial {number} of this study already has these bounds.")]
     Tried {
         /// The trial.
         trial: TrialId,
@@ -107,7 +110,9 @@ pub async fn of(
 fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
     let refused = match study.state {
         _ if study.plan.evaluation == Evaluation::Script => "A lab script evaluates the trials of this study.",
-        _ if study.archived_at.is_some() => "The study is archived. Show it in the list of studies first.",
+        _ if study.archived_at.is_some() => {
+            "The study is archived. Press \u{201c}Show in the list of studies again\u{201d} in its details first."
+        }
         StudyState::Running | StudyState::Finished => return Ok(()),
         StudyState::Draft => "The study has not started.",
         StudyState::Waiting => "The study waits for an answer. Answer the comparison first.",
@@ -271,6 +276,6 @@ mod tests {
         assert_eq!(found(&[("a6", 0.2)]), Err(NoRelaxedTrial::NotTuned("a6".to_owned())));
         let refused = found(&[("a7", 51.0)]).unwrap_err();
         assert_eq!(refused, NoRelaxedTrial::OutsideSearchSpace { bound: "a7".to_owned(), loosest: 50.0 });
-        assert_eq!(refused.to_string(), "The loosest a7 of this study is 50, which is not loose enough.");
+        assert_eq!(refused.to_string(), "The loosest value of a7 in this study is 50 °, which is not loose enough.");
     }
 }

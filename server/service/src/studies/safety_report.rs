@@ -17,7 +17,8 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewSafetyReport)]
 pub struct NewSafetyReport {
-    /// Who reports: `subject`, `clinician` or `script`. The default depends on the kind of caller.
+    /// Who reports: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    /// `clinician` for any other user.
     #[serde(default)]
     pub source: Option<Source>,
     /// Name or pseudonym of the author. Defaults to the caller's name.

@@ -23,6 +23,9 @@ pub struct ReportedGait {
     pub by: String,
     /// Time of the report.
     pub at: Instant,
+    /// What staff wrote in a report or an assessment. Empty for raters and for the subject in a blinded lab session, whose notes
+    /// could tell which gait was shown first.
+    pub note: String,
     /// Where it was given.
     pub source: SafetyReportSource,
     /// The newest review by staff.
@@ -161,6 +164,7 @@ impl SafetyReports {
                     trial,
                     by: by.clone(),
                     at,
+                    note: String::new(),
                     source: SafetyReportSource::Rater(shown.id),
                     review: None,
                 };
@@ -176,6 +180,7 @@ impl SafetyReports {
                 trial,
                 by: by.clone(),
                 at,
+                note: assessment.note.clone(),
                 source,
                 review: None,
             });
@@ -186,6 +191,7 @@ impl SafetyReports {
                 trial,
                 by,
                 at,
+                note: report.note,
                 source: SafetyReportSource::Alone(report.id),
                 review: None,
             });
@@ -200,7 +206,8 @@ impl SafetyReports {
                 let by =
                     format!("the subject in lab session {} (blinded, so either gait may be meant)", session.number);
                 let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
-                let report = |trial| ReportedGait { trial, by: by.clone(), at, source, review: None };
+                let report =
+                    |trial| ReportedGait { trial, by: by.clone(), at, note: String::new(), source, review: None };
                 found.in_force.extend([session.trial_a, session.trial_b].map(report));
             }
         }

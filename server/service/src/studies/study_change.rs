@@ -20,7 +20,7 @@ pub struct Change {
     #[serde(default)]
     #[schema(min_length = 1, max_length = 120)]
     pub name: Option<String>,
-    /// Priority, -10 to 10. Higher values run first.
+    /// Priority, -10 to 10. Studies with a higher priority run first.
     #[serde(default)]
     #[schema(minimum = -10, maximum = 10)]
     pub priority: Option<i32>,

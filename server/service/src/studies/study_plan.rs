@@ -81,7 +81,7 @@ pub struct NewStudy {
     /// Number of trials that run in parallel.
     #[serde(default = "one")]
     pub parallel_trials: u32,
-    /// Priority, -10 to 10. Higher values run first.
+    /// Priority, -10 to 10. Studies with a higher priority run first.
     #[serde(default)]
     pub priority: i32,
     /// Seed for all random draws except allocations.

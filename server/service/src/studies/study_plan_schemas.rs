@@ -16,7 +16,7 @@ pub struct SolveOptions(pub BTreeMap<String, Value>);
 #[derive(Debug, ToSchema)]
 pub struct LearnerSettings(pub BTreeMap<String, Value>);
 
-/// The tuned bounds of one action.
+/// Values of the bounds a1 to a8.
 #[derive(Debug, ToSchema)]
 pub struct Bounds(pub BTreeMap<String, Value>);
 
@@ -32,8 +32,9 @@ pub struct SearchSpace {
 pub struct Dimension {
     /// Name of the bound.
     pub name: String,
-    /// Its values, ascending.
+    /// Values of the bound, in its unit, ascending.
     pub values: Vec<f64>,
-    /// How far apart two values can be while their gaits are still expected to have similar utility.
+    /// How far apart two values can be, in the unit of the bound, while their gaits are still expected to have similar
+    /// utility.
     pub lengthscale: f64,
 }

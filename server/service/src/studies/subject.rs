@@ -78,7 +78,7 @@ pub async fn checked(db: &mut Connection, new: &NewSubject) -> Result<Body, Erro
 }
 
 fn is_taken(pseudonym: &str) -> Error {
-    Error::conflict(format!("There is already a subject {pseudonym:?}. Choose another pseudonym."))
+    Error::conflict(format!("A subject with the pseudonym {pseudonym:?} already exists. Choose another pseudonym."))
 }
 
 /// A correction of height and mass.

@@ -218,7 +218,8 @@ async fn outcome(
         seed,
         trials: snapshot.trials.len(),
         converged: snapshot.trials.iter().filter(|trial| trial.gait_rmse_rad.is_some()).count(),
-        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        // `sum` of nothing is -0.0.
+        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).fold(0.0, |all, own| all + own),
         wall_seconds: wall_seconds(snapshot),
         by_iteration: comparison::by_iteration(&milestones, history::results(snapshot).len()),
         best_trial: best.map(|trial| trial.number),

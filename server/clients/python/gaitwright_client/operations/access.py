@@ -12,7 +12,6 @@ from ..schemas import (
     CreatedInvitation,
     CreatedToken,
     Invitation,
-    Link,
     Me,
     Member,
     MemberId,
@@ -22,6 +21,7 @@ from ..schemas import (
     NewUser,
     Session,
     SessionId,
+    SignInLink,
     StudyAccess,
     StudyId,
     Token,
@@ -46,16 +46,16 @@ class AccessMethods(Transport):
         return cast(Me, self.request_json("GET", "/api/v1/me"))
 
     def list_sessions(self, *, page_size: Optional[int] = None) -> Pages[Session]:
-        """List sessions.
+        """List sign-in sessions.
 
-        Active sessions of the caller, or of all users for an administrator, newest first.
+        Active sign-in sessions of the caller, or of all users for an administrator, newest first.
         """
         return Pages(self, "/api/v1/sessions", query={"limit": page_size})
 
     def end_session(self, session_id: SessionId, *, idempotency_key: Optional[str] = None) -> Session:
-        """End a session.
+        """End a sign-in session.
 
-        Ends a session of the caller or, for an administrator, of any user.
+        Ends a sign-in session of the caller or, for an administrator, of any user.
         """
         return cast(
             Session,
@@ -155,7 +155,10 @@ class AccessMethods(Transport):
         return cast(Member, self.request_json("GET", "/api/v1/study-members/{id}", {"id": study_member_id}))
 
     def remove_study_member(self, study_member_id: MemberId, *, idempotency_key: Optional[str] = None) -> Member:
-        """Remove a study member."""
+        """Remove a study member.
+
+        Ends the membership, which remains on record.
+        """
         return cast(
             Member,
             self.request_json(
@@ -187,7 +190,10 @@ class AccessMethods(Transport):
         return cast(Token, self.request_json("GET", "/api/v1/tokens/{id}", {"id": token_id}))
 
     def revoke_token(self, token_id: TokenId, *, idempotency_key: Optional[str] = None) -> Token:
-        """Revoke a token."""
+        """Revoke a token.
+
+        A revoked token can no longer be used.
+        """
         return cast(
             Token,
             self.request_json(
@@ -219,7 +225,7 @@ class AccessMethods(Transport):
     def disable_user(self, user_id: UserId, *, idempotency_key: Optional[str] = None) -> User:
         """Disable a user.
 
-        Ends the user's sessions, and revokes the user's links and tokens.
+        Ends the user's sign-in sessions, and revokes the user's links and tokens.
         """
         return cast(User, self.request_json("POST", "/api/v1/users/{id}/disable", {"id": user_id}, key=idempotency_key))
 
@@ -227,12 +233,12 @@ class AccessMethods(Transport):
         """Enable a user."""
         return cast(User, self.request_json("POST", "/api/v1/users/{id}/enable", {"id": user_id}, key=idempotency_key))
 
-    def create_sign_in_link(self, user_id: UserId) -> Link:
+    def create_sign_in_link(self, user_id: UserId) -> SignInLink:
         """Create a sign-in link for a user.
 
         The link works once, within a day. The request does not accept an Idempotency-Key.
         """
-        return cast(Link, self.request_json("POST", "/api/v1/users/{id}/link", {"id": user_id}, repeatable=False))
+        return cast(SignInLink, self.request_json("POST", "/api/v1/users/{id}/link", {"id": user_id}, repeatable=False))
 
     def set_user_role(self, user_id: UserId, *, idempotency_key: Optional[str] = None, **body: Unpack[NewRole]) -> User:
         """Change the role of a user.

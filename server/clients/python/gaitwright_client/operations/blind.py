@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
-    Answered,
+    AnswerReceipt,
     BlindMotion,
     NextPair,
     RaterAnswer,
@@ -33,13 +33,15 @@ class BlindMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[RaterAnswer],
-    ) -> Answered:
+    ) -> AnswerReceipt:
         """Answer a blind pair.
+
+        The first answer to a pair counts. A safety report takes effect at once.
 
         Fields: answer; optionally note, response_ms.
         """
         return cast(
-            Answered,
+            AnswerReceipt,
             self.request_json(
                 "POST",
                 "/api/v1/blind-pairs/{token}/answer",

@@ -105,7 +105,7 @@ class LabMethods(Transport):
         allocation. It is meant for the device, which uses a token with only the `device` scope. If anybody else fetches
         the file, the session and the audit trail record this, and later answers of that caller do not count as blind.
 
-        walk: 2 or 3. Walk 1 is without the device.
+        walk: Number of the walk, 2 or 3. Walk 1 is without the device.
 
         rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
         """
@@ -119,19 +119,13 @@ class LabMethods(Transport):
             ),
         )
 
-    def get_emg_results(self, lab_session_id: LabSessionId) -> Optional[EmgView]:
+    def get_emg_results(self, lab_session_id: LabSessionId) -> EmgView:
         """Get the processed EMG.
 
-        The newest result. After unblinding, includes the muscle activity of the model.
+        The newest result. After unblinding, includes the muscle activity of the model. Without a result, the status is
+        404.
         """
-        return cast(
-            "Optional[EmgView]",
-            self.request_json(
-                "GET",
-                "/api/v1/lab-sessions/{id}/emg-results",
-                {"id": lab_session_id},
-            ),
-        )
+        return cast(EmgView, self.request_json("GET", "/api/v1/lab-sessions/{id}/emg-results", {"id": lab_session_id}))
 
     def process_emg(
         self,
@@ -249,7 +243,10 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
     ) -> LabSessionProgress:
-        """Retract the answer of the subject."""
+        """Retract the answer of the subject.
+
+        Possible until the session is closed or unblinded. A safety report cannot be retracted.
+        """
         return cast(
             LabSessionProgress,
             self.request_json(
@@ -294,6 +291,8 @@ class LabMethods(Transport):
     ) -> LabSessionProgress:
         """Record a walk.
 
+        Walks are recorded in order. A recorded walk cannot be undone.
+
         Fields: walk; optionally note.
         """
         return cast(
@@ -308,7 +307,7 @@ class LabMethods(Transport):
         )
 
     def get_measurement_file(self, measurement_file_id: MeasurementFileId) -> MeasurementFile:
-        """Get a measurement file."""
+        """Get the description of a measurement file."""
         return cast(
             MeasurementFile,
             self.request_json(

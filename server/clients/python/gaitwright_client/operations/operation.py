@@ -28,7 +28,7 @@ class OperationMethods(Transport):
     def list_access_log(
         self,
         *,
-        contains: Optional[str] = None,
+        text: Optional[str] = None,
         subject_id: Optional[SubjectId] = None,
         page_size: Optional[int] = None,
     ) -> Pages[AccessRow]:
@@ -36,24 +36,20 @@ class OperationMethods(Transport):
 
         Views and exports of subjects' data, and refusals, newest first.
 
-        contains: Text to find in the kind, actor, address, object, study or pseudonym.
+        text: Text to find in the kind, actor, address, object, study or pseudonym.
 
         subject_id: Only rows of this subject.
         """
-        return Pages(
-            self,
-            "/api/v1/access-log",
-            query={"contains": contains, "subject_id": subject_id, "limit": page_size},
-        )
+        return Pages(self, "/api/v1/access-log", query={"text": text, "subject_id": subject_id, "limit": page_size})
 
-    def list_audit_trail(self, *, contains: Optional[str] = None, page_size: Optional[int] = None) -> Pages[AuditRow]:
+    def list_audit_trail(self, *, text: Optional[str] = None, page_size: Optional[int] = None) -> Pages[AuditRow]:
         """List the audit trail.
 
         Every change by a user or a program, newest first.
 
-        contains: Text to find in the actor, the kind of change or the object.
+        text: Text to find in the actor, the kind of change or the object.
         """
-        return Pages(self, "/api/v1/audit", query={"contains": contains, "limit": page_size})
+        return Pages(self, "/api/v1/audit", query={"text": text, "limit": page_size})
 
     def create_backup(self, *, idempotency_key: Optional[str] = None) -> Job:
         """Back up the record.

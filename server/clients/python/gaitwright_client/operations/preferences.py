@@ -138,6 +138,9 @@ class PreferencesMethods(Transport):
     ) -> CreatedPreference:
         """Record a preference.
 
+        Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author has
+        one answer to two gaits; to change it, retract it first.
+
         Fields: answer, trial_a, trial_b; optionally author, note, source.
         """
         return cast(
@@ -183,7 +186,7 @@ class PreferencesMethods(Transport):
     ) -> FeedbackRow:
         """Record a suggestion.
 
-        The learner uses it like a preference. Retract it with `POST /preferences/{id}/retract`.
+        The learner uses it like a preference. Retract it with `POST /api/v1/preferences/{id}/retract`.
 
         Fields: bounds, over; optionally author, note, source.
         """

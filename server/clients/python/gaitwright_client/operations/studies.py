@@ -18,12 +18,12 @@ from ..schemas import (
     Milestone,
     NewStudy,
     Recommendation,
-    StudyActionReason,
     StudyComparison,
     StudyId,
     StudyState,
     StudyView,
     SubjectId,
+    TransitionReason,
 )
 from ..transport import Transport
 
@@ -112,7 +112,7 @@ class StudiesMethods(Transport):
     def get_study_archive(self, study_id: StudyId) -> bytes:
         """Export a study as an archive.
 
-        The archive has every row of the study, without blinded allocations, as `gaitwright export` writes it.
+        The archive has every row of the study, without concealed allocations, as `gaitwright export` writes it.
         """
         return self.request_bytes("GET", "/api/v1/studies/{id}/archive", {"id": study_id})
 
@@ -135,7 +135,7 @@ class StudiesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[Extend],
     ) -> StudyView:
-        """Raise the trial budget of a study.
+        """Raise the number of trials of a study.
 
         If the study has ended, it resumes.
 
@@ -204,7 +204,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Pause a study.
 
@@ -244,9 +244,11 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Resume a study.
+
+        Possible while the study is `paused`.
 
         Fields: optionally reason.
         """
@@ -268,9 +270,11 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Start a study.
+
+        Possible while the study is `draft`.
 
         Fields: optionally reason.
         """
@@ -292,7 +296,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyActionReason],
+        **body: Unpack[TransitionReason],
     ) -> StudyView:
         """Stop a study.
 
@@ -317,6 +321,6 @@ class StudiesMethods(Transport):
 
         Results keep the order of `ids`.
 
-        ids: 2 to 20 comma-separated identifiers of studies.
+        ids: 2 to 20 comma-separated identifiers of different studies.
         """
         return Pages(self, "/api/v1/study-comparison", query={"ids": ids, "limit": page_size})

@@ -1,5 +1,6 @@
 //! The editor of the search space: tuned bounds with their values, and fixed values of the others.
 
+use crate::form_errors;
 use gait_learner::{Dimension, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::{Error, FieldError};
@@ -26,7 +27,7 @@ impl SpaceEditor {
     /// Reads the entries; without any, Table I of the paper.
     ///
     /// # Errors
-    /// [`Error::Malformed`] for a field that the form does not have.
+    /// [`Error::Unreadable`] for a field that the form does not have.
     pub(super) fn typed(fields: &BTreeMap<String, String>) -> Result<Self, Error> {
         let known = |field: &str| {
             let parts = field.split_once('_');
@@ -35,7 +36,7 @@ impl SpaceEditor {
             })
         };
         if let Some(field) = fields.keys().find(|field| !known(field)) {
-            return Err(Error::Malformed(format!("unknown field {field}")));
+            return Err(Error::Unreadable(Box::new(form_errors::unknown_field(field))));
         }
         let defaults = TunedBounds::default().to_array();
         let row = |(bound, name): (usize, &'static str)| {
@@ -46,7 +47,7 @@ impl SpaceEditor {
             BoundEntries {
                 name,
                 meaning: TunedBounds::MEANINGS[bound],
-                allowed: format!("{low} to {high}"),
+                allowed: format!("{low} to {high} {}", TunedBounds::unit_of(name)),
                 tuned: fields.is_empty() || fields.contains_key(&format!("tuned_{name}")),
                 values: text("values", preset.join(", ")),
                 lengthscale: text("lengthscale", lengthscale.to_string()),
@@ -170,6 +171,7 @@ mod tests {
         }
         let every: Vec<(&str, &str)> = every.iter().map(|(name, value)| (name.as_str(), value.as_str())).collect();
         assert_eq!(refused(&every), "values_a1");
-        assert!(matches!(SpaceEditor::typed(&typed(&[("values_a0", "1")])), Err(Error::Malformed(_))));
+        let unknown = SpaceEditor::typed(&typed(&[("values_a0", "1")])).err().unwrap();
+        assert_eq!(unknown.to_string(), "The form has no field values_a0.");
     }
 }

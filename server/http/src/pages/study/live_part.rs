@@ -157,6 +157,7 @@ struct UnsafeGait {
     number: u32,
     by: String,
     at: Instant,
+    note: String,
     /// Whether staff reviewed the report and kept the gait unsafe.
     reviewed: bool,
 }
@@ -312,7 +313,14 @@ fn view(
     let unsafe_gait = |report: &ReportedGait| {
         let number = snapshot.trial(report.trial)?.number;
         let reviewed = report.review.is_some();
-        Some(UnsafeGait { id: report.trial, number, by: report.by.clone(), at: report.at, reviewed })
+        Some(UnsafeGait {
+            id: report.trial,
+            number,
+            by: report.by.clone(),
+            at: report.at,
+            note: report.note.clone(),
+            reviewed,
+        })
     };
     let unsafe_gaits = snapshot.grounds.safety_reports.in_force.iter().filter_map(unsafe_gait).collect();
     let converged = snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();

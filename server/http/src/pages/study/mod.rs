@@ -24,7 +24,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::{Administer, Permission, Read};
+use gaitwright_service::access::{Administer, Permission, Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_store::devices::{self, Device};
@@ -66,7 +66,7 @@ struct ClosedPage {
     study: Study,
     subject: Subject,
     counts: TrialCounts,
-    may_administer: bool,
+    may_run: bool,
 }
 
 impl ClosedPage {
@@ -88,8 +88,8 @@ pub(super) async fn get(
     let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
     if consents::is_withdrawn(&mut reader, id).await? {
         let counts = trials::counts(&mut reader, id).await?;
-        let may_administer = authorized.caller.may(Administer::NEEDED);
-        return page(&ClosedPage { study, subject, counts, may_administer });
+        let may_run = authorized.caller.may(Run::NEEDED);
+        return page(&ClosedPage { study, subject, counts, may_run });
     }
     let last_event = events::last(&mut reader, id).await?;
     let device = devices::get(&mut reader, study.plan.device_id).await?;

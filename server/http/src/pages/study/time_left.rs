@@ -18,12 +18,15 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
         return "The time left depends on the script that evaluates the trials.".to_owned();
     }
     let solves: Vec<f64> = snapshot.trials.iter().filter_map(|trial| trial.seconds_total).collect();
+    let left = study.plan.trial_budget.saturating_sub(results);
     let Some(median) = median(&solves) else {
         let missing = FEWEST_SOLVES - solves.len();
+        if left as usize <= missing {
+            return String::new();
+        }
         let solves = if missing == 1 { "1 more solve".to_owned() } else { format!("{missing} more solves") };
         return format!("No estimate of the time left yet: it needs {solves}.");
     };
-    let left = study.plan.trial_budget.saturating_sub(results);
     let parallel = (study.plan.parallel_trials as usize).min(workers).max(1);
     let mut seconds = median * f64::from(left) / parallel as f64;
     if let Some(budget) = study.plan.solve_seconds_budget {

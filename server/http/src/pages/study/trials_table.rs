@@ -20,7 +20,7 @@ pub(crate) struct TrialsQuery {
     pub(super) sort: String,
     pub(super) order: String,
     state: String,
-    pub(super) contains: String,
+    pub(super) text: String,
     page: u32,
     /// The trial whose gait the page shows walking, which the script sends.
     #[serde(skip_serializing)]
@@ -33,7 +33,7 @@ impl Default for TrialsQuery {
             sort: SORTS[0].to_owned(),
             order: DESCENDING.to_owned(),
             state: String::new(),
-            contains: String::new(),
+            text: String::new(),
             page: 1,
             shown: String::new(),
         }
@@ -58,7 +58,7 @@ impl TrialsQuery {
                 .ok_or_else(|| Error::invalid("sort", self.sort.as_str(), &format!("one of {}", SORTS.join(", "))))?,
             descending: self.order == DESCENDING,
             state,
-            contains: self.contains.trim().to_owned(),
+            contains: self.text.trim().to_owned(),
             limit: PAGE,
             offset: self.page.saturating_sub(1).saturating_mul(PAGE),
         })

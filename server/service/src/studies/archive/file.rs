@@ -220,7 +220,7 @@ impl<R: Read> Unpacker<R> {
                 Ok(Next::Row(table, found))
             }
             ArchiveLine { table: None, sha256: None, row: None, end: Some(end) } => self.end(&end).map(Next::End),
-            _ => Err(refuse(format!("line {row} is neither a row nor the end"))),
+            _ => Err(refuse(format!("line {row} is neither a row nor the end line"))),
         }
     }
 

@@ -32,7 +32,7 @@ const NO_LONGER_SHOWN: &str = "This pair is no longer shown. Continue with the n
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RaterAnswer {
-    /// The answer. `retracted` is reserved for the service.
+    /// The answer.
     pub answer: Judgement,
     /// Response time of the rater, ms.
     #[serde(default)]
@@ -319,5 +319,5 @@ async fn own_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<P
 }
 
 fn unknown_pair() -> Error {
-    Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() }
+    Error::NotFound { what: "blind pair".to_owned(), id: "with this token".to_owned() }
 }

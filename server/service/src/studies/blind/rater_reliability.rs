@@ -47,7 +47,7 @@ pub struct RaterReliability {
     pub shown: u32,
     /// Number of answers.
     pub answered: u32,
-    /// Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Absent
+    /// Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Null
     /// until the rater is unblinded, because it would reveal allocations.
     pub first_preferred: Option<Share>,
     /// Share of repeated pairs with the same answer as before, among blind answers.

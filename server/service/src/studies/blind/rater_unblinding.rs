@@ -27,15 +27,15 @@ pub struct UnblindedPair {
     pub shown_first: TrialId,
     /// Trial shown second.
     pub shown_second: TrialId,
-    /// Earlier pair that it repeats.
+    /// Earlier pair that it repeats. Null if it is not a repeat.
     pub repeats: Option<BlindPairId>,
     /// Whether the rater could have known the allocation.
     pub could_have_known: bool,
     /// Time at which the pair was drawn.
     pub created_at: Instant,
-    /// Answer in terms of what was shown. Absent if there is none yet.
+    /// Answer in terms of what was shown. Null if there is none yet.
     pub answer: Option<Judgement>,
-    /// Time of the answer.
+    /// Time of the answer. Null if there is none yet.
     pub answered_at: Option<Instant>,
 }
 

@@ -31,11 +31,11 @@ const LONGEST_NOTE: usize = 2000;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewLabAnswer)]
 pub struct NewAnswer {
-    /// Number of the answer: `answer_number` or, for a report of an unsafe walk, `report_number` of the session. An answer that is sent
-    /// twice counts once.
+    /// Number of the answer: `answer_number` or, for a report of an unsafe walk, `report_number` of the session. An
+    /// answer that is sent twice counts once.
     #[schema(minimum = 1)]
     pub number: u32,
-    /// The answer. First is walk 2, second is walk 3. `retracted` is reserved for the service.
+    /// The answer. First is walk 2, second is walk 3.
     pub answer: Judgement,
     /// Free text, at most 2000 characters.
     #[serde(default)]

@@ -62,7 +62,9 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     }
     drop(db);
     if files.first().is_none_or(|(walk, ..)| *walk != 1) {
-        return Err(Error::conflict("Walk 1 has no EMG recording. The other walks are compared with it."));
+        return Err(Error::conflict(
+            "Walk 1 has no EMG recording, with which the other walks are compared. Upload it first.",
+        ));
     }
     let process = move |pool: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();

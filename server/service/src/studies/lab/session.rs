@@ -23,9 +23,9 @@ const LONGEST_NOTE: usize = 2000;
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewLabSession {
-    /// Converged trial with one of the two gaits.
+    /// Trial with gait A, which must be walkable.
     pub trial_a: TrialId,
-    /// Converged trial with the other gait.
+    /// Trial with gait B, which must be walkable.
     pub trial_b: TrialId,
     /// Free text, at most 2000 characters.
     #[serde(default)]
@@ -176,17 +176,17 @@ pub async fn plan(
 pub struct LabSessionProgress {
     /// Identifier of the session.
     pub session: LabSessionId,
-    /// Next walk, 1 to 3. Absent after the last walk and in a closed session.
+    /// Next walk, 1 to 3. Null after the last walk and in a closed session.
     pub walk: Option<u8>,
     /// Number of walks.
     pub walks: u8,
-    /// Time at which the last walk was recorded.
+    /// Time at which the last walk was recorded. Null before the first walk.
     pub last_recorded: Option<Instant>,
-    /// Number to send with the answer. Absent before the last walk and after an answer.
+    /// Number to send with the answer. Null before the last walk and after an answer.
     pub answer_number: Option<u32>,
-    /// Number to send with a report of an unsafe walk. Absent until the subject may have walked with the device.
+    /// Number to send with a report of an unsafe walk. Null until the subject may have walked with the device.
     pub report_number: Option<u32>,
-    /// Current answer of the subject.
+    /// Current answer of the subject. Null if there is none.
     pub answer: Option<AnswerView>,
     /// Whether the current answer can be retracted: the session is neither closed nor unblinded, and the answer is not
     /// a safety report.

@@ -48,7 +48,7 @@ pub struct EmgReading {
     pub heel_strikes_s: Vec<f64>,
     /// Column of a switch under the right heel, or of the vertical force under the right foot.
     pub heel_strike_column: Option<String>,
-    /// Value of that column above which the foot is on the ground.
+    /// Value of `heel_strike_column`, in the unit of the column, above which the foot is on the ground.
     pub heel_strike_threshold: f64,
     /// Numbers of strides to leave out, from 1, in the order of the heel strikes.
     pub rejected_strides: Vec<u32>,
@@ -206,9 +206,7 @@ impl MotionReading {
     /// [`Error::Invalid`] with line and column, or the field.
     pub fn portraits(&self, text: &str) -> Result<Vec<PhasePortrait>, Error> {
         self.joints(text)?.portraits(self.cutoff_hz).map_err(|error| match error {
-            ModelError::OutOfRange { field, value, minimum, maximum } => {
-                ModelError::OutOfRange { field: format!("reading.{field}"), value, minimum, maximum }.into()
-            }
+            ModelError::OutOfRange { .. } => FieldError::from(error).within("reading").into(),
             other => other.into(),
         })
     }

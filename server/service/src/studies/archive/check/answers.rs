@@ -42,7 +42,7 @@ pub(super) async fn answers(
         let count = answered.entry((compared, author)).or_default();
         *count += 1;
         if *count > most {
-            return Err(refuse(format!("{what}: {} has answered this comparison already", row.author)));
+            return Err(refuse(format!("{what}: {} has already answered this comparison", row.author)));
         }
     }
     let results = trials.values().filter(|trial| trial.state.is_result()).count();
