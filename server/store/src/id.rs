@@ -139,7 +139,7 @@ identifier!(
     MeasurementFileId
 );
 identifier!(
-    /// Identifier of a controller file of a lab session.
+    /// Identifier of a download of a controller file.
     ControllerFileDownloadId
 );
 identifier!(
