@@ -1,8 +1,10 @@
--- The record of a tuning: who walks with what, which actions were tried, what they gave, what was preferred.
+-- The schema of a record.
 --
--- Identifiers are UUIDv7 text, instants are RFC 3339 UTC text with milliseconds (sortable as text), numbers are SI.
--- Constraints are named: the store turns a violated name into a specific answer.
--- Evidence (feedback, retractions, events, gaits) is append-only by trigger.
+-- Identifiers are UUIDs (version 7) as text. Times are RFC 3339 in UTC with milliseconds, so that they sort as text. Numbers
+-- are in SI units. Constraints have names, because the program turns a violated one into a specific error. Triggers refuse
+-- changes that this program never makes, whichever program tries them.
+
+---------------------------------------------------------------- Subjects
 
 create table subjects (
     id           text primary key not null,
@@ -15,7 +17,73 @@ create table subjects (
     created_at   text not null
 ) strict;
 
--- A device or a reference that changes is a new row: studies keep pointing at what they used.
+-- Corrected height and body mass. The newest row applies to studies that are created later.
+create table subject_corrections (
+    seq          integer primary key autoincrement,
+    subject_id   text not null references subjects (id),
+    height_m     real not null constraint subject_corrections_height check (height_m between 1.0 and 2.5),
+    body_mass_kg real not null constraint subject_corrections_mass check (body_mass_kg between 20 and 250),
+    reason       text not null constraint subject_corrections_reason check (length(reason) between 1 and 2000),
+    actor        text not null,
+    created_at   text not null
+) strict;
+
+create index subject_corrections_by_subject on subject_corrections (subject_id, seq);
+
+create trigger subject_corrections_no_update before update on subject_corrections
+begin select raise(abort, 'corrections of subjects are append-only'); end;
+create trigger subject_corrections_no_delete before delete on subject_corrections
+begin select raise(abort, 'corrections of subjects are append-only'); end;
+
+-- Measured muscle parameters, which override the published table. The newest row applies to studies that are created later.
+create table subject_muscles (
+    seq        integer primary key autoincrement,
+    subject_id text not null references subjects (id),
+    definition text not null constraint subject_muscles_definition_json check (json_valid(definition)),
+    actor      text not null,
+    created_at text not null
+) strict;
+
+create index subject_muscles_by_subject on subject_muscles (subject_id, seq);
+
+create trigger subject_muscles_no_update before update on subject_muscles
+begin select raise(abort, 'muscle parameters are append-only'); end;
+create trigger subject_muscles_no_delete before delete on subject_muscles
+begin select raise(abort, 'muscle parameters are append-only'); end;
+
+-- Consent given and withdrawn. The newest row of a subject applies.
+create table consents (
+    seq        integer primary key autoincrement,
+    subject_id text not null references subjects (id),
+    kind       text not null constraint consents_kind check (kind in ('given', 'withdrawn')),
+    -- given: the signed form and its version. withdrawn: the reason, if the subject states one.
+    note       text not null constraint consents_note_length check (length(note) between 1 and 2000),
+    actor      text not null,
+    created_at text not null
+) strict;
+
+create index consents_by_subject on consents (subject_id, seq);
+
+create trigger consents_no_update before update on consents
+begin select raise(abort, 'consents are append-only'); end;
+create trigger consents_no_delete before delete on consents
+begin select raise(abort, 'consents are append-only'); end;
+
+-- Tables with data of subjects have a trigger that refuses new rows of these subjects.
+create view withdrawn_subjects as
+select subject_id from consents c
+where kind = 'withdrawn' and seq = (select max(seq) from consents d where d.subject_id = c.subject_id);
+
+create trigger subject_corrections_need_consent before insert on subject_corrections
+when new.subject_id in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+create trigger subject_muscles_need_consent before insert on subject_muscles
+when new.subject_id in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+---------------------------------------------------------------- Devices and reference gaits
+
+-- A changed device or reference gait is a new row, so that studies keep the one that they use.
 create table devices (
     id         text primary key not null,
     name       text not null constraint devices_name_length check (length(name) between 1 and 80),
@@ -32,49 +100,157 @@ create table reference_gaits (
     created_at text not null
 ) strict;
 
+---------------------------------------------------------------- Studies
+
 create table studies (
-    id                text primary key not null,
-    name              text not null constraint studies_name_length check (length(name) between 1 and 120),
-    subject_id        text not null references subjects (id),
-    device_id         text not null references devices (id),
-    reference_gait_id text not null references reference_gaits (id),
-    muscles           integer not null constraint studies_muscles_bool check (muscles in (0, 1)),
-    gait_settings     text not null constraint studies_gait_settings_json check (json_valid(gait_settings)),
-    solve_options     text not null constraint studies_solve_options_json check (json_valid(solve_options)),
-    -- Bounds that are not tuned keep these values.
-    base_bounds       text not null constraint studies_base_bounds_json check (json_valid(base_bounds)),
-    search_space      text not null constraint studies_search_space_json check (json_valid(search_space)),
-    learner           text not null constraint studies_learner_json check (json_valid(learner)),
-    feedback_mode     text not null
-                      constraint studies_feedback_mode check (feedback_mode in ('automatic', 'human', 'mixed')),
-    trial_budget      integer not null constraint studies_trial_budget check (trial_budget between 1 and 10000),
-    parallel_trials   integer not null constraint studies_parallel_trials check (parallel_trials between 1 and 64),
-    priority          integer not null default 0 constraint studies_priority check (priority between -10 and 10),
-    -- JSON readers keep 53 bits of an integer.
-    seed              integer not null constraint studies_seed check (seed between 0 and 9007199254740991),
-    state             text not null
-                      constraint studies_state
-                      check (state in ('draft', 'running', 'waiting', 'paused', 'finished', 'stopped')),
-    state_reason      text not null default '',
-    -- What changes in place has a revision: the entity tag of the study.
-    revision          integer not null default 1 constraint studies_revision check (revision >= 1),
-    created_at        text not null,
-    updated_at        text not null,
-    -- Who evaluates the trials.
-    evaluation        text not null default 'optimizer'
-                      constraint studies_evaluation check (evaluation in ('optimizer', 'script')),
-    -- No new trial once the solves so far took so many seconds together.
+    id                   text primary key not null,
+    name                 text not null constraint studies_name_length check (length(name) between 1 and 120),
+    subject_id           text not null references subjects (id),
+    -- Height and body mass when the study was created. A later correction of the subject does not change them.
+    height_m             real not null constraint studies_height check (height_m between 1.0 and 2.5),
+    body_mass_kg         real not null constraint studies_mass check (body_mass_kg between 20 and 250),
+    device_id            text not null references devices (id),
+    reference_gait_id    text not null references reference_gaits (id),
+    muscles              integer not null constraint studies_muscles_bool check (muscles in (0, 1)),
+    gait_settings        text not null constraint studies_gait_settings_json check (json_valid(gait_settings)),
+    solve_options        text not null constraint studies_solve_options_json check (json_valid(solve_options)),
+    -- Values of the bounds that are not tuned.
+    base_bounds          text not null constraint studies_base_bounds_json check (json_valid(base_bounds)),
+    search_space         text not null constraint studies_search_space_json check (json_valid(search_space)),
+    learner              text not null constraint studies_learner_json check (json_valid(learner)),
+    feedback_mode        text not null
+                         constraint studies_feedback_mode check (feedback_mode in ('automatic', 'human', 'mixed')),
+    -- What evaluates trials.
+    evaluation           text not null default 'optimizer'
+                         constraint studies_evaluation check (evaluation in ('optimizer', 'script')),
+    trial_budget         integer not null constraint studies_trial_budget check (trial_budget between 1 and 10000),
+    -- Total solve time after which no new trial starts.
     solve_seconds_budget real
-                      constraint studies_solve_seconds
-                      check (solve_seconds_budget is null or solve_seconds_budget > 0),
-    -- Done when the best action stayed the same over so many results in a row.
-    unchanged_limit   integer
-                      constraint studies_unchanged
-                      check (unchanged_limit is null or unchanged_limit between 1 and 10000),
-    forked_from       text references studies (id)
+                         constraint studies_solve_seconds
+                         check (solve_seconds_budget is null or solve_seconds_budget > 0),
+    -- The study finishes when the best action has not changed over this many results.
+    unchanged_limit      integer
+                         constraint studies_unchanged
+                         check (unchanged_limit is null or unchanged_limit between 1 and 10000),
+    -- Whether a trial may have an action whose gait is known from another trial.
+    repeat_results       integer not null constraint studies_repeat_results_bool check (repeat_results in (0, 1)),
+    parallel_trials      integer not null constraint studies_parallel_trials check (parallel_trials between 1 and 64),
+    priority             integer not null default 0 constraint studies_priority check (priority between -10 and 10),
+    -- At most 53 bits, because JSON readers keep no more of an integer.
+    seed                 integer not null constraint studies_seed check (seed between 0 and 9007199254740991),
+    state                text not null
+                         constraint studies_state
+                         check (state in ('draft', 'running', 'waiting', 'paused', 'finished', 'stopped')),
+    state_reason         text not null default '',
+    forked_from          text references studies (id),
+    -- Tags, notes and the time of archiving help people to find a study. They do not affect its trials.
+    tags                 text constraint studies_tags check (json_valid(tags) and length(tags) <= 1000),
+    notes                text constraint studies_notes_length check (length(notes) between 1 and 4000),
+    archived_at          text,
+    -- Increases with each change. It is the entity tag of the study.
+    revision             integer not null default 1 constraint studies_revision check (revision >= 1),
+    created_at           text not null,
+    updated_at           text not null
 ) strict;
 
 create index studies_by_creation on studies (created_at desc, id desc);
+
+create trigger studies_body_fixed before update of height_m, body_mass_kg on studies
+begin select raise(abort, 'height and body mass of a study cannot be changed'); end;
+create trigger studies_need_consent before insert on studies
+when new.subject_id in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+create trigger studies_continue_with_consent before update of state on studies
+when new.state in ('running', 'waiting') and new.subject_id in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- Users and tokens with access to a study. Raters have access to the studies of which they are members, administrators to
+-- every study, other users and tokens to every study that is not restricted and to those of which they are members. Members
+-- can be removed after a withdrawal of consent, so these tables have no trigger that needs consent.
+create table study_members (
+    id         text primary key not null,
+    study_id   text not null references studies (id),
+    user_id    text references users (id),
+    token_id   text references tokens (id),
+    actor      text not null constraint study_members_actor_length check (length(actor) between 1 and 120),
+    created_at text not null,
+    constraint study_members_user_or_token check ((user_id is null) <> (token_id is null))
+) strict;
+
+create index study_members_by_study on study_members (study_id);
+create index study_members_by_user on study_members (user_id) where user_id is not null;
+create index study_members_by_token on study_members (token_id) where token_id is not null;
+
+-- A membership ends once. Who becomes a member again gets a new row.
+create table study_member_ends (
+    member_id  text primary key not null references study_members (id),
+    actor      text not null constraint study_member_ends_actor_length check (length(actor) between 1 and 120),
+    created_at text not null
+) strict;
+
+-- Whether a study is restricted to its members. The newest row applies; a study without one is not restricted.
+create table study_restrictions (
+    seq        integer primary key autoincrement,
+    study_id   text not null references studies (id),
+    restricted integer not null constraint study_restrictions_bool check (restricted in (0, 1)),
+    actor      text not null constraint study_restrictions_actor_length check (length(actor) between 1 and 120),
+    created_at text not null
+) strict;
+
+create index study_restrictions_by_study on study_restrictions (study_id, seq);
+
+create view current_study_members as
+select m.*, coalesce(m.user_id, m.token_id) as principal from study_members m
+where not exists (select 1 from study_member_ends e where e.member_id = m.id);
+
+create view restricted_studies as
+select r.study_id from study_restrictions r
+where r.restricted = 1
+and not exists (select 1 from study_restrictions n where n.study_id = r.study_id and n.seq > r.seq);
+
+create trigger study_members_once before insert on study_members
+when exists (
+    select 1 from current_study_members
+    where study_id = new.study_id and principal = coalesce(new.user_id, new.token_id)
+)
+begin select raise(abort, 'already a member of this study'); end;
+create trigger study_members_no_update before update on study_members
+begin select raise(abort, 'study members are append-only'); end;
+create trigger study_members_no_delete before delete on study_members
+begin select raise(abort, 'study members are append-only'); end;
+create trigger study_member_ends_no_update before update on study_member_ends
+begin select raise(abort, 'ends of memberships are append-only'); end;
+create trigger study_member_ends_no_delete before delete on study_member_ends
+begin select raise(abort, 'ends of memberships are append-only'); end;
+create trigger study_restrictions_no_update before update on study_restrictions
+begin select raise(abort, 'study restrictions are append-only'); end;
+create trigger study_restrictions_no_delete before delete on study_restrictions
+begin select raise(abort, 'study restrictions are append-only'); end;
+
+-- Imports of studies from archives.
+create table imports (
+    seq            integer primary key autoincrement,
+    study_id       text not null references studies (id),
+    -- SHA-256 of the archive.
+    file_sha256    text not null constraint imports_file check (length(file_sha256) = 64),
+    -- Public key of the signature in hexadecimal; null without a signature.
+    signed_by      text constraint imports_signed_by check (signed_by is null or length(signed_by) = 64),
+    -- Whether the importing user named this key as trusted.
+    trusted        integer not null constraint imports_trusted check (trusted in (0, 1)),
+    -- Number of trials whose Gait RMSE could not be recomputed, because the archive does not contain their gaits.
+    unchecked_rmse integer not null constraint imports_unchecked check (unchecked_rmse >= 0),
+    actor          text not null,
+    created_at     text not null
+) strict;
+
+create index imports_by_study on imports (study_id, seq);
+
+create trigger imports_no_update before update on imports
+begin select raise(abort, 'imports are append-only'); end;
+create trigger imports_no_delete before delete on imports
+begin select raise(abort, 'imports are append-only'); end;
+
+---------------------------------------------------------------- Trials
 
 create table trials (
     id                text primary key not null,
@@ -83,13 +259,16 @@ create table trials (
     action_index      integer not null constraint trials_action_index check (action_index >= 0),
     action            text not null constraint trials_action_json check (json_valid(action)),
     reason            text not null,
-    -- The best action when this trial was proposed (null: nothing was visited yet).
+    -- The trial with the best action at the time of the proposal; null before the first result.
     best_before       text references trials (id),
+    -- The trial whose gait is the warm start; null for a cold start.
     warm_started_from text references trials (id),
+    -- The lab script that evaluates the trial; null if the service does.
+    script            text constraint trials_script_length check (script is null or length(script) between 1 and 80),
     state             text not null
                       constraint trials_state
                       check (state in ('queued', 'running', 'converged', 'not_converged', 'failed', 'lost', 'cancelled')),
-    -- How the solve ended; only a finished solve has one.
+    -- How the solve ended; null unless it ran to its end.
     status            text,
     gait_rmse_rad     real,
     cost_of_transport real,
@@ -103,13 +282,11 @@ create table trials (
     created_at        text not null,
     started_at        text,
     finished_at       text,
-    -- Who asked for the trial; null: the program evaluates it.
-    asked_by          text
-                      constraint trials_asked_by_length check (asked_by is null or length(asked_by) between 1 and 80),
     constraint trials_number_unique unique (study_id, number),
     constraint trials_converged_has_figures check (
-        -- A script may say that a trial converged without having figures of a solve.
-        state <> 'converged' or asked_by is not null or (gait_rmse_rad is not null and cost_of_transport is not null and report is not null)
+        -- A script can report a converged trial without the figures of a solve.
+        state <> 'converged' or script is not null
+        or (gait_rmse_rad is not null and cost_of_transport is not null and report is not null)
     ),
     constraint trials_end_has_time check (
         (state in ('queued', 'running')) = (finished_at is null)
@@ -118,7 +295,68 @@ create table trials (
 
 create index trials_by_state on trials (study_id, state);
 
--- The trajectory of a finished trial, as the optimiser wrote it: zstd-compressed JSON.
+create trigger trials_no_delete before delete on trials
+begin select raise(abort, 'trials are never deleted'); end;
+create trigger trials_proposal_fixed
+before update of study_id, number, action_index, action, reason, best_before, warm_started_from, created_at on trials
+begin select raise(abort, 'the proposal of a trial cannot be changed'); end;
+create trigger trials_script_fixed before update of script on trials
+when old.script is not null
+begin select raise(abort, 'the script of a trial cannot be changed'); end;
+create trigger trials_result_fixed before update on trials
+when old.state in ('converged', 'not_converged')
+begin select raise(abort, 'the result of a trial cannot be changed'); end;
+create trigger trials_need_consent before insert on trials
+when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+create trigger trials_continue_with_consent before update of state on trials
+when new.state in ('queued', 'running')
+    and (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- The solves of trials in the queue of workers.
+create table jobs (
+    id          text primary key not null,
+    trial_id    text not null constraint jobs_trial_unique unique references trials (id),
+    state       text not null constraint jobs_state check (state in ('queued', 'leased', 'done')),
+    -- Number of attempts so far. A result with another number belongs to an attempt that has ended.
+    attempts    integer not null default 0 constraint jobs_attempts check (attempts >= 0),
+    -- Number of attempts that ended with a panic or an error of the program.
+    failures    integer not null default 0 constraint jobs_failures check (failures >= 0),
+    -- Number of attempts whose worker stopped responding.
+    losses      integer not null default 0 constraint jobs_losses check (losses >= 0),
+    worker      text,
+    lease_until text,
+    created_at  text not null,
+    constraint jobs_lease_complete check (
+        (state = 'leased') = (lease_until is not null) and (state = 'leased') = (worker is not null)
+    )
+) strict;
+
+create index jobs_by_state on jobs (state, created_at);
+
+-- Results of attempts, including those that arrived too late.
+create table attempts (
+    trial_id    text not null references trials (id),
+    attempt     integer not null constraint attempts_attempt check (attempt >= 1),
+    worker      text not null constraint attempts_worker_length check (length(worker) between 1 and 200),
+    -- Whether it became the result of the trial. If not, another attempt was running or the trial had ended.
+    used        integer not null constraint attempts_used check (used in (0, 1)),
+    -- How the solve ended.
+    status      text not null,
+    -- The finite figures of the solve.
+    report      text constraint attempts_report_json check (report is null or json_valid(report)),
+    received_at text not null,
+    constraint attempts_once primary key (trial_id, attempt)
+) strict, without rowid;
+
+create trigger attempts_no_update before update on attempts
+begin select raise(abort, 'attempts are append-only'); end;
+create trigger attempts_no_delete before delete on attempts
+begin select raise(abort, 'attempts are append-only'); end;
+
+-- The gait, the warm start and the iterations of a completed solve, as JSON compressed with zstd. Gaits can be deleted, to
+-- save space; their hashes stay in the seals.
 create table gaits (
     trial_id        text primary key not null references trials (id),
     format_version  integer not null,
@@ -132,19 +370,77 @@ create table gaits (
     created_at      text not null
 ) strict;
 
--- Everything the learner ever hears, in the order it was heard.
+create trigger gaits_no_update before update on gaits
+begin select raise(abort, 'gaits are append-only'); end;
+
+-- Certificates of gaits: one for each version of the certificate.
+create table certificates (
+    trial_id       text not null references trials (id),
+    format_version integer not null constraint certificates_format_version check (format_version >= 1),
+    passed         integer not null constraint certificates_passed check (passed in (0, 1)),
+    document       text not null constraint certificates_document check (json_valid(document)),
+    created_at     text not null,
+    primary key (trial_id, format_version)
+) strict;
+
+create trigger certificates_no_update before update on certificates
+begin select raise(abort, 'certificates are append-only'); end;
+create trigger certificates_no_delete before delete on certificates
+begin select raise(abort, 'certificates are append-only'); end;
+
+-- Requests for infeasibility explanations. Requested explanations are computed before the others, also after a restart.
+create table explanation_requests (
+    trial_id   text primary key not null references trials (id),
+    actor      text not null,
+    created_at text not null
+) strict;
+
+create trigger explanation_requests_no_update before update on explanation_requests
+begin select raise(abort, 'requests for explanations are append-only'); end;
+create trigger explanation_requests_no_delete before delete on explanation_requests
+begin select raise(abort, 'requests for explanations are append-only'); end;
+create trigger explanation_requests_need_consent before insert on explanation_requests
+when (select s.subject_id from trials t join studies s on s.id = t.study_id where t.id = new.trial_id)
+    in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- Infeasibility explanations: at most one for each trial.
+create table explanations (
+    trial_id       text primary key not null references trials (id),
+    -- Version of the program that computed it.
+    program        text not null,
+    -- SHA-256 of the explained problem, in the format of `problem.json`.
+    problem_sha256 text not null constraint explanations_problem check (length(problem_sha256) = 64),
+    -- The tuned bound whose relaxation is the smallest that gives a gait; null if no single bound does.
+    relaxed_bound  text,
+    document       text not null constraint explanations_document check (json_valid(document)),
+    created_at     text not null
+) strict;
+
+create trigger explanations_no_update before update on explanations
+begin select raise(abort, 'explanations are append-only'); end;
+create trigger explanations_no_delete before delete on explanations
+begin select raise(abort, 'explanations are append-only'); end;
+create trigger explanations_need_consent before insert on explanations
+when (select s.subject_id from trials t join studies s on s.id = t.study_id where t.id = new.trial_id)
+    in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+---------------------------------------------------------------- Feedback
+
+-- Everything that the learner learns from, in the order in which it learned it.
 create table feedback (
     seq        integer primary key autoincrement,
     id         text not null constraint feedback_id_unique unique,
     study_id   text not null references studies (id),
     kind       text not null constraint feedback_kind check (kind in ('label', 'preference', 'tie', 'suggestion')),
-    -- label: the trial; preference: the winner; tie: one of the two; suggestion: the trial it improves on.
+    -- label: the trial. preference: the winner. tie: one of the two trials. suggestion: the trial that it improves.
     trial_a    text not null references trials (id),
-    -- preference: the loser; tie: the other of the two.
+    -- preference: the loser. tie: the other trial.
     trial_b    text references trials (id),
-    -- label: ordinal category, 0 = not converged.
+    -- label: the ordinal category; 0 is not converged.
     category   integer,
-    -- suggestion: the action that would have been better, as a grid index.
+    -- suggestion: the index of the suggested action in the search space.
     suggested  integer,
     source     text not null
                constraint feedback_source
@@ -163,11 +459,26 @@ create table feedback (
 ) strict;
 
 create index feedback_by_study on feedback (study_id, seq);
--- A trial gets one label, and Gait RMSE compares a pair once, however often a result is delivered.
+-- Each answer looks up earlier answers about its two trials, and earlier suggestions about its two actions, in studies with
+-- tens of thousands of answers.
+create index feedback_by_pair on feedback (trial_a, trial_b, author, source);
+create index feedback_suggestions on feedback (study_id, suggested) where kind = 'suggestion';
+-- A trial has one label and Gait RMSE compares a pair once, however often a result is delivered.
 create unique index feedback_one_label on feedback (trial_a) where kind = 'label';
 create unique index feedback_one_rmse_pair on feedback (trial_a, trial_b) where source = 'gait_rmse';
 
--- A correction retracts; the retracted row stays.
+create trigger feedback_no_update before update on feedback
+begin select raise(abort, 'feedback is append-only'); end;
+create trigger feedback_no_delete before delete on feedback
+begin select raise(abort, 'feedback is append-only'); end;
+create trigger feedback_same_study before insert on feedback
+when exists (select 1 from trials where id in (new.trial_a, new.trial_b) and study_id <> new.study_id)
+begin select raise(abort, 'feedback refers to a trial of another study'); end;
+create trigger feedback_needs_consent before insert on feedback
+when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- A retracted answer stays in the record.
 create table retractions (
     feedback_seq integer primary key not null references feedback (seq),
     author       text not null constraint retractions_author_length check (length(author) between 1 and 80),
@@ -175,201 +486,203 @@ create table retractions (
     created_at   text not null
 ) strict;
 
-create table jobs (
-    id          text primary key not null,
-    trial_id    text not null constraint jobs_trial_unique unique references trials (id),
-    state       text not null constraint jobs_state check (state in ('queued', 'leased', 'done')),
-    -- How often a worker started it: the number of the current attempt, and its fence.
-    attempts    integer not null default 0 constraint jobs_attempts check (attempts >= 0),
-    -- Of which ended by a panic or an error of the program.
-    failures    integer not null default 0 constraint jobs_failures check (failures >= 0),
-    -- Of which ended by a worker that was not heard of again.
-    losses      integer not null default 0 constraint jobs_losses check (losses >= 0),
-    worker      text,
-    lease_until text,
-    created_at  text not null,
-    constraint jobs_lease_complete check (
-        (state = 'leased') = (lease_until is not null) and (state = 'leased') = (worker is not null)
-    )
-) strict;
-
-create index jobs_by_state on jobs (state, created_at);
-
--- What happened, for people who watch: replayed from any sequence number.
-create table events (
-    seq        integer primary key autoincrement,
-    study_id   text not null references studies (id),
-    kind       text not null,
-    payload    text not null constraint events_payload_json check (json_valid(payload)),
-    created_at text not null
-) strict;
-
-create index events_by_study on events (study_id, seq);
-
-create trigger feedback_no_update before update on feedback
-begin select raise(abort, 'feedback is append-only'); end;
-create trigger feedback_no_delete before delete on feedback
-begin select raise(abort, 'feedback is append-only'); end;
 create trigger retractions_no_update before update on retractions
 begin select raise(abort, 'retractions are append-only'); end;
 create trigger retractions_no_delete before delete on retractions
 begin select raise(abort, 'retractions are append-only'); end;
-create trigger events_no_update before update on events
-begin select raise(abort, 'events are append-only'); end;
-create trigger events_no_delete before delete on events
-begin select raise(abort, 'events are append-only'); end;
-create trigger gaits_no_update before update on gaits
-begin select raise(abort, 'gaits are append-only'); end;
-create trigger trials_no_delete before delete on trials
-begin select raise(abort, 'trials are never deleted'); end;
 
--- Both trials of a comparison, and the trial of a label, belong to the study of the row.
-create trigger feedback_same_study before insert on feedback
-when exists (select 1 from trials where id in (new.trial_a, new.trial_b) and study_id <> new.study_id)
-begin select raise(abort, 'feedback names a trial of another study'); end;
-
--- What a trial was is fixed when it is proposed; what it gave is fixed when it ends.
-create trigger trials_proposal_fixed
-before update of study_id, number, action_index, action, reason, best_before, warm_started_from, created_at on trials
-begin select raise(abort, 'the proposal of a trial is fixed'); end;
-create trigger trials_result_fixed before update on trials
-when old.state in ('converged', 'not_converged')
-begin select raise(abort, 'the result of a trial is fixed'); end;
-create trigger trials_asked_by_fixed before update of asked_by on trials
-when old.asked_by is not null
-begin select raise(abort, 'who asked for a trial is fixed'); end;
-
--- Who did what, when and why: one row per change, in the transaction of the change, chained by hashes.
--- And the answers to requests that may be repeated.
-
-create table audit (
-    seq        integer primary key autoincrement,
-    at         text not null,
-    actor      text not null constraint audit_actor_length check (length(actor) between 1 and 120),
-    action     text not null constraint audit_action_length check (length(action) between 1 and 60),
-    -- What was changed: `study 0190...`.
-    object     text not null,
-    detail     text not null constraint audit_detail_json check (json_valid(detail)),
-    -- SHA-256 of the row before, and of this row with it.
-    previous   text not null constraint audit_previous_length check (length(previous) = 64),
-    hash       text not null constraint audit_hash_unique unique constraint audit_hash_length check (length(hash) = 64)
+-- Answers about two gaits that state no preference. Those of raters are in blind_pair_answers, those of subjects in
+-- lab sessions in lab_answers.
+create table assessments (
+    id          text primary key not null,
+    study_id    text not null references studies (id),
+    trial_a     text not null references trials (id),
+    trial_b     text not null references trials (id),
+    answer      text not null
+                constraint assessments_answer check (answer in ('cannot_tell', 'unsafe_a', 'unsafe_b', 'unsafe_both')),
+    source      text not null constraint assessments_source check (source in ('subject', 'clinician', 'script')),
+    author      text not null constraint assessments_author_length check (length(author) between 1 and 80),
+    note        text not null default '' constraint assessments_note_length check (length(note) <= 2000),
+    -- The preference that the learner received; null if none.
+    feedback_id text references feedback (id),
+    created_at  text not null,
+    constraint assessments_two_gaits check (trial_a <> trial_b)
 ) strict;
 
-create trigger audit_no_update before update on audit
-begin select raise(abort, 'the audit trail is append-only'); end;
-create trigger audit_no_delete before delete on audit
-begin select raise(abort, 'the audit trail is append-only'); end;
+create index assessments_by_study on assessments (study_id);
 
-create table idempotency_keys (
-    actor      text not null,
-    key        text not null constraint idempotency_key_length check (length(key) between 1 and 200),
-    -- SHA-256 of method, path and body: the same key with another request is a mistake.
-    request    text not null,
-    status     integer not null,
-    location   text,
-    body       text not null,
-    created_at text not null,
-    constraint idempotency_keys_unique primary key (actor, key)
+create trigger assessments_no_update before update on assessments
+begin select raise(abort, 'assessments are append-only'); end;
+create trigger assessments_no_delete before delete on assessments
+begin select raise(abort, 'assessments are append-only'); end;
+create trigger assessments_same_study before insert on assessments
+when exists (select 1 from trials where id in (new.trial_a, new.trial_b) and study_id <> new.study_id)
+begin select raise(abort, 'an assessment refers to a trial of another study'); end;
+create trigger assessments_need_consent before insert on assessments
+when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+create table assessment_retractions (
+    assessment_id text primary key not null references assessments (id),
+    author        text not null constraint assessment_retractions_author_length check (length(author) between 1 and 80),
+    reason        text not null constraint assessment_retractions_reason_length check (length(reason) between 1 and 2000),
+    created_at    text not null
+) strict;
+
+create trigger assessment_retractions_no_update before update on assessment_retractions
+begin select raise(abort, 'retractions are append-only'); end;
+create trigger assessment_retractions_no_delete before delete on assessment_retractions
+begin select raise(abort, 'retractions are append-only'); end;
+
+---------------------------------------------------------------- Safety
+
+-- Reports that one gait is unsafe. Reports about one of two gaits are answers in assessments, blind_pair_answers and
+-- lab_answers.
+create table safety_reports (
+    id         text primary key not null,
+    trial_id   text not null references trials (id),
+    source     text not null constraint safety_reports_source check (source in ('subject', 'clinician', 'script')),
+    author     text not null constraint safety_reports_author_length check (length(author) between 1 and 80),
+    note       text not null default '' constraint safety_reports_note_length check (length(note) <= 2000),
+    created_at text not null
+) strict;
+
+create index safety_reports_by_trial on safety_reports (trial_id);
+
+create trigger safety_reports_no_update before update on safety_reports
+begin select raise(abort, 'safety reports are append-only'); end;
+create trigger safety_reports_no_delete before delete on safety_reports
+begin select raise(abort, 'safety reports are append-only'); end;
+create trigger safety_reports_need_consent before insert on safety_reports
+when (select s.subject_id from trials t join studies s on s.id = t.study_id where t.id = new.trial_id)
+     in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- Decisions of staff about safety reports.
+create table safety_reviews (
+    id         text primary key not null,
+    trial_id   text not null references trials (id),
+    decision   text not null constraint safety_reviews_decision check (decision in ('walkable', 'unsafe')),
+    author     text not null constraint safety_reviews_author_length check (length(author) between 1 and 80),
+    reason     text not null constraint safety_reviews_reason_length check (length(reason) between 1 and 2000),
+    created_at text not null
+) strict;
+
+create index safety_reviews_by_trial on safety_reviews (trial_id);
+
+create trigger safety_reviews_no_update before update on safety_reviews
+begin select raise(abort, 'safety reviews are append-only'); end;
+create trigger safety_reviews_no_delete before delete on safety_reviews
+begin select raise(abort, 'safety reviews are append-only'); end;
+create trigger safety_reviews_need_consent before insert on safety_reviews
+when (select s.subject_id from trials t join studies s on s.id = t.study_id where t.id = new.trial_id)
+    in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- The reports that a review decides about, by the identifier of the blind pair, the assessment, the lab session or the row of
+-- safety_reports. Times do not tell which reports a reviewer has seen: an imported report can come from a clock that was
+-- ahead.
+create table safety_review_reports (
+    review_id text not null references safety_reviews (id),
+    report_id text not null,
+    primary key (review_id, report_id)
 ) strict, without rowid;
 
--- Who may do what: people with roles, one-time sign-in links, sessions, tokens of scripts.
---
--- No secret is stored: passwords as argon2id, everything random as SHA-256. Nobody is deleted, only disabled: the
--- audit trail keeps speaking of people who exist.
+create trigger safety_review_reports_no_update before update on safety_review_reports
+begin select raise(abort, 'safety reviews are append-only'); end;
+create trigger safety_review_reports_no_delete before delete on safety_review_reports
+begin select raise(abort, 'safety reviews are append-only'); end;
 
-create table users (
-    id          text primary key not null,
-    name        text not null collate nocase
-                constraint users_name_unique unique
-                constraint users_name_length check (length(name) between 1 and 80),
-    role        text not null constraint users_role check (role in ('admin', 'clinician', 'rater')),
-    -- argon2id, in PHC form; null: this person signs in with one-time links alone.
-    password    text,
-    disabled_at text,
-    created_at  text not null
-) strict;
+---------------------------------------------------------------- Blind pairs
 
-create table sign_in_links (
-    hash       text primary key not null constraint sign_in_links_hash_length check (length(hash) = 64),
-    user_id    text not null references users (id),
-    created_at text not null,
-    expires_at text not null,
-    used_at    text
-) strict;
-
-create table sessions (
-    hash       text primary key not null constraint sessions_hash_length check (length(hash) = 64),
-    user_id    text not null references users (id),
-    created_at text not null,
-    -- When the person last did something; idle sessions end.
-    seen_at    text not null,
-    ended_at   text,
-    -- Whether it was begun by a one-time link: a password may then be set without the present one.
-    by_link    integer not null default 0 constraint sessions_by_link check (by_link in (0, 1))
-) strict;
-
-create index sessions_by_user on sessions (user_id);
-
-create table tokens (
+-- Pairs of gaits shown to raters. A rater knows a pair by its token only. Gait A is the newer one, so trial_a and trial_b do
+-- not tell which gait is shown first: that is an allocation (blind_pair_allocations).
+create table blind_pairs (
     id         text primary key not null,
-    name       text not null
-               constraint tokens_name_unique unique
-               constraint tokens_name_length check (length(name) between 1 and 80),
-    hash       text not null
-               constraint tokens_hash_unique unique
-               constraint tokens_hash_length check (length(hash) = 64),
-    scopes     text not null constraint tokens_scopes_json check (json_valid(scopes)),
-    created_by text not null,
+    token      text not null
+               constraint blind_pairs_token_unique unique
+               constraint blind_pairs_token_length check (length(token) = 64),
+    study_id   text not null references studies (id),
+    rater      text not null constraint blind_pairs_rater_length check (length(rater) between 1 and 80),
+    -- Number for this rater in this study.
+    number     integer not null constraint blind_pairs_number check (number >= 1),
+    -- new: the pending comparison. repeat: an earlier pair again, to measure agreement.
+    kind       text not null constraint blind_pairs_kind check (kind in ('new', 'repeat')),
+    trial_a    text not null references trials (id),
+    trial_b    text not null references trials (id),
+    repeats    text references blind_pairs (id),
+    -- Whether the rater had been unblinded in this study before the pair was drawn.
+    unblinded  integer not null constraint blind_pairs_unblinded check (unblinded in (0, 1)),
     created_at text not null,
-    expires_at text,
-    revoked_at text
+    constraint blind_pairs_number_unique unique (study_id, rater, number),
+    constraint blind_pairs_two_gaits check (trial_a <> trial_b),
+    constraint blind_pairs_repeats check ((kind = 'repeat') = (repeats is not null))
 ) strict;
 
-create trigger users_no_delete before delete on users
-begin select raise(abort, 'users are disabled, never deleted'); end;
-create trigger tokens_no_delete before delete on tokens
-begin select raise(abort, 'tokens are revoked, never deleted'); end;
+create trigger blind_pairs_no_update before update on blind_pairs
+begin select raise(abort, 'blind pairs are append-only'); end;
+create trigger blind_pairs_no_delete before delete on blind_pairs
+begin select raise(abort, 'blind pairs are append-only'); end;
+create trigger blind_pairs_need_consent before insert on blind_pairs
+when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
 
--- Blind comparisons: which two gaits a rater was shown, in which order, and what the rater said. Drawn and stored by
--- the server; the rater knows the token alone.
-
-create table presentations (
-    id           text primary key not null,
-    token        text not null
-                 constraint presentations_token_unique unique
-                 constraint presentations_token_length check (length(token) = 64),
-    study_id     text not null references studies (id),
-    rater        text not null constraint presentations_rater_length check (length(rater) between 1 and 80),
-    -- 1, 2, ... of this rater in this study.
-    number       integer not null constraint presentations_number check (number >= 1),
-    -- new: a pair that the study asks for; repeat: an earlier one with sides swapped; null: the same gait twice.
-    kind         text not null constraint presentations_kind check (kind in ('new', 'repeat', 'null')),
-    shown_first  text not null references trials (id),
-    shown_second text not null references trials (id),
-    repeats      text references presentations (id),
-    -- Whether somebody had told this rater which gait is which before this was drawn.
-    unblinded    integer not null constraint presentations_unblinded check (unblinded in (0, 1)),
-    created_at   text not null,
-    constraint presentations_number_unique unique (study_id, rater, number),
-    constraint presentations_shape check (
-        (kind = 'null') = (shown_first = shown_second) and (kind = 'repeat') = (repeats is not null)
-    )
+-- Answers of raters. They refer to gait A and gait B, not to what was shown first.
+create table blind_pair_answers (
+    pair_id          text primary key not null references blind_pairs (id),
+    answer           text not null
+                     constraint blind_pair_answers_answer
+                     check (answer in ('a', 'b', 'no_difference', 'cannot_tell', 'unsafe_a', 'unsafe_b', 'unsafe_both',
+                                       'retracted')),
+    -- Response time by the rater's clock, in milliseconds.
+    response_ms      integer constraint blind_pair_answers_response check (response_ms is null or response_ms >= 0),
+    note             text not null default '' constraint blind_pair_answers_note check (length(note) <= 2000),
+    -- The preference that the learner received; null if none.
+    feedback_id      text references feedback (id),
+    -- Whether the author could have known the allocation at the time of the answer.
+    could_have_known integer not null
+                     constraint blind_pair_answers_could_have_known check (could_have_known in (0, 1)),
+    created_at       text not null
 ) strict;
 
-create table presentation_answers (
-    presentation_id text primary key not null references presentations (id),
-    answer          text not null
-                    constraint presentation_answers_answer
-                    check (answer in ('first', 'second', 'no_difference', 'cannot_tell', 'unsafe_first',
-                                      'unsafe_second', 'unsafe_both', 'withdrawn')),
-    -- How long the rater took by the rater's own clock, ms; the server's clock dates the row.
-    response_ms     integer constraint presentation_answers_response check (response_ms is null or response_ms >= 0),
-    note            text not null default '' constraint presentation_answers_note check (length(note) <= 2000),
-    -- What the learner hears of it; null: nothing.
-    feedback_id     text references feedback (id),
-    created_at      text not null
+create index blind_pair_answers_by_feedback on blind_pair_answers (feedback_id) where feedback_id is not null;
+
+create trigger blind_pair_answers_no_update before update on blind_pair_answers
+begin select raise(abort, 'answers of raters are append-only'); end;
+create trigger blind_pair_answers_no_delete before delete on blind_pair_answers
+begin select raise(abort, 'answers of raters are append-only'); end;
+create trigger blind_pair_answers_need_consent before insert on blind_pair_answers
+when (select s.subject_id from blind_pairs p join studies s on s.id = p.study_id where p.id = new.pair_id)
+    in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- Retractions by raters. The preference of the answer is retracted in the same transaction.
+create table blind_pair_retractions (
+    pair_id    text primary key not null references blind_pair_answers (pair_id),
+    created_at text not null
 ) strict;
 
+create trigger blind_pair_retractions_no_update before update on blind_pair_retractions
+begin select raise(abort, 'retractions are append-only'); end;
+create trigger blind_pair_retractions_no_delete before delete on blind_pair_retractions
+begin select raise(abort, 'retractions are append-only'); end;
+
+-- Which gait of a pair is shown first, drawn by the operating system. Only store/src/allocations reads this table.
+create table blind_pair_allocations (
+    pair_id    text primary key not null references blind_pairs (id),
+    -- Whether gait B is shown first.
+    swapped    integer not null constraint blind_pair_allocations_swapped check (swapped in (0, 1)),
+    -- Random, so that the hash in the seal of the row does not reveal the allocation.
+    nonce      text not null constraint blind_pair_allocations_nonce check (length(nonce) = 64),
+    created_at text not null
+) strict;
+
+create trigger blind_pair_allocations_no_update before update on blind_pair_allocations
+begin select raise(abort, 'allocations are append-only'); end;
+create trigger blind_pair_allocations_no_delete before delete on blind_pair_allocations
+begin select raise(abort, 'allocations are append-only'); end;
+
+-- Raters who were unblinded in a study.
 create table unblindings (
     seq        integer primary key autoincrement,
     study_id   text not null references studies (id),
@@ -379,313 +692,102 @@ create table unblindings (
     created_at text not null
 ) strict;
 
-create trigger presentations_no_update before update on presentations
-begin select raise(abort, 'presentations are append-only'); end;
-create trigger presentations_no_delete before delete on presentations
-begin select raise(abort, 'presentations are append-only'); end;
-create trigger presentation_answers_no_update before update on presentation_answers
-begin select raise(abort, 'answers are append-only'); end;
-create trigger presentation_answers_no_delete before delete on presentation_answers
-begin select raise(abort, 'answers are append-only'); end;
 create trigger unblindings_no_update before update on unblindings
 begin select raise(abort, 'unblindings are append-only'); end;
 create trigger unblindings_no_delete before delete on unblindings
 begin select raise(abort, 'unblindings are append-only'); end;
 
--- What workers brought: one row for each attempt at a trial, also when it came too late to count.
+---------------------------------------------------------------- Lab sessions
 
-create table results (
-    trial_id    text not null references trials (id),
-    attempt     integer not null constraint results_attempt check (attempt >= 1),
-    worker      text not null constraint results_worker_length check (length(worker) between 1 and 200),
-    -- 1: it is the result of the trial. 0: another attempt was under way or the trial had ended; evidence only.
-    taken       integer not null constraint results_taken check (taken in (0, 1)),
-    -- How the solve ended, and its figures where they can be written as JSON.
-    status      text not null,
-    report      text constraint results_report_json check (report is null or json_valid(report)),
-    received_at text not null,
-    constraint results_once primary key (trial_id, attempt)
-) strict, without rowid;
-
-create trigger results_no_update before update on results
-begin select raise(abort, 'results are append-only'); end;
-create trigger results_no_delete before delete on results
-begin select raise(abort, 'results are append-only'); end;
-
--- Consent of subjects: what they signed, and that they withdrew. The newest row counts; none is ever changed.
-
-create table consents (
-    seq        integer primary key autoincrement,
-    subject_id text not null references subjects (id),
-    kind       text not null constraint consents_kind check (kind in ('given', 'withdrawn')),
-    -- given: which version of which form was signed. withdrawn: why, as far as the subject says.
-    note       text not null constraint consents_note_length check (length(note) between 1 and 2000),
-    actor      text not null,
-    created_at text not null
-) strict;
-
-create index consents_by_subject on consents (subject_id, seq);
-
-create view withdrawn_subjects as
-select subject_id from consents c
-where kind = 'withdrawn' and seq = (select max(seq) from consents d where d.subject_id = c.subject_id);
-
-create trigger consents_no_update before update on consents
-begin select raise(abort, 'consents are append-only'); end;
-create trigger consents_no_delete before delete on consents
-begin select raise(abort, 'consents are append-only'); end;
-
--- Nothing new of a subject who withdrew, whichever way it comes in.
-create trigger studies_need_consent before insert on studies
-when new.subject_id in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger studies_go_on_with_consent before update of state on studies
-when new.state in ('running', 'waiting') and new.subject_id in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger trials_need_consent before insert on trials
-when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger trials_go_on_with_consent before update of state on trials
-when new.state in ('queued', 'running')
-    and (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger feedback_needs_consent before insert on feedback
-when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger presentations_need_consent before insert on presentations
-when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger presentation_answers_need_consent before insert on presentation_answers
-when (select s.subject_id from presentations p join studies s on s.id = p.study_id where p.id = new.presentation_id)
-    in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-
--- Certificates of gaits: what an examination independent of the optimisation found. Made on demand; a gait has one per
--- version of the examination.
-
-create table certificates (
-    trial_id       text not null references trials (id),
-    format_version integer not null constraint certificates_format_version check (format_version >= 1),
-    passed         integer not null constraint certificates_passed check (passed in (0, 1)),
-    -- The whole certificate, JSON.
-    document       text not null constraint certificates_document check (json_valid(document)),
-    created_at     text not null,
-    primary key (trial_id, format_version)
-) strict;
-
-create trigger certificates_no_update before update on certificates
-begin select raise(abort, 'certificates are append-only'); end;
-create trigger certificates_no_delete before delete on certificates
-begin select raise(abort, 'certificates are append-only'); end;
-
--- Whoever answers a comparison is told who else has: found without reading all that a study has heard.
-
-create index feedback_by_pair on feedback (trial_a, trial_b, author, source);
-
--- A rater takes an answer back: what was said stays, and counts no more. What the learner heard of it is retracted in
--- the same transaction.
-create table presentation_retractions (
-    presentation_id text primary key not null references presentation_answers (presentation_id),
-    created_at      text not null
-) strict;
-
-create trigger presentation_retractions_no_update before update on presentation_retractions
-begin select raise(abort, 'retractions are append-only'); end;
-create trigger presentation_retractions_no_delete before delete on presentation_retractions
-begin select raise(abort, 'retractions are append-only'); end;
-
--- What stands in the record is sealed in the transaction that writes it: a hash of the row, chained with the seals
--- before. A row that another hand changed, added or took away does not fit its newest seal; `gaitwright audit verify`
--- finds it. Which tables are sealed, and how, is said in the program (store/seals.rs): what does not come through it has
--- no seal.
-create table seals (
-    seq      integer primary key autoincrement,
-    -- The table of the row, and its primary key.
-    evidence text not null,
-    key      text not null,
-    -- SHA-256 of the row; empty: the row was taken away.
-    sha256   text not null constraint seals_sha256_length check (length(sha256) in (0, 64)),
-    -- SHA-256 of the seal before, and of this one with it.
-    previous text not null constraint seals_previous_length check (length(previous) = 64),
-    hash     text not null constraint seals_hash_length check (length(hash) = 64)
-) strict;
-
-create index seals_by_row on seals (evidence, key, seq);
-
-create trigger seals_no_update before update on seals
-begin select raise(abort, 'seals are append-only'); end;
-create trigger seals_no_delete before delete on seals
-begin select raise(abort, 'seals are append-only'); end;
-
--- Lab sessions: one person walks without the device and with two gaits of a study, in an order that the server draws
--- and keeps to itself. Walk 1 is the one without the device; which gait is walk 2 follows from gait_one_first.
-
+-- A subject walks without the device (walk 1) and with two gaits (walks 2 and 3), in the order of lab_allocations.
 create table lab_sessions (
-    id             text primary key not null,
-    study_id       text not null references studies (id),
-    -- 1, 2, ... of this study.
-    number         integer not null constraint lab_sessions_number check (number >= 1),
-    gait_one       text not null references trials (id),
-    gait_two       text not null references trials (id),
-    gait_one_first integer not null constraint lab_sessions_order check (gait_one_first in (0, 1)),
-    notes          text not null default '' constraint lab_sessions_notes check (length(notes) <= 2000),
-    actor          text not null,
-    created_at     text not null,
-    constraint lab_sessions_number_unique unique (study_id, number),
-    constraint lab_sessions_two_gaits check (gait_one <> gait_two)
-) strict;
-
--- What happened to a session; each of these happens once.
-create table lab_acts (
-    session_id text not null references lab_sessions (id),
-    act        text not null
-               constraint lab_acts_act check (act in ('walk_1', 'walk_2', 'walk_3', 'unblinded', 'closed')),
-    note       text not null default '' constraint lab_acts_note check (length(note) <= 2000),
+    id         text primary key not null,
+    study_id   text not null references studies (id),
+    -- Number in the study.
+    number     integer not null constraint lab_sessions_number check (number >= 1),
+    trial_a    text not null references trials (id),
+    trial_b    text not null references trials (id),
+    notes      text not null default '' constraint lab_sessions_notes check (length(notes) <= 2000),
     actor      text not null,
     created_at text not null,
-    primary key (session_id, act)
+    constraint lab_sessions_number_unique unique (study_id, number),
+    constraint lab_sessions_two_gaits check (trial_a <> trial_b)
 ) strict;
 
 create trigger lab_sessions_no_update before update on lab_sessions
 begin select raise(abort, 'lab sessions are append-only'); end;
 create trigger lab_sessions_no_delete before delete on lab_sessions
 begin select raise(abort, 'lab sessions are append-only'); end;
-create trigger lab_acts_no_update before update on lab_acts
-begin select raise(abort, 'acts are append-only'); end;
-create trigger lab_acts_no_delete before delete on lab_acts
-begin select raise(abort, 'acts are append-only'); end;
-
 create trigger lab_sessions_same_study before insert on lab_sessions
-when exists (select 1 from trials where id in (new.gait_one, new.gait_two) and study_id <> new.study_id)
-begin select raise(abort, 'a lab session names a trial of another study'); end;
+when exists (select 1 from trials where id in (new.trial_a, new.trial_b) and study_id <> new.study_id)
+begin select raise(abort, 'a lab session refers to a trial of another study'); end;
 create trigger lab_sessions_need_consent before insert on lab_sessions
 when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger lab_acts_need_consent before insert on lab_acts
+
+-- Which gait walk 2 uses, drawn by the operating system. Only store/src/allocations reads this table.
+create table lab_allocations (
+    session_id   text primary key not null references lab_sessions (id),
+    -- Whether walk 2 uses gait A.
+    gait_a_first integer not null constraint lab_allocations_order check (gait_a_first in (0, 1)),
+    -- Random, so that the hash in the seal of the row does not reveal the allocation.
+    nonce        text not null constraint lab_allocations_nonce check (length(nonce) = 64),
+    created_at   text not null
+) strict;
+
+create trigger lab_allocations_no_update before update on lab_allocations
+begin select raise(abort, 'allocations are append-only'); end;
+create trigger lab_allocations_no_delete before delete on lab_allocations
+begin select raise(abort, 'allocations are append-only'); end;
+
+-- Completed steps of a session. Each step happens at most once.
+create table lab_session_steps (
+    session_id text not null references lab_sessions (id),
+    step       text not null
+               constraint lab_session_steps_step
+               check (step in ('walk_1', 'walk_2', 'walk_3', 'unblinded', 'closed')),
+    note       text not null default '' constraint lab_session_steps_note check (length(note) <= 2000),
+    actor      text not null,
+    created_at text not null,
+    primary key (session_id, step)
+) strict;
+
+create trigger lab_session_steps_no_update before update on lab_session_steps
+begin select raise(abort, 'steps of lab sessions are append-only'); end;
+create trigger lab_session_steps_no_delete before delete on lab_session_steps
+begin select raise(abort, 'steps of lab sessions are append-only'); end;
+create trigger lab_session_steps_need_consent before insert on lab_session_steps
 when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
--- What was measured in the walks of a lab session, as it was brought, and what was made of the electromyograms. The
--- newest recording of a walk counts; none is ever changed, so that it can be processed anew with other settings.
-
-create table lab_recordings (
+-- Downloads of the controller files of walks. A controller file reveals the gait of its walk to a person who reads it.
+create table controller_file_downloads (
     id         text primary key not null,
     session_id text not null references lab_sessions (id),
-    walk       integer not null constraint lab_recordings_walk check (walk in (1, 2, 3)),
-    kind       text not null constraint lab_recordings_kind check (kind in ('electromyogram', 'motion')),
-    -- How the file is to be read, JSON.
-    reading    text not null constraint lab_recordings_reading check (json_valid(reading)),
-    -- The file, zstd-compressed.
-    raw        blob not null,
-    raw_sha256 text not null,
+    walk       integer not null constraint controller_file_downloads_walk check (walk in (2, 3)),
+    -- Whether the device itself fetched the file, with a token that has no other right.
+    to_device  integer not null constraint controller_file_downloads_to_device check (to_device in (0, 1)),
     actor      text not null,
     created_at text not null
 ) strict;
 
-create index lab_recordings_by_session on lab_recordings (session_id, kind, walk);
+create index controller_file_downloads_by_session on controller_file_downloads (session_id);
 
-create table emg_results (
-    id         text primary key not null,
-    session_id text not null references lab_sessions (id),
-    -- Settings and curves, JSON.
-    document   text not null constraint emg_results_document check (json_valid(document)),
-    actor      text not null,
-    created_at text not null
-) strict;
-
-create index emg_results_by_session on emg_results (session_id);
-
-create trigger lab_recordings_no_update before update on lab_recordings
-begin select raise(abort, 'recordings are append-only'); end;
-create trigger lab_recordings_no_delete before delete on lab_recordings
-begin select raise(abort, 'recordings are append-only'); end;
-create trigger emg_results_no_update before update on emg_results
-begin select raise(abort, 'results are append-only'); end;
-create trigger emg_results_no_delete before delete on emg_results
-begin select raise(abort, 'results are append-only'); end;
-
-create trigger lab_recordings_need_consent before insert on lab_recordings
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
-    in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-create trigger emg_results_need_consent before insert on emg_results
+create trigger controller_file_downloads_no_update before update on controller_file_downloads
+begin select raise(abort, 'downloads of controller files are append-only'); end;
+create trigger controller_file_downloads_no_delete before delete on controller_file_downloads
+begin select raise(abort, 'downloads of controller files are append-only'); end;
+create trigger controller_file_downloads_need_consent before insert on controller_file_downloads
 when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
--- Muscle parameters of a person, where they are known better than the published table. The newest row counts; studies keep
--- what they were made with.
-
-create table subject_muscles (
-    seq        integer primary key autoincrement,
-    subject_id text not null references subjects (id),
-    definition text not null constraint subject_muscles_definition_json check (json_valid(definition)),
-    actor      text not null,
-    created_at text not null
-) strict;
-
-create index subject_muscles_by_subject on subject_muscles (subject_id, seq);
-
-create trigger subject_muscles_no_update before update on subject_muscles
-begin select raise(abort, 'muscle parameters are append-only'); end;
-create trigger subject_muscles_no_delete before delete on subject_muscles
-begin select raise(abort, 'muscle parameters are append-only'); end;
-create trigger subject_muscles_need_consent before insert on subject_muscles
-when new.subject_id in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-
--- What staff say of two gaits that is no preference: that they cannot tell which is better, that one must not be walked.
--- Raters say the same in presentation_answers.
-create table remarks (
-    id          text primary key not null,
-    study_id    text not null references studies (id),
-    first       text not null references trials (id),
-    second      text not null references trials (id),
-    answer      text not null
-                constraint remarks_answer check (answer in ('cannot_tell', 'unsafe_first', 'unsafe_second', 'unsafe_both')),
-    source      text not null constraint remarks_source check (source in ('subject', 'clinician', 'script')),
-    author      text not null constraint remarks_author_length check (length(author) between 1 and 80),
-    note        text not null default '' constraint remarks_note_length check (length(note) <= 2000),
-    -- What the learner hears of it; null: nothing.
-    feedback_id text references feedback (id),
-    created_at  text not null,
-    constraint remarks_two_gaits check (first <> second)
-) strict;
-
-create index remarks_by_study on remarks (study_id);
-
-create table remark_retractions (
-    remark_id  text primary key not null references remarks (id),
-    author     text not null constraint remark_retractions_author_length check (length(author) between 1 and 80),
-    reason     text not null constraint remark_retractions_reason_length check (length(reason) between 1 and 2000),
-    created_at text not null
-) strict;
-
--- Which answers that the learner heard came from a rater.
-create index presentation_answers_by_feedback on presentation_answers (feedback_id) where feedback_id is not null;
-
-create trigger remarks_no_update before update on remarks
-begin select raise(abort, 'remarks are append-only'); end;
-create trigger remarks_no_delete before delete on remarks
-begin select raise(abort, 'remarks are append-only'); end;
-create trigger remark_retractions_no_update before update on remark_retractions
-begin select raise(abort, 'retractions are append-only'); end;
-create trigger remark_retractions_no_delete before delete on remark_retractions
-begin select raise(abort, 'retractions are append-only'); end;
-
-create trigger remarks_same_study before insert on remarks
-when exists (select 1 from trials where id in (new.first, new.second) and study_id <> new.study_id)
-begin select raise(abort, 'a remark names a trial of another study'); end;
-create trigger remarks_need_consent before insert on remarks
-when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-
--- Which of the two walks with the device the person who walked found better, in terms of walks: 'first' is walk 2. The
--- learner hears of it when the order is told, not before: what it hears is shown, and would tell the order.
+-- Answers of the subject about the two walks with the device: first is walk 2. The learner receives a preference only when the
+-- session is unblinded, because feedback is visible and would reveal the allocation.
 create table lab_answers (
     session_id text not null references lab_sessions (id),
-    -- 1; a further one when the one before was taken back.
+    -- From 1; an answer after a retraction has the next number.
     number     integer not null constraint lab_answers_number check (number >= 1),
     answer     text not null
                constraint lab_answers_answer
@@ -697,6 +799,15 @@ create table lab_answers (
     primary key (session_id, number)
 ) strict;
 
+create trigger lab_answers_no_update before update on lab_answers
+begin select raise(abort, 'answers in lab sessions are append-only'); end;
+create trigger lab_answers_no_delete before delete on lab_answers
+begin select raise(abort, 'answers in lab sessions are append-only'); end;
+create trigger lab_answers_need_consent before insert on lab_answers
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+    in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
 create table lab_answer_retractions (
     session_id text not null,
     number     integer not null,
@@ -706,83 +817,282 @@ create table lab_answer_retractions (
     foreign key (session_id, number) references lab_answers (session_id, number)
 ) strict;
 
-create trigger lab_answers_no_update before update on lab_answers
-begin select raise(abort, 'answers are append-only'); end;
-create trigger lab_answers_no_delete before delete on lab_answers
-begin select raise(abort, 'answers are append-only'); end;
 create trigger lab_answer_retractions_no_update before update on lab_answer_retractions
 begin select raise(abort, 'retractions are append-only'); end;
 create trigger lab_answer_retractions_no_delete before delete on lab_answer_retractions
 begin select raise(abort, 'retractions are append-only'); end;
 
-create trigger lab_answers_need_consent before insert on lab_answers
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
-    in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-
--- What staff say who looked at a gait that somebody called unsafe: it may be walked with again, or it stays unsafe. What was
--- said stays as it was said; a review is of all that was said until an instant which whoever reviews has seen.
-create table safety_reviews (
+-- Measurement files of walks. The newest file of a walk and kind is used. All of them are kept, so that they can be processed
+-- again with other settings.
+create table measurement_files (
     id         text primary key not null,
-    trial_id   text not null references trials (id),
-    said_until text not null,
-    verdict    text not null constraint safety_reviews_verdict check (verdict in ('walkable', 'unsafe')),
-    author     text not null constraint safety_reviews_author_length check (length(author) between 1 and 80),
-    reason     text not null constraint safety_reviews_reason_length check (length(reason) between 1 and 2000),
-    created_at text not null
-) strict;
-
-create index safety_reviews_by_trial on safety_reviews (trial_id);
-
-create trigger safety_reviews_no_update before update on safety_reviews
-begin select raise(abort, 'reviews are append-only'); end;
-create trigger safety_reviews_no_delete before delete on safety_reviews
-begin select raise(abort, 'reviews are append-only'); end;
-
-create trigger safety_reviews_need_consent before insert on safety_reviews
-when (select s.subject_id from trials t join studies s on s.id = t.study_id where t.id = new.trial_id)
-    in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-
--- Why a trial has no gait: which bound, relaxed alone and solved again, gives one. A trial has one explanation; it follows from
--- what its solve left.
-
-create table explanations (
-    trial_id       text primary key not null references trials (id),
-    -- Which version of the program made it.
-    program        text not null,
-    -- SHA-256 of what it was made from: the problem of the trial as its file gives it.
-    problem_sha256 text not null constraint explanations_problem check (length(problem_sha256) = 64),
-    -- The tuned bound of the smallest relaxation that gives a gait (null: no bound alone does).
-    relieved_by    text,
-    -- The whole explanation, JSON.
-    document       text not null constraint explanations_document check (json_valid(document)),
-    created_at     text not null
-) strict;
-
-create trigger explanations_no_update before update on explanations
-begin select raise(abort, 'explanations are append-only'); end;
-create trigger explanations_no_delete before delete on explanations
-begin select raise(abort, 'explanations are append-only'); end;
-
-create trigger explanations_need_consent before insert on explanations
-when (select s.subject_id from trials t join studies s on s.id = t.study_id where t.id = new.trial_id)
-    in (select subject_id from withdrawn_subjects)
-begin select raise(abort, 'the subject withdrew consent'); end;
-
--- That somebody asked for one: it is made before those that nobody asked for, also by a process that starts later.
-create table explanation_requests (
-    trial_id   text primary key not null references trials (id),
+    session_id text not null references lab_sessions (id),
+    walk       integer not null constraint measurement_files_walk check (walk in (1, 2, 3)),
+    kind       text not null constraint measurement_files_kind check (kind in ('emg', 'motion')),
+    -- How to read the file, as JSON.
+    reading    text not null constraint measurement_files_reading check (json_valid(reading)),
+    -- The file, compressed with zstd.
+    raw        blob not null,
+    raw_sha256 text not null,
     actor      text not null,
     created_at text not null
 ) strict;
 
-create trigger explanation_requests_no_update before update on explanation_requests
-begin select raise(abort, 'requests are append-only'); end;
-create trigger explanation_requests_no_delete before delete on explanation_requests
-begin select raise(abort, 'requests are append-only'); end;
+create index measurement_files_by_session on measurement_files (session_id, kind, walk);
 
-create trigger explanation_requests_need_consent before insert on explanation_requests
-when (select s.subject_id from trials t join studies s on s.id = t.study_id where t.id = new.trial_id)
+create trigger measurement_files_no_update before update on measurement_files
+begin select raise(abort, 'measurement files are append-only'); end;
+create trigger measurement_files_no_delete before delete on measurement_files
+begin select raise(abort, 'measurement files are append-only'); end;
+create trigger measurement_files_need_consent before insert on measurement_files
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
+
+-- Results of EMG processing: settings and curves as JSON.
+create table emg_results (
+    id         text primary key not null,
+    session_id text not null references lab_sessions (id),
+    document   text not null constraint emg_results_document check (json_valid(document)),
+    actor      text not null,
+    created_at text not null
+) strict;
+
+create index emg_results_by_session on emg_results (session_id);
+
+create trigger emg_results_no_update before update on emg_results
+begin select raise(abort, 'EMG results are append-only'); end;
+create trigger emg_results_no_delete before delete on emg_results
+begin select raise(abort, 'EMG results are append-only'); end;
+create trigger emg_results_need_consent before insert on emg_results
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+    in (select subject_id from withdrawn_subjects)
+begin select raise(abort, 'the subject withdrew consent'); end;
+
+---------------------------------------------------------------- Users, tokens and sign-in
+
+-- The record contains no secrets: passwords are hashed with argon2id, and random secrets with SHA-256. Users are disabled, not
+-- deleted, because the audit trail refers to them.
+create table users (
+    id          text primary key not null,
+    name        text not null collate nocase
+                constraint users_name_unique unique
+                constraint users_name_length check (length(name) between 1 and 80),
+    role        text not null constraint users_role check (role in ('admin', 'clinician', 'rater')),
+    -- A PHC string; null if the user signs in with one-time links only.
+    password    text,
+    disabled_at text,
+    created_at  text not null
+) strict;
+
+create trigger users_no_delete before delete on users
+begin select raise(abort, 'users are disabled, never deleted'); end;
+
+create table tokens (
+    id         text primary key not null,
+    name       text not null
+               constraint tokens_name_unique unique
+               constraint tokens_name_length check (length(name) between 1 and 80),
+    hash       text not null
+               constraint tokens_hash_unique unique
+               constraint tokens_hash_length check (length(hash) = 64),
+    scopes     text not null constraint tokens_scopes_json check (json_valid(scopes)),
+    -- The actor who created the token, as in the audit trail.
+    created_by text not null,
+    -- The user among these actors; null if the program created the token.
+    creator_id text references users (id),
+    created_at text not null,
+    expires_at text,
+    revoked_at text
+) strict;
+
+create trigger tokens_no_delete before delete on tokens
+begin select raise(abort, 'tokens are revoked, never deleted'); end;
+
+create table sign_in_links (
+    hash       text primary key not null constraint sign_in_links_hash_length check (length(hash) = 64),
+    user_id    text not null references users (id),
+    created_at text not null,
+    expires_at text not null,
+    used_at    text
+) strict;
+
+create table sessions (
+    -- Of the secret in the browser.
+    hash         text primary key not null constraint sessions_hash_length check (length(hash) = 64),
+    -- The name of the session in lists.
+    id           text not null constraint sessions_id_unique unique,
+    user_id      text not null references users (id),
+    -- Whether it began with a one-time link. If so, the user can set a password without the present one.
+    by_link      integer not null default 0 constraint sessions_by_link check (by_link in (0, 1)),
+    -- Network address, and how the browser identifies itself.
+    address      text,
+    browser      text,
+    -- Hash of a cookie that outlives the session. Failed sign-ins by others in the same network do not delay this browser.
+    browser_hash text,
+    created_at   text not null,
+    -- Time of the last request. Idle sessions end.
+    seen_at      text not null,
+    ended_at     text
+) strict;
+
+create index sessions_by_user on sessions (user_id);
+create index sessions_by_browser on sessions (browser_hash) where browser_hash is not null;
+
+-- Failed sign-ins by name and source. The source is a network, or a browser in which this user has signed in before.
+create table sign_in_failures (
+    name        text not null,
+    source      text not null,
+    -- Number of wrong passwords, including those whose sender disconnected before the comparison ended.
+    failures    integer not null,
+    last_at     text not null,
+    -- Until this time the service checks no password of this name from this source.
+    waits_until text not null,
+    primary key (name, source)
+) strict, without rowid;
+
+create index sign_in_failures_by_age on sign_in_failures (last_at);
+
+-- Failed sign-ins by network, whatever the name.
+create table sign_in_sources (
+    network  text primary key not null,
+    -- Includes those that were refused without a check of the password.
+    attempts integer not null,
+    -- Number of different names.
+    names    integer not null,
+    first_at text not null,
+    last_at  text not null
+) strict, without rowid;
+
+create index sign_in_sources_by_age on sign_in_sources (last_at);
+
+-- The latest time at which access was decided. What has expired by then stays expired if the machine's clock is set back.
+create table clock (
+    id     integer primary key not null constraint clock_one_row check (id = 1),
+    latest text not null
+) strict;
+
+---------------------------------------------------------------- Events and requests
+
+-- Progress of studies for clients, which can replay it from any sequence number.
+create table events (
+    seq        integer primary key autoincrement,
+    study_id   text not null references studies (id),
+    kind       text not null,
+    payload    text not null constraint events_payload_json check (json_valid(payload)),
+    created_at text not null
+) strict;
+
+create index events_by_study on events (study_id, seq);
+
+create trigger events_no_update before update on events
+begin select raise(abort, 'events are append-only'); end;
+create trigger events_no_delete before delete on events
+begin select raise(abort, 'events are append-only'); end;
+
+-- Responses to requests that clients may repeat.
+create table idempotency_keys (
+    actor      text not null,
+    key        text not null constraint idempotency_key_length check (length(key) between 1 and 200),
+    -- SHA-256 of method, path and body, because a client may use a key for one request only.
+    request    text not null,
+    status     integer not null,
+    location   text,
+    body       text not null,
+    created_at text not null,
+    constraint idempotency_keys_unique primary key (actor, key)
+) strict, without rowid;
+
+---------------------------------------------------------------- Audit trail and access log
+
+-- One row for each change by a user or a program, written in the transaction of the change.
+create table audit (
+    seq      integer primary key autoincrement,
+    at       text not null,
+    actor    text not null constraint audit_actor_length check (length(actor) between 1 and 120),
+    action   text not null constraint audit_action_length check (length(action) between 1 and 60),
+    -- Kind and identifier of the changed object: `study 0190...`.
+    object   text not null,
+    detail   text not null constraint audit_detail_json check (json_valid(detail)),
+    -- The hash of the previous row, and the SHA-256 of this row together with it.
+    previous text not null constraint audit_previous_length check (length(previous) = 64),
+    hash     text not null constraint audit_hash_unique unique constraint audit_hash_length check (length(hash) = 64)
+) strict;
+
+-- Raters who were allowed to read earlier are not blind, so each of their answers looks up their former roles.
+create index audit_role_changes on audit (object) where action = 'user.role';
+
+create trigger audit_no_update before update on audit
+begin select raise(abort, 'the audit trail is append-only'); end;
+create trigger audit_no_delete before delete on audit
+begin select raise(abort, 'the audit trail is append-only'); end;
+
+-- Views and exports of subjects' data, and refusals. Requests that are repeated within a short time share a row.
+create table access_log (
+    seq        integer primary key autoincrement,
+    created_at text not null,
+    last_at    text not null,
+    times      integer not null constraint access_log_times check (times >= 1),
+    kind       text not null constraint access_log_kind check (kind in ('view', 'export', 'refused')),
+    actor      text not null,
+    address    text not null,
+    method     text not null,
+    route      text not null,
+    object     text not null,
+    status     integer not null,
+    study_id   text references studies (id),
+    subject_id text references subjects (id)
+) strict;
+
+create index access_log_by_subject on access_log (subject_id, seq);
+
+-- Deletions of old rows of the access log. Rows can be deleted only after the row here that covers them was written.
+create table access_prunings (
+    seq             integer primary key autoincrement,
+    up_to           integer not null,
+    older_than_days integer not null constraint access_prunings_days check (older_than_days >= 1),
+    actor           text not null,
+    created_at      text not null
+) strict;
+
+create trigger access_log_no_update before update on access_log
+begin select raise(abort, 'the access log is append-only'); end;
+create trigger access_log_no_delete before delete on access_log
+when old.seq > coalesce((select max(up_to) from access_prunings), 0)
+begin select raise(abort, 'the access log is append-only'); end;
+create trigger access_prunings_no_update before update on access_prunings
+begin select raise(abort, 'prunings of the access log are append-only'); end;
+create trigger access_prunings_no_delete before delete on access_prunings
+begin select raise(abort, 'prunings of the access log are append-only'); end;
+
+---------------------------------------------------------------- Seals
+
+-- Hashes of rows, chained. The program seals each row in the transaction that writes it, so a row that another program
+-- changed, added or deleted does not match its newest seal. store/src/seals/tables.rs lists the sealed tables.
+create table seals (
+    seq        integer primary key autoincrement,
+    -- The table of the row, and its primary key.
+    table_name text not null,
+    key        text not null,
+    -- SHA-256 of the row; empty if the row was deleted.
+    sha256     text not null constraint seals_sha256_length check (length(sha256) in (0, 64)),
+    -- The hash of the previous seal, and the SHA-256 of this seal together with it.
+    previous   text not null constraint seals_previous_length check (length(previous) = 64),
+    hash       text not null constraint seals_hash_length check (length(hash) = 64)
+) strict;
+
+create index seals_by_row on seals (table_name, key, seq);
+
+create trigger seals_no_update before update on seals
+begin select raise(abort, 'seals are append-only'); end;
+create trigger seals_no_delete before delete on seals
+begin select raise(abort, 'seals are append-only'); end;
+
+-- Hashes of rows of tables whose rows change often or are deleted: only the newest hash of each row is kept.
+create table checksums (
+    -- The table of the row, and its primary key.
+    table_name text not null,
+    key        text not null,
+    sha256     text not null constraint checksums_sha256_length check (length(sha256) = 64),
+    primary key (table_name, key)
+) strict, without rowid;

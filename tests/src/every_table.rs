@@ -50,26 +50,26 @@ pub async fn fill(database: &Path) {
     for sql in [
         "insert into sign_in_links (hash, user_id, created_at, expires_at) select hex(zeroblob(32)), id, '', '' from users \
          limit 1",
-        "insert into sessions (hash, user_id, created_at, seen_at) select hex(zeroblob(32)), id, '', '' from users limit 1",
+        "insert into sessions (hash, id, user_id, created_at, seen_at) select hex(zeroblob(32)), 'Z', id, '', '' from users limit 1",
         "insert into certificates select trial_id, 1, 1, '{}', created_at from gaits limit 1",
         "insert into explanation_requests (trial_id, actor, created_at) select id, 'K', '' from trials limit 1",
         "insert into explanations (trial_id, program, problem_sha256, document, created_at) \
          select trial_id, 'P', gait_sha256, '{}', created_at from gaits limit 1",
-        "insert into presentation_retractions select presentation_id, created_at from presentation_answers limit 1",
-        "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, actor, created_at) \
-         select 'L', study_id, 1, min(id), max(id), 1, 'K', '' from trials group by study_id",
-        "insert into lab_allocations (session_id, gait_one_first, nonce, created_at) \
+        "insert into blind_pair_retractions select pair_id, created_at from blind_pair_answers limit 1",
+        "insert into lab_sessions (id, study_id, number, trial_a, trial_b, actor, created_at) \
+         select 'L', study_id, 1, min(id), max(id), 'K', '' from trials group by study_id",
+        "insert into lab_allocations (session_id, gait_a_first, nonce, created_at) \
          values ('L', 1, lower(hex(randomblob(32))), '')",
-        "insert into lab_device_files (id, session_id, walk, to_device, actor, created_at) \
+        "insert into controller_file_downloads (id, session_id, walk, to_device, actor, created_at) \
          values ('D', 'L', 2, 0, 'K', '')",
-        "insert into lab_acts (session_id, act, actor, created_at) values ('L', 'walk_1', 'K', '')",
+        "insert into lab_session_steps (session_id, step, actor, created_at) values ('L', 'walk_1', 'K', '')",
         "insert into lab_answers (session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
         "insert into lab_answer_retractions (session_id, number, actor, created_at) values ('L', 1, 'K', '')",
-        "insert into assessments (id, study_id, first, second, answer, source, author, created_at) \
+        "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, created_at) \
          select 'M', study_id, min(id), max(id), 'cannot_tell', 'clinician', 'K', '' from trials group by study_id",
         "insert into assessment_retractions (assessment_id, author, reason, created_at) values ('M', 'K', 'r', '')",
-        "insert into safety_reviews (id, trial_id, said_until, decision, author, reason, created_at) \
-         select 'I', id, '', 'unsafe', 'K', 'r', '' from trials limit 1",
+        "insert into safety_reviews (id, trial_id, decision, author, reason, created_at) \
+         select 'I', id, 'unsafe', 'K', 'r', '' from trials limit 1",
         "insert into safety_reports (id, trial_id, source, author, created_at) \
          select 'S', id, 'clinician', 'K', '' from trials limit 1",
         "insert into safety_review_reports (review_id, report_id) values ('I', 'S')",
@@ -83,13 +83,11 @@ pub async fn fill(database: &Path) {
         "insert into access_log (created_at, last_at, times, kind, actor, address, method, route, object, status) \
          values ('', '', 1, 'view', 'K', '', 'GET', '/', '/', 200)",
         "insert into access_prunings (up_to, older_than_days, actor, created_at) values (0, 1, 'K', '')",
+        "insert into imports (study_id, file_sha256, trusted, unchecked_rmse, actor, created_at) \
+         select id, hex(zeroblob(32)), 0, 0, 'K', '' from studies limit 1",
     ] {
         sqlx::query(sql).execute(&mut **writer).await.unwrap();
     }
-    // Tables that the baseline schema does not have.
-    let imports = "insert into imports (study_id, file_sha256, trusted, unchecked_rmse, actor, created_at) \
-                   select id, hex(zeroblob(32)), 0, 0, 'K', '' from studies limit 1";
-    sqlx::query(imports).execute(&mut **writer).await.unwrap();
     commit(writer).await.unwrap();
     for (path, body) in [(format!("/api/v1/studies/{study}/members"), json!({"kind": "user", "name": "R1"}))] {
         let done = service.post(&path, &body).await;

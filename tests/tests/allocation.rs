@@ -7,7 +7,7 @@ use gaitwright_service::access::{Right, Role};
 use gaitwright_service::studies::lab::{self, NewLabSession};
 use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::presentations::{self, NewPresentation, PresentationKind};
+use gaitwright_store::blind_pairs::{self, BlindPairKind, NewBlindPair};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
@@ -228,20 +228,20 @@ async fn sides_of_10_000_pairs_are_balanced_and_independent_of_earlier_pairs() {
     let (study, trials) = finished(&service).await;
     let mut writer = service.store.write().await.unwrap();
     for number in 1..=10_000 {
-        let new = NewPresentation {
+        let new = NewBlindPair {
             token: format!("{number:064}"),
             study_id: study,
             rater: "R".to_owned(),
             number,
-            kind: PresentationKind::New,
+            kind: BlindPairKind::New,
             pair: (trials[1].id, trials[0].id),
             repeats: None,
             could_have_known: false,
         };
-        let id = presentations::insert(&mut writer, &new).await.unwrap();
+        let id = blind_pairs::insert(&mut writer, &new).await.unwrap();
         allocations::of_pair(&mut writer, id, None, RandomDraw::draw().unwrap()).await.unwrap();
     }
-    let rows = "select swapped from presentation_allocations order by rowid";
+    let rows = "select swapped from blind_pair_allocations order by rowid";
     let rows = sqlx::query(rows).fetch_all(&mut **writer).await.unwrap();
     drop(writer);
     let swapped: Vec<bool> = rows.iter().map(|row| row.get(0)).collect();
@@ -282,7 +282,7 @@ impl Seen {
     async fn of(store: &Store) -> Self {
         let mut reader = store.read().await.unwrap();
         let names = "select name from sqlite_master where type = 'table' \
-                     and name not in ('lab_allocations', 'presentation_allocations')";
+                     and name not in ('lab_allocations', 'blind_pair_allocations')";
         let mut tables = BTreeMap::new();
         for name in sqlx::query(names).fetch_all(&mut **reader).await.unwrap() {
             let name: String = name.get(0);
@@ -371,7 +371,7 @@ async fn program_that_reads_everything_else_guesses_1_000_allocations_at_chance(
         assert!(is_chance(right, 1000), "{rule}: {right} of 1000");
         tried += 1;
     }
-    // The seed of the study and the number of the session, by which earlier versions drew.
+    // A draw from the seed of the study and the number of the session.
     let by_seed = |k: usize| bit(&format!("1 lab session {}", k / 250));
     assert!(is_chance((0..1000).filter(|k| by_seed(*k) == truth[*k]).count(), 1000));
 
@@ -400,7 +400,7 @@ fn by_hash(sha256: &str, session: &str, created_at: &str) -> Option<bool> {
             hash.update(bytes);
         };
         column("created_at", "TEXT", created_at.as_bytes());
-        column("gait_one_first", "INTEGER", &i64::from(first).to_be_bytes());
+        column("gait_a_first", "INTEGER", &i64::from(first).to_be_bytes());
         column("session_id", "TEXT", session.as_bytes());
         if hex::encode(hash.finalize()) == sha256 {
             return Some(first);
@@ -443,8 +443,8 @@ async fn exchange_orders(database: &Path) {
     let store = Store::open(database).await.unwrap();
     let mut writer = store.write().await.unwrap();
     for (trigger, sql) in [
-        ("lab_allocations_no_update", "update lab_allocations set gait_one_first = 1 - gait_one_first"),
-        ("presentation_allocations_no_update", "update presentation_allocations set swapped = 1 - swapped"),
+        ("lab_allocations_no_update", "update lab_allocations set gait_a_first = 1 - gait_a_first"),
+        ("blind_pair_allocations_no_update", "update blind_pair_allocations set swapped = 1 - swapped"),
     ] {
         let text = sqlx::query_scalar("select sql from sqlite_master where name = ?").bind(trigger);
         let text: String = text.fetch_one(&mut **writer).await.unwrap();
@@ -695,7 +695,7 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_d
         let walked = lab::RecordedWalk { walk, note: String::new() };
         lab::record_walk(&mut writer, &reading_caller.actor, row, &walked).await.unwrap();
     }
-    let answer = lab::NewAnswer { number: 1, answer: presentations::Judgement::First, note: String::new() };
+    let answer = lab::NewAnswer { number: 1, answer: blind_pairs::Judgement::First, note: String::new() };
     let seen = lab::answer(&mut writer, &reading_caller, row, &answer).await.unwrap();
     assert!(seen.answer.unwrap().could_have_known);
     commit(writer).await.unwrap();
@@ -733,7 +733,7 @@ async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
             let walked = lab::RecordedWalk { walk, note: String::new() };
             lab::record_walk(&mut writer, &person.actor, id, &walked).await.unwrap();
         }
-        let answer = lab::NewAnswer { number: 1, answer: presentations::Judgement::First, note: String::new() };
+        let answer = lab::NewAnswer { number: 1, answer: blind_pairs::Judgement::First, note: String::new() };
         let seen = lab::answer(&mut writer, &person, id, &answer).await.unwrap();
         assert_eq!(seen.answer.unwrap().could_have_known, could_have_known, "{}", fetched_by.name);
         commit(writer).await.unwrap();
@@ -854,7 +854,7 @@ fn only_allocation_modules_name_the_allocation_tables() {
             continue;
         }
         read += 1;
-        for table in ["lab_allocations", "presentation_allocations"] {
+        for table in ["lab_allocations", "blind_pair_allocations"] {
             assert!(!text.contains(table), "{name} names {table}");
         }
     }

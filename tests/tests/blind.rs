@@ -6,8 +6,8 @@ use axum::http::{Method, StatusCode};
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright_service::access::{Right, Role};
 use gaitwright_service::workers::{Assignment, Evaluate};
+use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::presentations::{self, Presentation, PresentationKind};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
@@ -36,8 +36,8 @@ async fn say(service: &Service, pair: &Value, answer: &str) -> StatusCode {
     service.post(&path, &json!({"answer": answer, "response_ms": 900})).await.status
 }
 
-async fn shown(service: &Service, study: StudyId) -> Vec<Presentation> {
-    presentations::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap()
+async fn shown(service: &Service, study: StudyId) -> Vec<BlindPair> {
+    blind_pairs::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap()
 }
 
 #[tokio::test]
@@ -132,7 +132,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, "first").await;
         let shown = shown(&service, study).await;
-        if shown.iter().any(|pair| pair.kind == PresentationKind::Repeat) {
+        if shown.iter().any(|pair| pair.kind == BlindPairKind::Repeat) {
             with_repeats = Some((study, shown));
             break;
         }
@@ -142,12 +142,8 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let heard: Vec<_> = feedback.iter().filter(|row| row.by_rater).collect();
     assert_eq!(heard.len(), shown.len());
     assert!(heard.iter().all(|row| !row.could_have_known), "a rater who may not read answers blindly");
-    let repeats = shown.iter().filter(|p| p.kind == PresentationKind::Repeat).count();
-    assert!(
-        repeats > 0 && shown.iter().all(|p| p.kind != PresentationKind::Null),
-        "{repeats} repeats of {}",
-        shown.len()
-    );
+    let repeats = shown.iter().filter(|p| p.kind == BlindPairKind::Repeat).count();
+    assert!(repeats > 0, "{repeats} repeats of {}", shown.len());
 
     let figures = format!("/api/v1/studies/{study}/raters");
     let before = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
@@ -343,7 +339,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
         }
         let word = if turn == 0 {
             "cannot_tell"
-        } else if unsafe_trial.is_none() && last.kind == PresentationKind::New {
+        } else if unsafe_trial.is_none() && last.kind == BlindPairKind::New {
             unsafe_trial = sides(&service.store, study).await.last().map(|(_, second)| *second);
             "unsafe_second"
         } else {
@@ -355,10 +351,10 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
     service.wait_for(study, &[StudyState::Finished]).await;
     assert!(unsafe_trial.is_some());
     let shown = shown(&service, study).await;
-    let skipped = shown[0].pair();
+    let skipped = shown[0].trials();
     let again = shown[1..].iter().filter(|p| {
-        let pair = p.pair();
-        p.kind == PresentationKind::New && (pair == skipped || pair == (skipped.1, skipped.0))
+        let pair = p.trials();
+        p.kind == BlindPairKind::New && (pair == skipped || pair == (skipped.1, skipped.0))
     });
     assert_eq!(again.count(), 0);
     service.stop().await;

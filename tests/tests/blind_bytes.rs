@@ -6,8 +6,8 @@
 use axum::http::{HeaderMap, Method, StatusCode};
 use gaitwright_http::openapi;
 use gaitwright_service::access::{Right, Role};
+use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::presentations::{self, Presentation, PresentationKind};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, studies};
@@ -68,8 +68,7 @@ async fn secrets(service: &Service, studies_of: &[StudyId]) -> BTreeSet<String> 
             }
         }
         secrets.extend(service.feedback(id).await.iter().map(|row| row.id.to_string()));
-        secrets
-            .extend(presentations::of_study(&mut reader, id).await.unwrap().iter().map(|shown| shown.id.to_string()));
+        secrets.extend(blind_pairs::of_study(&mut reader, id).await.unwrap().iter().map(|shown| shown.id.to_string()));
     }
     secrets.insert("paper-1".to_owned());
     secrets
@@ -189,7 +188,7 @@ fn named(headers: &HeaderMap) -> Vec<(String, String)> {
 }
 
 /// Answers every pair of a study and says of what kind each was, provided that all of them looked the same.
-async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<PresentationKind> {
+async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<BlindPairKind> {
     let study = waiting(service, 40).await;
     let (rater, clinician) = (rater_of(service, &[study]).await, signed_in(service, Role::Clinician).await);
     let mut looks = BTreeSet::new();
@@ -206,9 +205,9 @@ async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<Presentatio
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         }
-        let shown = presentations::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
+        let shown = blind_pairs::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
         let shown = shown.last().unwrap().clone();
-        if shown.kind == PresentationKind::New {
+        if shown.kind == BlindPairKind::New {
             answer_too(service, &clinician, study, &shown).await;
         }
         kinds.push(shown.kind);
@@ -249,7 +248,7 @@ async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
     for _ in 0..8 {
         let kinds = kinds_of_pairs_that_look_the_same(&service).await;
         assert!(kinds.len() > 30, "{kinds:?}");
-        if kinds.contains(&PresentationKind::Repeat) {
+        if kinds.contains(&BlindPairKind::Repeat) {
             service.stop().await;
             return;
         }
@@ -258,8 +257,8 @@ async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
 }
 
 /// A clinician answers the comparison that a rater was shown.
-async fn answer_too(service: &Service, clinician: &As, study: StudyId, shown: &Presentation) {
-    let body = json!({"trial_a": shown.one, "trial_b": shown.other, "answer": "b"});
+async fn answer_too(service: &Service, clinician: &As, study: StudyId, shown: &BlindPair) {
+    let body = json!({"trial_a": shown.trial_a, "trial_b": shown.trial_b, "answer": "b"});
     let given = post(service, clinician, &format!("/api/v1/studies/{study}/preferences"), &body).await;
     assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
 }

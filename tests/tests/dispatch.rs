@@ -11,7 +11,7 @@ use gaitwright_service::workers::{Assignment, Dispatch, EngineMessage, InProcess
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
-use gaitwright_store::{StudyId, TrialId, jobs, results};
+use gaitwright_store::{StudyId, TrialId, attempts, jobs};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::broker::Broker;
 use gaitwright_tests::service::Service;
@@ -151,7 +151,7 @@ async fn nothing_is_lost_or_doubled(service: &Service, study: StudyId) {
             .iter()
             .filter(|row| matches!(row.content, FeedbackContent::Label { trial: of, .. } if of == trial.id));
         assert_eq!(labels.count(), 1, "labels of trial {}", trial.number);
-        let brought = results::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
+        let brought = attempts::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
         assert_eq!(brought.iter().filter(|result| result.used).count(), 1, "{brought:?}");
     }
 }
@@ -229,7 +229,7 @@ async fn a_job_that_is_cancelled(mut rig: Rig) {
     assert!(
         !feedback.iter().any(|row| matches!(row.content, FeedbackContent::Label { trial, .. } if trial == running))
     );
-    let brought = results::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
+    let brought = attempts::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
     assert!(brought.iter().all(|result| !result.used), "{brought:?}");
     service.stop().await;
 }

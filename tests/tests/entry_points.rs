@@ -12,7 +12,7 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
-use gaitwright_store::{StudyId, TrialId, lab_sessions, presentations};
+use gaitwright_store::{StudyId, TrialId, blind_pairs, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::sources;
@@ -206,10 +206,10 @@ impl Scene {
         for table in [
             "feedback",
             "assessments",
-            "presentations",
-            "presentation_answers",
+            "blind_pairs",
+            "blind_pair_answers",
             "lab_sessions",
-            "lab_acts",
+            "lab_session_steps",
             "lab_answers",
         ] {
             let sql = sqlx::AssertSqlSafe(format!("select count(*) from {table}"));
@@ -530,8 +530,8 @@ async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
     for blind_first in [true, false] {
         let scene = Rated::new().await;
         let token = scene.token().await;
-        let shown = presentations::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
-        let (a, b) = shown[0].pair();
+        let shown = blind_pairs::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
+        let (a, b) = shown[0].trials();
         let blind = format!("/api/v1/blind-pairs/{token}/answer");
         let open = format!("/api/v1/studies/{}/preferences", scene.study);
         let (said, chosen) = (json!({"answer": "first"}), json!({"trial_a": b, "trial_b": a, "answer": "a"}));

@@ -132,7 +132,7 @@ async fn repeated_requests_give_one_explanation() {
     assert_eq!(trail.iter().filter(|row| row.action == "trial.ask_explanation").count(), 1);
     let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     let told: Vec<_> = told.iter().filter(|event| event.kind == "trial_explained").collect();
-    assert_eq!((told.len(), &told[0].payload["relieved_by"]), (1, &json!("a5")));
+    assert_eq!((told.len(), &told[0].payload["relaxed_bound"]), (1, &json!("a5")));
     service.stop().await;
 }
 

@@ -651,7 +651,7 @@ async fn height_and_mass_are_accepted_in_customary_units() {
     let (_folder, service) = service().await;
     let body = format!("{STUDY}&subject=new&pseudonym=S7&height_m=5+ft+8+in&body_mass_kg=145+lb&trial_budget=1&seed=1");
     let study = made(&service.post_text("/studies/new", FORM, &body).await);
-    let body = service.get(study).await.plan.body.unwrap();
+    let body = service.get(study).await.plan.body;
     assert_eq!((body.height_m, body.body_mass_kg), (1.727, 65.77));
     service.stop().await;
 }

@@ -404,8 +404,8 @@ async fn archive_preserves_the_lab_sessions_of_its_study() {
     assert_eq!(serde_json::to_value(&anew).unwrap(), emg["result"]);
     assert_eq!(lab::emg(&mut computing, before[0].id).await.unwrap().unwrap().result, anew);
     for change in [
-        "update lab_allocations set gait_one_first = 1 - gait_one_first",
-        "delete from lab_acts",
+        "update lab_allocations set gait_a_first = 1 - gait_a_first",
+        "delete from lab_session_steps",
         "delete from measurement_files",
     ] {
         let mut writer = other.write().await.unwrap();

@@ -5,7 +5,7 @@
 
 use gaitwright_service::studies::comparison::open_question;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::results;
+use gaitwright_store::attempts;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
@@ -40,7 +40,7 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
         let from = t.warm_started_from.map(|from| trials.iter().find(|other| other.id == from).unwrap().number);
         let rmse = t.gait_rmse_rad.map(f64::to_bits);
         essence.push(format!("{} {} {:?} {rmse:?} {from:?} {}", t.number, t.action_index, t.state, t.reason));
-        let brought = results::of_trial(&mut service.store.read().await.unwrap(), t.id).await.unwrap();
+        let brought = attempts::of_trial(&mut service.store.read().await.unwrap(), t.id).await.unwrap();
         assert_eq!(brought.len(), 1, "{brought:?}");
         assert!(brought[0].used);
         workers.push(brought[0].worker.clone());

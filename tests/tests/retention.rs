@@ -49,14 +49,16 @@ async fn only_expired_keys_sessions_and_links_are_deleted() {
         .await
         .unwrap();
     for (hash, seen, ended) in [("a", old, None), ("b", new, Some(old)), ("c", new, None)] {
-        sqlx::query("insert into sessions (hash, user_id, created_at, seen_at, ended_at) values (?, 'u', ?, ?, ?)")
-            .bind(hash.repeat(64))
-            .bind(old)
-            .bind(seen)
-            .bind(ended)
-            .execute(&mut **writer)
-            .await
-            .unwrap();
+        sqlx::query(
+            "insert into sessions (hash, id, user_id, created_at, seen_at, ended_at) values (?1, ?1, 'u', ?2, ?3, ?4)",
+        )
+        .bind(hash.repeat(64))
+        .bind(old)
+        .bind(seen)
+        .bind(ended)
+        .execute(&mut **writer)
+        .await
+        .unwrap();
     }
     for (hash, expires, used) in [("a", old, None), ("b", new, Some(old)), ("c", new, None)] {
         sqlx::query(

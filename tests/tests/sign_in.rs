@@ -13,7 +13,7 @@ use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Caller, Clock, Right, Role};
 use gaitwright_store::audit::{self, Actor, AuditRow};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::{Instant, SessionId, Store, UserId, commit, now, seals, sign_in_failures};
+use gaitwright_store::{Instant, Store, UserId, commit, now, sign_in_failures};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{
     self, As, FORM, cookie_of, member, send, service, session_of, sign_in_from, signed_in, token, user, with_password,
@@ -468,11 +468,6 @@ async fn disabling_a_user_ends_their_tokens_and_sessions() {
         let session = session_of(&sign_in_from(&service, OWNER, None, name, RIGHT).await);
         made.push((id, session, token_by(&service, id, name, Role::Admin).await));
     }
-    // As an older version wrote it: with only the name of the creator.
-    let mut writer = service.store.write().await.unwrap();
-    let id = made[2].0;
-    sqlx::query("update tokens set maker = null where maker = ?").bind(id).execute(&mut **writer).await.unwrap();
-    commit(writer).await.unwrap();
     for (_, session, token) in &made {
         assert_eq!((status(&service, session).await, status(&service, token).await), (StatusCode::OK, StatusCode::OK));
     }
@@ -724,31 +719,4 @@ async fn new_administrator_is_created_if_all_are_disabled() {
     assert!(user_administration::link(&mut writer, &Actor::terminal(), fresh.id).await.is_ok());
     commit(writer).await.unwrap();
     service.stop().await;
-}
-
-#[tokio::test]
-async fn upgrade_from_the_baseline_keeps_sessions_and_seals() {
-    let folder = tempfile::tempdir().unwrap();
-    let database = folder.path().join("a.db");
-    let baseline = zstd::decode_all(&include_bytes!("../records/v1.db.zst")[..]).unwrap();
-    std::fs::write(&database, baseline).unwrap();
-    let pool = sqlx::SqlitePool::connect(&format!("sqlite:{}", database.display())).await.unwrap();
-    let begin = "insert into sessions (hash, user_id, created_at, seen_at) \
-                 select 'f' || substr(hex(zeroblob(32)), 2), id, created_at, created_at from users limit 1";
-    sqlx::query(begin).execute(&pool).await.unwrap();
-    pool.close().await;
-    let store = Store::open(&database).await.unwrap();
-    let mut reader = store.read().await.unwrap();
-    let ids: Vec<Option<String>> =
-        sqlx::query_scalar("select id from sessions").fetch_all(&mut **reader).await.unwrap();
-    assert!(!ids.is_empty());
-    for id in ids {
-        id.unwrap().parse::<SessionId>().expect("every session has an identifier now");
-    }
-    drop(reader);
-    let tokens = gaitwright_store::tokens::all(&mut store.read().await.unwrap()).await.unwrap();
-    assert!(!tokens.is_empty());
-    let found = seals::verify(&mut store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(found, seals::SealCheck::Intact { .. }), "{found:?}");
-    store.close().await;
 }

@@ -4,9 +4,9 @@ use gait_learner::Prediction;
 use gait_optimizer::TunedBounds;
 use gaitwright_charts::power_of_ten;
 use gaitwright_service::access::Role;
+use gaitwright_store::blind_pairs::Judgement;
 use gaitwright_store::feedback::{FeedbackRow, Source};
 use gaitwright_store::measurement_files::MeasurementKind;
-use gaitwright_store::presentations::Judgement;
 use gaitwright_store::studies::FeedbackMode;
 
 /// A figure with four decimals, or a dash.

@@ -35,11 +35,8 @@ impl Audit {
         let found = verify::file(&database, settings.anchor().as_slice()).await?;
         let (rows, last) = found.audit;
         data(&format!("audit trail intact: {rows} rows, last hash {last}"))?;
-        data(&match found.seals {
-            Some((seals, last)) => format!("seals intact: {seals} seals, last hash {last}"),
-            None => "no seals: an older version wrote this record; the service will seal it the next time it starts"
-                .to_owned(),
-        })?;
+        let (seals, last) = found.seals;
+        data(&format!("seals intact: {seals} seals, last hash {last}"))?;
         for (anchor, ends) in &found.anchors {
             let (audit, seals) = (ends.audit.seq, ends.seals.seq);
             data(&format!("complete according to anchor {}: {audit} rows, {seals} seals", anchor.display()))?;

@@ -83,7 +83,7 @@ async fn record(database: &Path, anchors: &[PathBuf]) -> CheckOutcome {
             "{} is intact: audit trail of {} rows, {} seals, anchors: {}",
             database.display(),
             whole.audit.0,
-            whole.seals.map_or(0, |(seals, _)| seals),
+            whole.seals.0,
             whole.anchors.len()
         )),
         Err(error) => Trouble(error.to_string()),

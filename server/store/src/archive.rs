@@ -20,13 +20,13 @@ const TABLES: [(&str, &str); 31] = [
     ("gaits", "trial_id in (select id from trials where study_id = ?)"),
     ("explanation_requests", "trial_id in (select id from trials where study_id = ?)"),
     ("jobs", "trial_id in (select id from trials where study_id = ?)"),
-    ("results", "trial_id in (select id from trials where study_id = ?)"),
+    ("attempts", "trial_id in (select id from trials where study_id = ?)"),
     ("feedback", "study_id = ? order by seq"),
     ("retractions", "feedback_seq in (select seq from feedback where study_id = ?)"),
-    ("presentations", "study_id = ? order by id"),
-    ("presentation_answers", "presentation_id in (select id from presentations where study_id = ?)"),
-    ("presentation_retractions", "presentation_id in (select id from presentations where study_id = ?)"),
-    ("presentation_allocations", archived_allocations::PAIRS),
+    ("blind_pairs", "study_id = ? order by id"),
+    ("blind_pair_answers", "pair_id in (select id from blind_pairs where study_id = ?)"),
+    ("blind_pair_retractions", "pair_id in (select id from blind_pairs where study_id = ?)"),
+    ("blind_pair_allocations", archived_allocations::PAIRS),
     ("unblindings", "study_id = ? order by seq"),
     ("assessments", "study_id = ? order by id"),
     ("assessment_retractions", "assessment_id in (select id from assessments where study_id = ?)"),
@@ -34,7 +34,7 @@ const TABLES: [(&str, &str); 31] = [
     (
         "safety_reviews",
         "trial_id in (select id from trials where study_id = ?) \
-         order by (select min(s.seq) from seals s where s.evidence = 'safety_reviews' and s.key = safety_reviews.id)",
+         order by (select min(s.seq) from seals s where s.table_name = 'safety_reviews' and s.key = safety_reviews.id)",
     ),
     (
         "safety_review_reports",
@@ -43,8 +43,8 @@ const TABLES: [(&str, &str); 31] = [
     ),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_allocations", archived_allocations::LAB),
-    ("lab_device_files", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
-    ("lab_acts", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("controller_file_downloads", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("lab_session_steps", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_answers", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_answer_retractions", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("measurement_files", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
@@ -204,7 +204,7 @@ impl Unpacking {
                 row.set("lease_until", Cell::Null);
             }
             // Scripts keep their open trials. Our own running solves are queued again.
-            "trials" if row.text("asked_by").is_none() && row.text("state") == Some("running") => {
+            "trials" if row.text("script").is_none() && row.text("state") == Some("running") => {
                 row.set("state", text("queued"));
             }
             "feedback" => {
@@ -236,7 +236,7 @@ impl Unpacking {
 pub async fn trial_unlike_its_job(db: &mut Connection) -> StoreResult<Option<u32>> {
     Ok(sqlx::query_scalar(
         "select t.number from trials t left join jobs j on j.trial_id = t.id \
-         where (t.asked_by is null and t.state in ('queued', 'running')) <> coalesce(j.state <> 'done', 0) \
+         where (t.script is null and t.state in ('queued', 'running')) <> coalesce(j.state <> 'done', 0) \
          order by t.number limit 1",
     )
     .fetch_optional(db)

@@ -1,7 +1,7 @@
 //! Assessments: what staff say of two gaits that is no preference.
 
+use super::blind_pairs::Judgement;
 use super::feedback::{Attribution, Retraction, Source};
-use super::presentations::Judgement;
 use super::{AssessmentId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
@@ -114,14 +114,14 @@ pub struct UnsavedAssessment<'a> {
 pub async fn insert(db: &mut Connection, new: &UnsavedAssessment<'_>) -> StoreResult<AssessmentId> {
     let id = AssessmentId::fresh();
     sqlx::query(
-        "insert into assessments (id, study_id, first, second, answer, source, author, note, feedback_id, created_at) \
+        "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, note, feedback_id, created_at) \
          values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(new.study)
     .bind(new.pair.0)
     .bind(new.pair.1)
-    .bind(Judgement::from(new.answer).as_str())
+    .bind(Judgement::from(new.answer).about_gaits())
     .bind(new.attribution.source.as_str())
     .bind(new.attribution.author)
     .bind(new.attribution.note)
@@ -179,9 +179,9 @@ fn from_row(row: &SqliteRow) -> StoreResult<Assessment> {
     Ok(Assessment {
         id: row.try_get("id")?,
         study_id: row.try_get("study_id")?,
-        trial_a: row.try_get("first")?,
-        trial_b: row.try_get("second")?,
-        answer: row.try_get::<&str, _>("answer")?.parse::<Judgement>()?.try_into()?,
+        trial_a: row.try_get("trial_a")?,
+        trial_b: row.try_get("trial_b")?,
+        answer: Judgement::from_gaits(row.try_get("answer")?)?.try_into()?,
         source: row.try_get::<&str, _>("source")?.parse()?,
         author: row.try_get("author")?,
         note: row.try_get("note")?,

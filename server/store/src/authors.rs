@@ -8,7 +8,7 @@ use super::{Connection, StoreResult, StudyId, TrialId};
 const AUTHORS: &str = "select author from feedback where trial_a = ?2 and trial_b = ?3 and source <> 'gait_rmse' \
      union select author from feedback where trial_a = ?3 and trial_b = ?2 and source <> 'gait_rmse' \
      union select author from assessments where study_id = ?1 \
-     union select rater from presentations where study_id = ?1 \
+     union select rater from blind_pairs where study_id = ?1 \
      union select author from feedback indexed by feedback_suggestions where study_id = ?1 and kind = 'suggestion' \
      and suggested in (select action_index from trials where id in (?2, ?3))";
 

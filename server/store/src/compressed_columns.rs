@@ -3,6 +3,7 @@
 use super::{StoreError, StoreResult, json_columns};
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
+use std::marker::PhantomData;
 
 /// A compressed text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,17 +37,12 @@ impl PackedText {
 #[derive(Debug, Clone)]
 pub struct Packed<T> {
     json: PackedText,
-    parse: fn(&'static str, &str) -> StoreResult<T>,
+    value: PhantomData<fn() -> T>,
 }
 
 impl<T: DeserializeOwned> Packed<T> {
     pub(super) fn new(json: PackedText) -> Self {
-        Self { json, parse: json_columns::from_text }
-    }
-
-    /// The same, parsed by another function.
-    pub(super) fn read_by(self, parse: fn(&'static str, &str) -> StoreResult<T>) -> Self {
-        Self { parse, ..self }
+        Self { json, value: PhantomData }
     }
 
     /// Decompresses the JSON text.
@@ -62,6 +58,6 @@ impl<T: DeserializeOwned> Packed<T> {
     /// # Errors
     /// As [`PackedText::text`], and if the text is not the JSON of such a value.
     pub fn unpack(&self, pool: &OnPool) -> StoreResult<T> {
-        (self.parse)(self.json.what, &self.json.text(pool)?)
+        json_columns::from_text(self.json.what, &self.json.text(pool)?)
     }
 }

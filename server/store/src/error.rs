@@ -59,18 +59,18 @@ pub enum StoreError {
         /// The newest version that this program supports.
         known: i64,
     },
-    /// A study has a setting that this version lacks, with a value that changes its trials.
+    /// A development version, with another migration of this number, wrote the file.
     #[error(
-        "The study {study:?} was made with the learner setting {setting} = {value}, which this version does not have. Nothing was \
-         changed. Use the version of gaitwright that made the study."
+        "The database {} is from a development version of gaitwright: its migration {version} differs from the one of this version, \
+         so its tables cannot be read. Nothing was changed. Open it with the version that wrote it, or start an empty record \
+         in another file.",
+        path.display()
     )]
-    FormerSetting {
-        /// The name of the study.
-        study: String,
-        /// The setting.
-        setting: &'static str,
-        /// Its value, as JSON.
-        value: String,
+    DevelopmentSchema {
+        /// The file.
+        path: PathBuf,
+        /// The first migration that differs.
+        version: i64,
     },
     /// The database file is missing, but its anchor or log is there.
     #[error(
@@ -302,7 +302,11 @@ impl StoreError {
     pub fn is_wrong_file(&self) -> bool {
         matches!(
             self,
-            Self::Open { .. } | Self::NotADatabase { .. } | Self::NewerSchema { .. } | Self::NoAnchorFolder { .. }
+            Self::Open { .. }
+                | Self::NotADatabase { .. }
+                | Self::NewerSchema { .. }
+                | Self::DevelopmentSchema { .. }
+                | Self::NoAnchorFolder { .. }
         )
     }
 }

@@ -2,7 +2,7 @@
 
 use super::audit::Actor;
 use super::members::{reach_values, reached};
-use super::{Connection, Instant, StoreResult, StudyId, TrialId, former_documents, json_columns, now};
+use super::{Connection, Instant, StoreResult, StudyId, TrialId, json_columns, now};
 use crate::accessible_studies::Reach;
 use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
@@ -34,7 +34,7 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Sto
         Ok(StoredExplanation {
             program: row.try_get("program")?,
             problem_sha256: row.try_get("problem_sha256")?,
-            explanation: former_documents::explanation(row.try_get("document")?)?,
+            explanation: json_columns::column(&row, "document")?,
             created_at: row.try_get("created_at")?,
         })
     })
@@ -52,7 +52,7 @@ pub async fn insert(
     explanation: &Explanation,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into explanations (trial_id, program, problem_sha256, relieved_by, document, created_at) \
+        "insert into explanations (trial_id, program, problem_sha256, relaxed_bound, document, created_at) \
          values (?, ?, ?, ?, ?, ?) on conflict do nothing",
     )
     .bind(trial)
@@ -120,7 +120,7 @@ pub async fn next_of_ended(
 ) -> StoreResult<Option<TrialId>> {
     Ok(sqlx::query_scalar(
         "select t.id from trials t join studies s on s.id = t.study_id \
-         where t.study_id = ? and t.state = 'not_converged' and t.asked_by is null \
+         where t.study_id = ? and t.state = 'not_converged' and t.script is null \
          and s.state in ('finished', 'stopped') \
          and t.id in (select trial_id from gaits) and t.id not in (select trial_id from explanations) \
          and t.id not in (select value from json_each(?)) \
@@ -159,9 +159,9 @@ pub struct Relief {
 /// Errors of the database.
 pub async fn in_common(db: &mut Connection, study: StudyId) -> StoreResult<Common> {
     let rows = sqlx::query(
-        "select e.relieved_by, count(*) as trials, min(t.number) as number, t.id from explanations e \
-         join trials t on t.id = e.trial_id where t.study_id = ? group by e.relieved_by \
-         order by trials desc, e.relieved_by",
+        "select e.relaxed_bound, count(*) as trials, min(t.number) as number, t.id from explanations e \
+         join trials t on t.id = e.trial_id where t.study_id = ? group by e.relaxed_bound \
+         order by trials desc, e.relaxed_bound",
     )
     .bind(study)
     .fetch_all(db)
@@ -170,7 +170,7 @@ pub async fn in_common(db: &mut Connection, study: StudyId) -> StoreResult<Commo
     for row in rows {
         let trials: u32 = row.try_get("trials")?;
         common.explained += trials;
-        let bound: Option<String> = row.try_get("relieved_by")?;
+        let bound: Option<String> = row.try_get("relaxed_bound")?;
         if let (None, Some(bound)) = (&common.relief, bound) {
             common.relief = Some(Relief { bound, trials, instance: (row.try_get("id")?, row.try_get("number")?) });
         }

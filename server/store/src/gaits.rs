@@ -1,6 +1,6 @@
 //! Stored gaits: trajectory, warm start and iterations of completed solves, compressed.
 
-use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, former_documents, json_columns, now};
+use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, json_columns, now};
 use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
@@ -143,8 +143,7 @@ pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<Pack
 /// # Errors
 /// [`StoreError::Missing`] if the trial has none; errors of the database.
 pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Vec<IterationRecord>>> {
-    let packed = column(db, trial, "iterations", "select iterations from gaits where trial_id = ?").await?;
-    Ok(packed.read_by(former_documents::iterations))
+    column(db, trial, "iterations", "select iterations from gaits where trial_id = ?").await
 }
 
 /// Deletes the gaits of a study, except those of the `kept` trials, their warm starts, and gaits of lab sessions.
@@ -158,7 +157,7 @@ pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: &[T
          and trial_id not in (select value from json_each(?2)) \
          and trial_id not in (select warm_started_from from trials where warm_started_from is not null \
                               and id in (select value from json_each(?2))) \
-         and trial_id not in (select gait_one from lab_sessions union select gait_two from lab_sessions)",
+         and trial_id not in (select trial_a from lab_sessions union select trial_b from lab_sessions)",
     )
     .bind(study)
     .bind(json_columns::to_text("trials", &kept)?)

@@ -115,8 +115,8 @@ identifier!(
     SessionId
 );
 identifier!(
-    /// Identifier of a presentation.
-    PresentationId
+    /// Identifier of a blind pair.
+    BlindPairId
 );
 identifier!(
     /// Identifier of an assessment.
@@ -139,8 +139,8 @@ identifier!(
     MeasurementFileId
 );
 identifier!(
-    /// Identifier of a controller file of a lab session.
-    LabControllerFileId
+    /// Identifier of a download of a controller file.
+    ControllerFileDownloadId
 );
 identifier!(
     /// Identifier of a result of EMG processing.
@@ -157,4 +157,4 @@ macro_rules! holds_safety_reports {
         })*
     };
 }
-holds_safety_reports!(PresentationId, AssessmentId, LabSessionId);
+holds_safety_reports!(BlindPairId, AssessmentId, LabSessionId);

@@ -1,7 +1,7 @@
 //! Stored answers of subjects in lab sessions, in terms of walks.
 
 use super::audit::Actor;
-use super::presentations::Judgement;
+use super::blind_pairs::Judgement;
 use super::{Connection, Instant, LabSessionId, StoreResult, now};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;

@@ -96,8 +96,8 @@ impl LabSession {
 
     /// The gaits of walks 2 and 3; `None` while the session is blinded.
     pub fn walked(&self) -> Option<(TrialId, TrialId)> {
-        let one_first = self.allocation.gait_a_first?;
-        Some(if one_first { (self.trial_a, self.trial_b) } else { (self.trial_b, self.trial_a) })
+        let gait_a_first = self.allocation.gait_a_first?;
+        Some(if gait_a_first { (self.trial_a, self.trial_b) } else { (self.trial_b, self.trial_a) })
     }
 }
 
@@ -123,8 +123,8 @@ pub struct UnsavedLabSession<'a> {
 pub async fn insert(db: &mut Connection, actor: &Actor, new: &UnsavedLabSession<'_>) -> StoreResult<LabSessionId> {
     let id = LabSessionId::fresh();
     sqlx::query(
-        "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, notes, actor, created_at) \
-         values (?, ?, ?, ?, ?, 0, ?, ?, ?)",
+        "insert into lab_sessions (id, study_id, number, trial_a, trial_b, notes, actor, created_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(new.study_id)
@@ -151,8 +151,8 @@ pub async fn add_step(
     note: &str,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into lab_acts (session_id, act, note, actor, created_at) values (?, ?, ?, ?, ?) \
-         on conflict (session_id, act) do nothing",
+        "insert into lab_session_steps (session_id, step, note, actor, created_at) values (?, ?, ?, ?, ?) \
+         on conflict (session_id, step) do nothing",
     )
     .bind(id)
     .bind(step.as_str())
@@ -194,7 +194,7 @@ pub async fn open_since(db: &mut Connection, reach: Reach, limit: u32, since: In
     let rows = sqlx::query(concat!(
         "select l.* from lab_sessions l join studies s on s.id = l.study_id \
          where s.subject_id not in (select subject_id from withdrawn_subjects) \
-         and not exists (select 1 from lab_acts a where a.session_id = l.id and a.act = 'closed' \
+         and not exists (select 1 from lab_session_steps a where a.session_id = l.id and a.step = 'closed' \
          and a.created_at < ?5) and ",
         reached!("s.id"),
         " order by l.id desc limit ?4"
@@ -219,19 +219,19 @@ async fn all(db: &mut Connection, rows: &[SqliteRow]) -> StoreResult<Vec<LabSess
 
 async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> {
     let id: LabSessionId = row.try_get("id")?;
-    let steps = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id);
+    let steps = sqlx::query("select * from lab_session_steps where session_id = ? order by rowid").bind(id);
     let steps = steps.fetch_all(&mut *db).await?;
     let step = |row: &SqliteRow| -> StoreResult<(SessionStep, LabSessionStep)> {
         let done =
             LabSessionStep { note: row.try_get("note")?, actor: row.try_get("actor")?, at: row.try_get("created_at")? };
-        Ok((row.try_get::<&str, _>("act")?.parse()?, done))
+        Ok((row.try_get::<&str, _>("step")?.parse()?, done))
     };
     Ok(LabSession {
         id,
         study_id: row.try_get("study_id")?,
         number: row.try_get("number")?,
-        trial_a: row.try_get("gait_one")?,
-        trial_b: row.try_get("gait_two")?,
+        trial_a: row.try_get("trial_a")?,
+        trial_b: row.try_get("trial_b")?,
         allocation: allocations::session(&mut *db, id).await?,
         notes: row.try_get("notes")?,
         actor: row.try_get("actor")?,

@@ -18,10 +18,12 @@ pub mod archived_allocations;
 pub mod archived_row;
 pub mod assessments;
 pub mod atomic_file;
+pub mod attempts;
 pub mod audit;
 pub mod authors;
 pub mod backup;
 pub mod backup_folder;
+pub mod blind_pairs;
 mod borrowed_connection;
 pub mod cancelled_jobs;
 pub mod certificates;
@@ -34,7 +36,6 @@ pub mod events;
 pub mod execution_reports;
 pub mod explanations;
 pub mod feedback;
-mod former_documents;
 mod free_disk_space;
 pub mod gaits;
 mod id;
@@ -51,14 +52,12 @@ pub mod members;
 mod migrations;
 mod opening_checks;
 mod ownership;
-pub mod presentations;
 pub mod quarantine;
 pub mod read_only;
 mod record_files;
 pub mod reference_gaits;
 pub mod restore;
 mod restore_marker;
-pub mod results;
 pub mod rights;
 pub mod safety_reports;
 pub mod safety_reviews;
@@ -85,8 +84,8 @@ pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use free_disk_space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use id::{
-    AssessmentId, BackupId, DeviceId, EmgResultId, FeedbackId, JobId, LabControllerFileId, LabSessionId,
-    MeasurementFileId, MemberId, PresentationId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId,
+    AssessmentId, BackupId, BlindPairId, ControllerFileDownloadId, DeviceId, EmgResultId, FeedbackId, JobId,
+    LabSessionId, MeasurementFileId, MemberId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId,
     SubjectId, TokenId, TrialId, UserId,
 };
 pub use schema_versions::SCHEMA_VERSION;
@@ -165,7 +164,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
-    /// [`StoreError::NewerSchema`], [`StoreError::FormerSetting`], [`StoreError::WrongAnchor`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
+    /// [`StoreError::NewerSchema`], [`StoreError::DevelopmentSchema`], [`StoreError::WrongAnchor`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
     /// if the record contradicts an anchor, [`StoreError::Unsealed`] and [`StoreError::Damaged`] if another program
     /// added, changed or deleted a row or changed the schema; errors of the database.
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {

@@ -3,7 +3,7 @@
 use super::audit::Actor;
 use super::{
     Connection, EmgResultId, Instant, LabSessionId, MeasurementFileId, PackedText, StoreError, StoreResult,
-    former_documents, json_columns, now,
+    json_columns, now,
 };
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
@@ -27,7 +27,7 @@ impl MeasurementKind {
     /// The name in the record.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Emg => "electromyogram",
+            Self::Emg => "emg",
             Self::Motion => "motion",
         }
     }
@@ -180,7 +180,7 @@ pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: MeasurementFileI
         .await?
         .ok_or_else(|| missing(id))?;
     let file = PackedText::new("recording", row.try_get("raw")?, Some(row.try_get("raw_sha256")?));
-    Ok((former_documents::reading(row.try_get("reading")?)?, file))
+    Ok((json_columns::column(&row, "reading")?, file))
 }
 
 /// Adds a result of EMG processing.
@@ -214,7 +214,7 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
         .bind(session)
         .fetch_optional(db)
         .await?;
-    row.map(|row| former_documents::emg_result(row.try_get("document")?)).transpose()
+    row.map(|row| json_columns::column(&row, "document")).transpose()
 }
 
 /// Every result of EMG processing of a session, oldest first.
@@ -223,7 +223,7 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
 /// Errors of the database.
 pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<T>> {
     let rows = sqlx::query("select document from emg_results where session_id = ? order by id").bind(session);
-    rows.fetch_all(db).await?.iter().map(|row| former_documents::emg_result(row.try_get("document")?)).collect()
+    rows.fetch_all(db).await?.iter().map(|row| json_columns::column(row, "document")).collect()
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<MeasurementFile> {

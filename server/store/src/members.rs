@@ -62,7 +62,7 @@ pub struct Member {
 }
 
 /// The message of the trigger that refuses a second membership.
-pub const MEMBER_ALREADY: &str = "a member of this study already";
+pub const MEMBER_ALREADY: &str = "already a member of this study";
 
 /// Whether a caller can access a study. `false` for a study that does not exist.
 ///

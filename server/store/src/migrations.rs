@@ -1,7 +1,7 @@
 //! Migrates a record at start, in one transaction, after a backup.
 
 use super::record_files::path_with_suffix;
-use super::schema_versions::{SCHEMA_VERSION, check_version, up_to};
+use super::schema_versions::{FILES, SchemaFile, check_version, migrator};
 use super::{StoreError, StoreResult, backup, seals, verify};
 use sqlx::SqlitePool;
 use std::path::{Path, PathBuf};
@@ -12,16 +12,24 @@ const SQLITE_HEADER_BYTES: usize = 100;
 /// Verifies a record, migrates it, and seals the rows that the migrations wrote, in one transaction. Refuses a record
 /// that another program changed, and leaves it unchanged.
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
+    migrate(pool, path, FILES).await
+}
+
+/// As [`apply`], with these migrations.
+async fn migrate(pool: &SqlitePool, path: &Path, files: &[SchemaFile]) -> StoreResult<()> {
     let found = check_version(pool, path).await?;
-    back_up_before(pool, path, found).await?;
+    let is_newest = files.iter().all(|(version, ..)| *version <= found);
+    if found > 0 && !is_newest {
+        back_up_before(pool, path, found).await?;
+    }
     let mut change = pool.begin().await?;
     if found > 0 {
         verify::rows(&mut change, found).await?;
     }
-    if found < SCHEMA_VERSION {
+    if !is_newest {
         let before = seals::present(&mut change).await?;
         seals::watch_migrations(&mut change).await?;
-        up_to(SCHEMA_VERSION).run_direct(None, &mut *change, false).await?;
+        migrator(files).run_direct(None, &mut *change, false).await?;
         seals::adopt(&mut change, &before).await?;
         seals::end_watch(&mut change).await?;
     }
@@ -30,9 +38,6 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
 
 /// Backs up a file before a migration, as `gaitwright.db.v1`.
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
-    if found == 0 || found == SCHEMA_VERSION {
-        return Ok(());
-    }
     let name = path_with_suffix(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
     let copy = backup::whole_copy(pool, path, &name, path).await?;
@@ -57,4 +62,112 @@ fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
         candidate = path_with_suffix(name, &format!("-{number}"));
     }
     Ok(Some(candidate))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::audit::Actor;
+    use super::super::schema_versions::SCHEMA_VERSION;
+    use super::super::{Store, commit, consents, read_only, subjects};
+    use super::*;
+    use tempfile::TempDir;
+
+    /// A migration that the next version could have: it writes rows of a sealed table.
+    const NEXT: &str = "alter table subjects add column next text; update subjects set next = 'x';";
+
+    fn with_next(sql: &'static str) -> Vec<SchemaFile> {
+        let mut files = FILES.to_vec();
+        files.push((SCHEMA_VERSION + 1, "next", sql));
+        files
+    }
+
+    /// A closed record with a subject who has given consent.
+    async fn record() -> (TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let database = folder.path().join("a.db");
+        let store = Store::open(&database).await.unwrap();
+        let mut writer = store.write().await.unwrap();
+        let body = gait_optimizer::Subject { height_m: 1.8, body_mass_kg: 70.0 };
+        let subject = subjects::insert(&mut writer, "S1", body, "").await.unwrap();
+        consents::append(&mut writer, subject.id, consents::ConsentKind::Given, "form 1", &Actor::program())
+            .await
+            .unwrap();
+        commit(writer).await.unwrap();
+        store.close().await;
+        (folder, database)
+    }
+
+    async fn pool(database: &Path) -> SqlitePool {
+        SqlitePool::connect_with(sqlx::sqlite::SqliteConnectOptions::new().filename(database)).await.unwrap()
+    }
+
+    async fn versions(database: &Path) -> Vec<i64> {
+        let pool = pool(database).await;
+        let found = sqlx::query_scalar("select version from _sqlx_migrations order by version").fetch_all(&pool).await;
+        pool.close().await;
+        found.unwrap()
+    }
+
+    fn files(folder: &TempDir) -> Vec<String> {
+        let names = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<String> = names.map(|name| name.into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[tokio::test]
+    async fn migration_seals_the_rows_that_it_writes_and_keeps_a_copy_of_the_old_record() {
+        let (folder, database) = record().await;
+        let old = folder.path().join("old.db");
+        std::fs::copy(&database, &old).unwrap();
+        let kept = path_with_suffix(&database, &format!(".v{SCHEMA_VERSION}"));
+        for _ in 0..2 {
+            let migrated = pool(&database).await;
+            migrate(&migrated, &database, &with_next(NEXT)).await.unwrap();
+            let mut db = migrated.acquire().await.unwrap();
+            let next: String = sqlx::query_scalar("select next from subjects").fetch_one(&mut *db).await.unwrap();
+            assert_eq!(next, "x");
+            let sealed = seals::verify(&mut db).await.unwrap();
+            assert!(matches!(sealed, seals::SealCheck::Intact { .. }), "{sealed:?}");
+            drop(db);
+            migrated.close().await;
+            assert_eq!(versions(&database).await.last(), Some(&(SCHEMA_VERSION + 1)));
+            read_only::check(&kept).await.unwrap();
+            verify::file(&kept, &[]).await.unwrap();
+            assert_eq!(versions(&kept).await.last(), Some(&SCHEMA_VERSION));
+            // The same record again, whose copy is there already.
+            std::fs::copy(&old, &database).unwrap();
+        }
+        let copies = files(&folder).iter().filter(|name| name.contains(".v") || name.contains("copying")).count();
+        assert_eq!(copies, 1, "{:?}", files(&folder));
+    }
+
+    #[tokio::test]
+    async fn failed_migration_leaves_the_record_as_it_was() {
+        let (_folder, database) = record().await;
+        let pool = pool(&database).await;
+        let failing = "update subjects set notes = 'x'; insert into no_such_table values (1);";
+        let failed = migrate(&pool, &database, &with_next(failing)).await;
+        assert!(matches!(failed, Err(StoreError::Migrate(_))), "{failed:?}");
+        pool.close().await;
+        assert_eq!(versions(&database).await.last(), Some(&SCHEMA_VERSION));
+        verify::file(&database, &[]).await.unwrap();
+        let store = Store::open(&database).await.unwrap();
+        let found = subjects::all(&mut store.read().await.unwrap()).await.unwrap();
+        assert_eq!(found.iter().map(|subject| subject.notes.as_str()).collect::<Vec<_>>(), [""]);
+        store.close().await;
+    }
+
+    #[tokio::test]
+    async fn record_with_a_forged_row_is_not_migrated() {
+        let (_folder, database) = record().await;
+        let pool = pool(&database).await;
+        let forged = "insert into consents (subject_id, kind, note, actor, created_at) \
+                      select id, 'given', 'x', 'x', '' from subjects";
+        sqlx::query(forged).execute(&pool).await.unwrap();
+        let refused = migrate(&pool, &database, &with_next(NEXT)).await;
+        assert!(matches!(&refused, Err(StoreError::Unsealed { table, .. }) if table == "consents"), "{refused:?}");
+        pool.close().await;
+        assert_eq!(versions(&database).await.last(), Some(&SCHEMA_VERSION));
+    }
 }

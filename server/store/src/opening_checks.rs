@@ -2,12 +2,12 @@
 //! place of a record.
 
 use super::record_files::path_with_suffix;
-use super::{StoreError, StoreResult, anchor, schema_versions, studies};
+use super::{StoreError, StoreResult, anchor, schema_versions};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use std::path::{Path, PathBuf};
 
-/// Refuses a file of another program or a newer version, before a writing connection opens it.
+/// Refuses a file of another program, of a development version or of a newer one, before a writing connection opens it.
 pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     if !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
         return Ok(());
@@ -17,7 +17,11 @@ pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     let checked = schema_versions::check_version(&pool, path).await;
     pool.close().await;
     match checked {
-        Err(refusal @ (StoreError::NotADatabase { .. } | StoreError::NewerSchema { .. })) => Err(refusal),
+        Err(
+            refusal @ (StoreError::NotADatabase { .. }
+            | StoreError::NewerSchema { .. }
+            | StoreError::DevelopmentSchema { .. }),
+        ) => Err(refusal),
         // A file that cannot be read without writing, such as one with a hot journal, is checked by the next
         // connection.
         _ => Ok(()),
@@ -38,7 +42,7 @@ pub(super) fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) 
 }
 
 /// Refuses a file that is not the record which its companions know: another program's, an earlier state, or an empty file
-/// in its place; and a record with a study that this version cannot continue.
+/// in its place.
 pub(super) async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
     if schema_versions::check_version(pool, path).await? == 0 {
         return refuse_to_begin_anew(path, anchors);
@@ -46,7 +50,7 @@ pub(super) async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[Pat
     for anchor in anchors {
         anchor::check(&mut *pool.acquire().await?, path, anchor).await?;
     }
-    studies::refuse_former_settings(&mut *pool.acquire().await?).await
+    Ok(())
 }
 
 /// Refuses a file without a schema if an anchor shows that its log was lost.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Checks that a file is an intact record of a known version.
 ///
 /// # Errors
-/// [`StoreError::NewerSchema`], [`StoreError::Damaged`] with the finding of the database.
+/// [`StoreError::NewerSchema`], [`StoreError::DevelopmentSchema`], [`StoreError::Damaged`] with the finding of the database.
 pub async fn check(file: &Path) -> StoreResult<()> {
     let pool = open(file).await?;
     let found = check_open(&pool).await;
@@ -20,7 +20,8 @@ pub async fn check(file: &Path) -> StoreResult<()> {
 /// Opens a record read-only, even if another process owns it or its folder is not writable.
 ///
 /// # Errors
-/// [`StoreError::Open`], [`StoreError::NotADatabase`], [`StoreError::NewerSchema`].
+/// [`StoreError::Open`], [`StoreError::NotADatabase`], [`StoreError::NewerSchema`],
+/// [`StoreError::DevelopmentSchema`].
 pub async fn open(file: &Path) -> StoreResult<SqlitePool> {
     restore_marker::refuse_interrupted(file)?;
     sqlite_file::check(file)?;

@@ -80,19 +80,16 @@ const SELECT: &str = "select r.*, (select group_concat(report_id) from safety_re
 /// A violated constraint or trigger; errors of the database.
 pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResult<SafetyReviewId> {
     let id = SafetyReviewId::fresh();
-    let at = now();
-    // The column said_until decides nothing: the rows of safety_review_reports do.
     sqlx::query(
-        "insert into safety_reviews (id, trial_id, said_until, decision, author, reason, created_at) \
-         values (?, ?, ?, ?, ?, ?, ?)",
+        "insert into safety_reviews (id, trial_id, decision, author, reason, created_at) \
+         values (?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(new.trial)
-    .bind(at)
     .bind(new.decision.as_str())
     .bind(new.author)
     .bind(new.reason)
-    .bind(at)
+    .bind(now())
     .execute(&mut *db)
     .await?;
     for report in new.reports {
@@ -123,7 +120,7 @@ pub async fn get(db: &mut Connection, id: SafetyReviewId) -> StoreResult<SafetyR
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<SafetyReview>> {
     // In the order of their seals, which nobody can change unnoticed. A review of the present change has none yet.
     let of_study = "cross join trials t on t.id = r.trial_id where t.study_id = ? order by \
-                    ifnull((select min(s.seq) from seals s where s.evidence = 'safety_reviews' and s.key = r.id), 1e18), \
+                    ifnull((select min(s.seq) from seals s where s.table_name = 'safety_reviews' and s.key = r.id), 1e18), \
                     r.rowid";
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} {of_study}"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
@@ -157,9 +154,9 @@ pub struct SafetyVersion([i64; 9]);
 pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyVersion> {
     let row = sqlx::query(
         "with own as (select id from studies where subject_id = (select subject_id from studies where id = ?1))
-         select (select count(*) from presentation_answers a join presentations p on p.id = a.presentation_id
+         select (select count(*) from blind_pair_answers a join blind_pairs p on p.id = a.pair_id
                  where p.study_id in own),
-                (select count(*) from presentation_retractions r join presentations p on p.id = r.presentation_id
+                (select count(*) from blind_pair_retractions r join blind_pairs p on p.id = r.pair_id
                  where p.study_id in own),
                 (select count(*) from assessments where study_id in own),
                 (select count(*) from assessment_retractions r join assessments m on m.id = r.assessment_id
@@ -168,8 +165,8 @@ pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyV
                  where s.study_id in own),
                 (select count(*) from lab_answer_retractions r join lab_sessions s on s.id = r.session_id
                  where s.study_id in own),
-                (select count(*) from lab_acts a join lab_sessions s on s.id = a.session_id
-                 where s.study_id in own and a.act = 'unblinded'),
+                (select count(*) from lab_session_steps a join lab_sessions s on s.id = a.session_id
+                 where s.study_id in own and a.step = 'unblinded'),
                 (select count(*) from safety_reviews r cross join trials t on t.id = r.trial_id
                  where t.study_id in own),
                 (select count(*) from safety_reports r cross join trials t on t.id = r.trial_id

@@ -6,37 +6,29 @@ use sqlx::{Row, SqlSafeStr, SqlitePool};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Version, description and text of each migration. Never edit a file; add the next one.
-const FILES: &[(i64, &str, &str)] = &[
-    (1, "baseline", include_str!("../migrations/0001_baseline.sql")),
-    (2, "checksums", include_str!("../migrations/0002_checksums.sql")),
-    (3, "imports", include_str!("../migrations/0003_imports.sql")),
-    (4, "sessions", include_str!("../migrations/0004_sessions.sql")),
-    (5, "access_log", include_str!("../migrations/0005_access_log.sql")),
-    (6, "allocations", include_str!("../migrations/0006_allocations.sql")),
-    (7, "study members", include_str!("../migrations/0007_study_members.sql")),
-    (8, "role changes", include_str!("../migrations/0008_role_changes.sql")),
-    (9, "safety reports", include_str!("../migrations/0009_safety_reports.sql")),
-    (10, "suggestions by action", include_str!("../migrations/0010_suggestions_by_action.sql")),
-    (11, "reviewed safety reports", include_str!("../migrations/0011_reviewed_safety_reports.sql")),
-    (12, "names", include_str!("../migrations/0012_names.sql")),
-    (13, "repeat results", include_str!("../migrations/0013_repeat_results.sql")),
-    (14, "study lists", include_str!("../migrations/0014_study_lists.sql")),
-];
+/// Version, description and text of a migration.
+pub(super) type SchemaFile = (i64, &'static str, &'static str);
+
+/// The migrations. Never edit a released file; add the next one.
+pub(super) const FILES: &[SchemaFile] = &[(1, "baseline", include_str!("../migrations/0001_baseline.sql"))];
 
 /// Newest schema version.
 pub const SCHEMA_VERSION: i64 = FILES[FILES.len() - 1].0;
 
 /// Creates the schema in an empty database.
 pub(super) async fn fresh(db: &mut Connection) -> StoreResult<()> {
-    Ok(up_to(SCHEMA_VERSION).run_direct(None, db, false).await?)
+    Ok(migrator(FILES).run_direct(None, db, false).await?)
 }
 
 /// The migrations up to a version.
 pub(super) fn up_to(newest: i64) -> Migrator {
-    let migrations = FILES
+    migrator(&FILES.iter().copied().filter(|(version, ..)| *version <= newest).collect::<Vec<_>>())
+}
+
+/// These migrations.
+pub(super) fn migrator(files: &[SchemaFile]) -> Migrator {
+    let migrations = files
         .iter()
-        .filter(|(version, ..)| *version <= newest)
         .map(|&(version, description, sql)| {
             let description = Cow::Borrowed(description);
             Migration::new(version, description, MigrationType::Simple, sql.into_sql_str(), false)
@@ -45,8 +37,9 @@ pub(super) fn up_to(newest: i64) -> Migrator {
     Migrator::with_migrations(migrations)
 }
 
-/// The schema version of a file. Refuses files of other programs and of newer versions, and a list of migrations with a
-/// gap, because the missing migrations would be applied again and their rows sealed.
+/// The schema version of a file. Refuses files of other programs, of development versions with other migrations and of
+/// newer versions, and a list of migrations with a gap, because the missing migrations would be applied again and their
+/// rows sealed.
 pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult<i64> {
     let known = FILES[FILES.len() - 1].0;
     let found = version(pool).await?;
@@ -66,6 +59,9 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
         if first.as_deref() != Some(FILES[0].1) {
             return foreign("it belongs to another program, which has its own migrations".to_owned());
         }
+        if let Some(version) = unlike_a_migration(pool).await? {
+            return Err(StoreError::DevelopmentSchema { path: path.to_owned(), version });
+        }
     }
     if found > known {
         return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });
@@ -79,6 +75,18 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
             Err(StoreError::Damaged { what: "evidence", reason })
         }
     }
+}
+
+/// The first applied migration whose text differs from the file with its number.
+async fn unlike_a_migration(pool: &SqlitePool) -> StoreResult<Option<i64>> {
+    for known in migrator(FILES).iter() {
+        let unlike = "select 1 from _sqlx_migrations where version = ? and checksum <> ?";
+        let unlike = sqlx::query(unlike).bind(known.version).bind(known.checksum.as_ref());
+        if unlike.fetch_optional(pool).await?.is_some() {
+            return Ok(Some(known.version));
+        }
+    }
+    Ok(None)
 }
 
 /// The newest applied migration; 0 for a new file.

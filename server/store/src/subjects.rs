@@ -140,17 +140,6 @@ pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) ->
     rows.iter().map(from_row).collect()
 }
 
-/// Height and mass as entered first, which older studies without a body use.
-///
-/// # Errors
-/// [`StoreError::Missing`]; errors of the database.
-pub async fn body_as_entered(db: &mut Connection, id: SubjectId) -> StoreResult<Body> {
-    let row =
-        sqlx::query("select height_m, body_mass_kg from subjects where id = ?").bind(id).fetch_optional(db).await?;
-    let row = row.ok_or_else(|| StoreError::Missing { what: "subject", id: id.to_string() })?;
-    Ok(Body { height_m: row.try_get("height_m")?, body_mass_kg: row.try_get("body_mass_kg")? })
-}
-
 /// Records a correction.
 ///
 /// # Errors

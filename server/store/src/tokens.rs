@@ -57,7 +57,7 @@ pub async fn insert(
         revoked_at: None,
     };
     sqlx::query(
-        "insert into tokens (id, name, hash, scopes, created_by, maker, created_at, expires_at) \
+        "insert into tokens (id, name, hash, scopes, created_by, creator_id, created_at, expires_at) \
          values (?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(token.id)
@@ -83,20 +83,13 @@ pub async fn by_hash(db: &mut Connection, hash: &str) -> StoreResult<Option<Toke
     row.as_ref().map(from_row).transpose()
 }
 
-/// The tokens of a user that were not revoked. Older rows have only the name of the user.
+/// The tokens that a user created and that were not revoked.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn created_by_user(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
-    let rows = sqlx::query(
-        "select t.* from tokens t join users u on u.id = ? where t.revoked_at is null and (t.maker = u.id or \
-         t.maker is null and t.created_by in ('admin ' || u.name, 'clinician ' || u.name, 'rater ' || u.name)) \
-         order by t.id",
-    )
-    .bind(user)
-    .fetch_all(db)
-    .await?;
-    rows.iter().map(from_row).collect()
+    let rows = sqlx::query("select * from tokens where revoked_at is null and creator_id = ? order by id").bind(user);
+    rows.fetch_all(db).await?.iter().map(from_row).collect()
 }
 
 /// The token with this identifier.

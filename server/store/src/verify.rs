@@ -13,8 +13,8 @@ use tokio::sync::OnceCell;
 pub struct IntactRecord {
     /// Number of rows of the audit trail, and the hash of the last one.
     pub audit: (u64, String),
-    /// Number of seals, and the hash of the last one; `None` for a schema version without seals.
-    pub seals: Option<(u64, String)>,
+    /// Number of seals, and the hash of the last one.
+    pub seals: (u64, String),
     /// The existing anchors and the rows that they list.
     pub anchors: Vec<(PathBuf, ChainEnds)>,
 }
@@ -57,7 +57,7 @@ type ChainSummary = (u64, String);
 ///
 /// # Errors
 /// [`StoreError::Damaged`], or [`StoreError::Unsealed`] for a row that was added outside the program.
-pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(ChainSummary, Option<ChainSummary>)> {
+pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(ChainSummary, ChainSummary)> {
     let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     schema(db, version).await?;
     let audit = match audit::verify(db).await? {
@@ -65,8 +65,7 @@ pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chai
         audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
     };
     let seals = match seals::verify(db).await? {
-        seals::SealCheck::Intact { seals, last } => Some((seals, last)),
-        seals::SealCheck::None => None,
+        seals::SealCheck::Intact { seals, last } => (seals, last),
         seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
         seals::SealCheck::Unsealed { table, key } => return Err(StoreError::Unsealed { table, key }),
         seals::SealCheck::Touched { table, key } => return Err(seals::touched(&table, &key)),

@@ -40,7 +40,7 @@ const MOST_MEMORY_BYTES: u64 = 320 << 20;
 
 /// A compressed archive of content that is made as it is compressed.
 fn streamed(write: impl FnOnce(&mut dyn Write)) -> Vec<u8> {
-    let mut encoder = zstd::Encoder::new(b"gaitwright study 4\n".to_vec(), 1).unwrap();
+    let mut encoder = zstd::Encoder::new(b"gaitwright study 5\n".to_vec(), 1).unwrap();
     write(&mut encoder);
     encoder.finish().unwrap()
 }
@@ -212,7 +212,7 @@ async fn decompression_bombs_are_refused_within_bounded_memory() {
             }
         }),
     ));
-    let mut window = zstd::Encoder::new(b"gaitwright study 4\n".to_vec(), 1).unwrap();
+    let mut window = zstd::Encoder::new(b"gaitwright study 5\n".to_vec(), 1).unwrap();
     window.window_log(27).unwrap();
     repeated(&mut window, "w", 512 << 20);
     bombs.push(("a window of 128 MB", window.finish().unwrap()));

@@ -9,7 +9,7 @@ fn in_reports(rows: &mut Rows, change: impl Fn(&mut Value)) {
     let trial = rows.table("trials").into_iter().find(|row| row["state"] == "converged").unwrap();
     within(trial, "report", &change);
     let id = trial["id"].clone();
-    for result in rows.table("results").into_iter().filter(|row| row["trial_id"] == id) {
+    for result in rows.table("attempts").into_iter().filter(|row| row["trial_id"] == id) {
         within(result, "report", &change);
     }
 }
@@ -213,7 +213,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     (
         "a learner setting that this version lacks",
         |r| within(r.first("studies"), "learner", |l| l["additive_share"] = 0.3.into()),
-        "additive_share = 0.3, which this version does not have",
+        "unknown field `additive_share`",
     ),
     ("too many at a time", |r| r.first("studies")["parallel_trials"] = 65.into(), "studies_parallel_trials"),
     (
@@ -247,7 +247,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     ),
     (
         "another result",
-        |r| within(r.first("results"), "report", |p| p["iterations"] = 1.into()),
+        |r| within(r.first("attempts"), "report", |p| p["iterations"] = 1.into()),
         "its result differs from the accepted one",
     ),
     (
@@ -354,11 +354,11 @@ pub(super) const MORE: [Forgery; 9] = [
         "a review of a report that nobody made yet",
         |r| {
             let session = "01900000-0000-7000-8000-000000000003";
-            let (review, trial) = ("01900000-0000-7000-8000-000000000004", r.first("assessments")["first"].clone());
+            let (review, trial) = ("01900000-0000-7000-8000-000000000004", r.first("assessments")["trial_a"].clone());
             r.0.push((
                 "safety_reviews".to_owned(),
                 json!({
-                    "id": review, "trial_id": trial, "said_until": "2026-01-01T00:00:00.000Z", "decision": "walkable",
+                    "id": review, "trial_id": trial, "decision": "walkable",
                     "author": "K", "reason": "r", "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));
@@ -391,7 +391,7 @@ pub(super) const MORE: [Forgery; 9] = [
                 "safety_reviews".to_owned(),
                 json!({
                     "id": "01900000-0000-7000-8000-000000000001", "trial_id": "01900000-0000-7000-8000-000000000002",
-                    "said_until": "2026-01-01T00:00:00.000Z", "decision": "walkable", "author": "K", "reason": "r",
+                    "decision": "walkable", "author": "K", "reason": "r",
                     "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));

@@ -57,7 +57,7 @@ impl Rows {
 
 /// An archive with this content.
 pub(super) fn framed(content: &str) -> Vec<u8> {
-    [b"gaitwright study 4\n", &zstd::encode_all(content.as_bytes(), 3).unwrap()[..]].concat()
+    [b"gaitwright study 5\n", &zstd::encode_all(content.as_bytes(), 3).unwrap()[..]].concat()
 }
 
 pub(super) fn sha256(text: &[u8]) -> String {

@@ -25,6 +25,12 @@ BackupId = str
 # Bytes that are not text, such as a picture or an archive.
 Binary = bytes
 
+# Identifier of a blind pair.
+BlindPairId = str
+
+# Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement.
+BlindPairKind = Literal["new", "repeat"]
+
 # State of the certificate of a gait: `passed`, every checked value is within its limit, the walker does not fall and
 # the gait is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified;
 # `not_certified`, the gait has no certificate.
@@ -108,13 +114,6 @@ PairAnswer = Literal["a", "b", "no_difference"]
 
 # Who gives the answer.
 PersonSource = Literal["subject", "clinician", "script"]
-
-# Identifier of a presentation.
-PresentationId = str
-
-# Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement; `null`, the
-# same gait twice, in older records only.
-PresentationKind = Literal["new", "repeat", "null"]
 
 # A reference gait: joint angles over the gait cycle, the measured person, and the processing.
 ReferenceGaitDocument = dict[str, Any]
@@ -1311,29 +1310,19 @@ class LabSessionView(_LabSessionViewRequired, total=False):
 class LearnerSettings(TypedDict, total=False):
     """Settings of the learner."""
 
-    # Share of the prior variance in functions of one dimension.
-    additive_share: float
     # Region of avoidance (ROIAL): an action is not proposed if its mean plus this many standard deviations is below the
     # threshold of labels, unless no other action is left. ROIAL uses -0.45. Null disables the region.
     avoidance: Optional[float]
-    # Lengthscale of the additive and pairwise parts, as a multiple of the range of each dimension.
-    broad_lengthscale: float
     # If `partner` is `previous`: number of actions before a batch with which each action of the batch is compared.
     buffer: int
     # Noise scale of suggestions, in units of utility.
     coactive_noise: float
-    # Share of the prior variance of feasibility in functions of one dimension.
-    feasibility_additive_share: float
-    # Factor on every lengthscale of feasibility.
-    feasibility_lengthscale_factor: float
     # Method of approximate inference: `laplace`, a normal distribution at the mode of the posterior;
     # `expectation_propagation`, which needs the link `probit`.
     inference: Literal["laplace", "expectation_propagation"]
     # What labels are evidence of: `in_utility`, the utility, as in the literature; `separate`, the feasibility of
     # actions, modelled by a second Gaussian process.
     labels: Literal["in_utility", "separate"]
-    # Number of trials after which lengthscales and preference noise are learned again. Null keeps them as they are set.
-    learn_every: Optional[int]
     # Factor on the lengthscale of every dimension.
     lengthscale_factor: float
     # Number of trials after which `eubo` searches the whole search space instead of lines.
@@ -1353,9 +1342,6 @@ class LearnerSettings(TypedDict, total=False):
     ordinal_noise: float
     # Threshold between the labels *not converged* and *converged*, in units of utility.
     ordinal_thresholds: list[float]
-    # Share of the prior variance in functions of two dimensions. The rest of the variance is in the product kernel of
-    # the literature.
-    pairwise_share: float
     # Earlier actions with which a new one is compared: `previous`, the other actions of its batch and the last `buffer`
     # actions before the batch; `incumbent`, the best one; `every`, all of them.
     partner: Literal["previous", "incumbent", "every"]
@@ -2034,38 +2020,6 @@ class PhasePortrait(TypedDict):
     velocity_rad_s: list[float]
 
 
-class _PresentationRequired(TypedDict):
-    # Whether the rater could have known the allocation.
-    could_have_known: bool
-    # Time at which the pair was drawn.
-    created_at: Instant
-    # Identifier.
-    id: PresentationId
-    # Why it was shown.
-    kind: PresentationKind
-    # Number of the pair for this rater in this study, from 1.
-    number: int
-    # Name of the rater.
-    rater: str
-    # Trial shown first.
-    shown_first: TrialId
-    # Trial shown second.
-    shown_second: TrialId
-    # Identifier of the study.
-    study_id: StudyId
-
-
-class Presentation(_PresentationRequired, total=False):
-    """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
-
-    # Answer in terms of what was shown. Null if there is none yet.
-    answer: Optional[Judgement]
-    # Time of the answer. Null if there is none yet.
-    answered_at: Optional[Instant]
-    # Earlier presentation that it repeats. Null if it is not a repeat.
-    repeats: Optional[PresentationId]
-
-
 class _ProblemRequired(TypedDict):
     # What went wrong in this request.
     detail: str
@@ -2144,13 +2098,13 @@ class _RaterReliabilityRequired(TypedDict):
     answered: int
     # Number of "cannot tell" answers.
     cannot_tell: int
-    # Number of presentations in which the rater could have known the allocation. The shares exclude them.
+    # Number of blind pairs in which the rater could have known the allocation. The shares exclude them.
     could_have_known: int
     # Name of the rater.
     rater: str
     # Share of repeated pairs with the same answer as before, among blind answers.
     repeats_agree: Proportion
-    # Number of presentations.
+    # Number of blind pairs.
     shown: int
     # Number of answers that reported a gait as unsafe.
     unsafe_gaits: int
@@ -2588,6 +2542,8 @@ class StridesOnYield(TypedDict):
 class _StudyPlanRequired(TypedDict):
     # Values of bounds that are not tuned.
     base_bounds: Bounds
+    # Height and mass used by solves, independent of later corrections.
+    body: Body
     # Identifier of the device.
     device_id: DeviceId
     # What evaluates trials.
@@ -2627,9 +2583,6 @@ class _StudyPlanRequired(TypedDict):
 class StudyPlan(_StudyPlanRequired, total=False):
     """Set-up of a study."""
 
-    # Height and mass used by solves, independent of later corrections. Null in older studies, which use the values
-    # entered first.
-    body: Optional[Body]
     # Total solve time, s, after which no new trial starts.
     solve_seconds_budget: Optional[float]
     # The study finishes when the best action has not changed over this many results.
@@ -2813,8 +2766,6 @@ class _TrialRequired(TypedDict):
 class Trial(_TrialRequired, total=False):
     """Trial of a study."""
 
-    # Script that evaluates the trial. Null if the service does.
-    asked_by: Optional[str]
     # Best trial when this one was proposed. Null if there was none.
     best_before: Optional[TrialId]
     # Cost of transport of a converged gait, dimensionless. Null without one, and if the script that evaluated the trial
@@ -2833,6 +2784,8 @@ class Trial(_TrialRequired, total=False):
     objective: Optional[float]
     # All numerical results of the solve. Null without a completed solve.
     report: Optional[SolveReport]
+    # Script that evaluates the trial. Null if the service does.
+    script: Optional[str]
     # Wall time of the solve, s. Null without a completed solve.
     seconds_total: Optional[float]
     # Time at which a worker first started it. Null before.
@@ -2932,11 +2885,43 @@ class UnblindSession(TypedDict):
     reason: str
 
 
+class _UnblindedPairRequired(TypedDict):
+    # Whether the rater could have known the allocation.
+    could_have_known: bool
+    # Time at which the pair was drawn.
+    created_at: Instant
+    # Identifier.
+    id: BlindPairId
+    # Why it was shown.
+    kind: BlindPairKind
+    # Number of the pair for this rater in this study, from 1.
+    number: int
+    # Name of the rater.
+    rater: str
+    # Trial shown first.
+    shown_first: TrialId
+    # Trial shown second.
+    shown_second: TrialId
+    # Identifier of the study.
+    study_id: StudyId
+
+
+class UnblindedPair(_UnblindedPairRequired, total=False):
+    """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
+
+    # Answer in terms of what was shown. Null if there is none yet.
+    answer: Optional[Judgement]
+    # Time of the answer. Null if there is none yet.
+    answered_at: Optional[Instant]
+    # Earlier pair that it repeats. Null if it is not a repeat.
+    repeats: Optional[BlindPairId]
+
+
 class UnblindedRater(TypedDict):
     """Pairs of an unblinded rater."""
 
     # All pairs of the rater, in order.
-    pairs: list[Presentation]
+    pairs: list[UnblindedPair]
 
 
 class _UnchangedBoundRequired(TypedDict):

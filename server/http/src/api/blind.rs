@@ -61,10 +61,10 @@ pub(super) async fn next(
     let answering = app.clone();
     let (writer, shown) = blind::next(app.store_mut(), &request.caller, id).await?;
     let pair = shown.map(|shown| Pair {
-        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.presentation.token),
-        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.presentation.token),
-        token: shown.presentation.token,
-        number: shown.presentation.number,
+        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.pair.token),
+        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.pair.token),
+        token: shown.pair.token,
+        number: shown.pair.number,
     });
     request.done(&answering, writer, &NextPair { pair }).await
 }

@@ -20,7 +20,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::command;
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::trials_table::{self, Listing, SORTS};
-use gaitwright_store::{StudyId, TrialId, gaits, results, studies};
+use gaitwright_store::{StudyId, TrialId, attempts, gaits, studies};
 use serde::Deserialize;
 use std::collections::HashMap;
 
@@ -224,8 +224,8 @@ pub(super) async fn attempts(
     Visible(id, _): Visible<TrialId, Read>,
     paging: Paging<u32>,
 ) -> Result<Json<Page<AttemptResult>>, Refusal> {
-    let attempts = results::of_trial(&mut *app.read().await?, id).await?;
-    Ok(Json(paging.cut(attempts, |attempt| attempt.attempt)?.map(AttemptResult::from)))
+    let results = attempts::of_trial(&mut *app.read().await?, id).await?;
+    Ok(Json(paging.cut(results, |attempt| attempt.attempt)?.map(AttemptResult::from)))
 }
 
 async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {

@@ -18,7 +18,7 @@ use gaitwright_service::access::{Caller, Rate, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::PairWithSides;
-use gaitwright_store::presentations::{self, Judgement, Presentation};
+use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
 use gaitwright_store::studies::{FeedbackMode, StudyFilter};
 use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
@@ -184,12 +184,12 @@ pub(super) async fn list(
 
 /// A rater's newest answer, if it can be retracted.
 async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlindAnswer>, Error> {
-    let mut newest: Option<Presentation> = None;
+    let mut newest: Option<BlindPair> = None;
     for study in studies::page(db, caller.reach(), &StudyFilter::newest(SEARCHED)).await? {
         if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
             continue;
         }
-        let own = presentations::of_study(db, study.id).await?.into_iter().filter(|shown| shown.rater == caller.name);
+        let own = blind_pairs::of_study(db, study.id).await?.into_iter().filter(|shown| shown.rater == caller.name);
         newest = newest.into_iter().chain(own).max_by_key(|shown| shown.answered_at);
     }
     let Some(shown) = newest else { return Ok(None) };
@@ -202,13 +202,13 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlin
 }
 
 async fn read_back(db: &mut Connection, shown: PairWithSides) -> Result<Option<SavedBlindAnswer>, Error> {
-    let can_be_retracted = blind::can_be_retracted(db, &shown.presentation).await?;
-    Ok(shown.answer().zip(shown.presentation.answered_at).map(|(judgement, at)| SavedBlindAnswer {
-        study: shown.presentation.study_id,
+    let can_be_retracted = blind::can_be_retracted(db, &shown.pair).await?;
+    Ok(shown.answer().zip(shown.pair.answered_at).map(|(judgement, at)| SavedBlindAnswer {
+        study: shown.pair.study_id,
         answer: judgement,
         at,
-        number: shown.presentation.number,
-        token: shown.presentation.token,
+        number: shown.pair.number,
+        token: shown.pair.token,
         can_be_retracted,
     }))
 }
@@ -222,7 +222,7 @@ pub(super) async fn next(
     let (writer, shown) = blind::next(app.store_mut(), &authorized.caller, id).await?;
     commit(writer).await?;
     Ok(match shown {
-        Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.presentation.token)),
+        Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.pair.token)),
         None => Redirect::to(&format!("/rate?nothing=true&study={id}")),
     })
 }
@@ -239,10 +239,10 @@ pub(super) async fn pair(
 async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> PageResult {
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, token).await?;
-    let (token, number) = (shown.presentation.token.clone(), shown.presentation.number);
-    let not_blind = shown.presentation.could_have_known
-        || blind::could_have_known(&mut reader, caller, shown.presentation.study_id).await?;
-    if shown.presentation.answer.is_some() {
+    let (token, number) = (shown.pair.token.clone(), shown.pair.number);
+    let not_blind =
+        shown.pair.could_have_known || blind::could_have_known(&mut reader, caller, shown.pair.study_id).await?;
+    if shown.pair.answer.is_some() {
         let saved = read_back(&mut reader, shown).await?;
         return page(&PairPage { token, number, not_blind, saved, refused, strides: None });
     }

@@ -75,9 +75,8 @@ pub(crate) struct StudyPlan {
     name: String,
     /// Identifier of the subject.
     subject_id: SubjectId,
-    /// Height and mass used by solves, independent of later corrections. Null in older studies, which use the values
-    /// entered first.
-    body: Option<Body>,
+    /// Height and mass used by solves, independent of later corrections.
+    body: Body,
     /// Identifier of the device.
     device_id: DeviceId,
     /// Identifier of the reference gait for Gait RMSE.
@@ -148,7 +147,7 @@ impl From<studies::StudyPlan> for StudyPlan {
         Self {
             name,
             subject_id,
-            body: body.map(Into::into),
+            body: body.into(),
             device_id,
             reference_gait_id,
             muscles,

@@ -5,7 +5,7 @@ use gait_learner::ActionIndex;
 use gait_optimizer::TunedBounds;
 use gaitwright_service::studies::study_plan_schemas;
 use gaitwright_store::trials::{self, TrialState};
-use gaitwright_store::{Instant, StudyId, TrialId, results};
+use gaitwright_store::{Instant, StudyId, TrialId, attempts};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -31,7 +31,7 @@ pub(crate) struct Trial {
     /// Trial whose gait is the warm start. Null for a cold start.
     warm_started_from: Option<TrialId>,
     /// Script that evaluates the trial. Null if the service does.
-    asked_by: Option<String>,
+    script: Option<String>,
     /// State of the trial.
     state: TrialState,
     /// How the solve ended. Null without a completed solve.
@@ -75,7 +75,7 @@ impl From<trials::Trial> for Trial {
             reason,
             best_before,
             warm_started_from,
-            asked_by,
+            script,
             state,
             status,
             gait_rmse_rad,
@@ -100,7 +100,7 @@ impl From<trials::Trial> for Trial {
             reason,
             best_before,
             warm_started_from,
-            asked_by,
+            script,
             state,
             status: status.map(Into::into),
             gait_rmse_rad,
@@ -158,9 +158,9 @@ pub(crate) struct AttemptResult {
     received_at: Instant,
 }
 
-impl From<results::AttemptResult> for AttemptResult {
-    fn from(row: results::AttemptResult) -> Self {
-        let results::AttemptResult { attempt, worker, used, status, report, received_at } = row;
+impl From<attempts::AttemptResult> for AttemptResult {
+    fn from(row: attempts::AttemptResult) -> Self {
+        let attempts::AttemptResult { attempt, worker, used, status, report, received_at } = row;
         Self { attempt, worker, used, status: status.into(), report: report.map(Into::into), received_at }
     }
 }

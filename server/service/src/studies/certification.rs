@@ -40,7 +40,7 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
             found.number
         )));
     }
-    if found.asked_by.is_some() {
+    if found.script.is_some() {
         return Err(Error::conflict(format!(
             "Trial {} was evaluated by a script, which gives no gait to certify.",
             found.number

@@ -106,7 +106,7 @@ fn why_not(trial: &Trial) -> Option<String> {
         return Some(format!("Trial {number} is {state}. Walks can be simulated with a converged gait only."));
     }
     let by_script = format!("Trial {number} was evaluated by a script, which gives no gait to walk with.");
-    trial.asked_by.is_some().then_some(by_script)
+    trial.script.is_some().then_some(by_script)
 }
 
 /// Stores a report.

@@ -147,10 +147,10 @@ pub(super) async fn record(store: &Store, id: TrialId, problem: &str, explanatio
     let mut writer = store.write().await?;
     if explanations::insert(&mut writer, id, problem, explanation).await? {
         let trial = trials::get(&mut writer, id).await?;
-        let relieved_by = explanation.relief().map(|relaxation| &relaxation.bound);
-        let payload = json!({ "trial_id": id, "number": trial.number, "relieved_by": relieved_by });
+        let relaxed_bound = explanation.relief().map(|relaxation| &relaxation.bound);
+        let payload = json!({ "trial_id": id, "number": trial.number, "relaxed_bound": relaxed_bound });
         events::append(&mut writer, trial.study_id, "trial_explained", &payload).await?;
-        let detail = json!({ "relieved_by": relieved_by });
+        let detail = json!({ "relaxed_bound": relaxed_bound });
         audit::append(&mut writer, &Actor::program(), "trial.explain", &format!("trial {id}"), &detail).await?;
     }
     Ok(commit(writer).await?)
@@ -159,7 +159,7 @@ pub(super) async fn record(store: &Store, id: TrialId, problem: &str, explanatio
 /// The status of a trial that can be explained: our own solve ended without a gait, and its last iterate was kept.
 async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, Error> {
     let number = trial.number;
-    if trial.asked_by.is_some() {
+    if trial.script.is_some() {
         return Err(Error::conflict(format!(
             "Trial {number} was evaluated by a script, so there is no solve to explain."
         )));

@@ -72,7 +72,7 @@ pub async fn find(db: &mut Connection, runners: Runners<'_>, id: JobId) -> Resul
 type FoundState = Option<(JobState, Option<String>)>;
 
 fn solve(trial: &Trial) -> FoundState {
-    if trial.asked_by.is_some() {
+    if trial.script.is_some() {
         // A script evaluates it.
         return None;
     }

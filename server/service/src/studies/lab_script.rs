@@ -192,7 +192,7 @@ pub struct CheckedOutcome {
 pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Result<CheckedOutcome, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
-    if trial.asked_by.is_none() {
+    if trial.script.is_none() {
         return Err(Error::conflict("The service evaluates this trial itself."));
     }
     if trial.state != TrialState::Running {

@@ -6,12 +6,10 @@ use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
 use crate::error::Error;
 use crate::printable;
 use gait_learner::ActionIndex;
+use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
 use gaitwright_store::feedback::{self, Attribution, FeedbackContent, Source};
-use gaitwright_store::presentations::{self, Judgement, Presentation};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{
-    Connection, FeedbackId, PresentationId, StudyId, TrialId, Writer, assessments, authors, trials,
-};
+use gaitwright_store::{BlindPairId, Connection, FeedbackId, StudyId, TrialId, Writer, assessments, authors, trials};
 use serde_json::Value;
 
 /// The author of computed answers.
@@ -110,7 +108,7 @@ pub enum CurrentAnswer {
     /// An assessment: the person cannot tell, or reported a gait as unsafe.
     Assessment(gaitwright_store::AssessmentId),
     /// A rater's answer to a blinded pair.
-    Blind(PresentationId),
+    Blind(BlindPairId),
     /// A suggestion whose bounds are those of the other gait.
     Suggestion(FeedbackId),
 }
@@ -140,7 +138,7 @@ pub async fn current_answer(
     if let Some((id, _)) = given.into_iter().find(|(_, other)| is_own(other)) {
         return Ok(Some(CurrentAnswer::Preference(id)));
     }
-    for shown in presentations::of_pair(db, (a, b)).await? {
+    for shown in blind_pairs::of_pair(db, (a, b)).await? {
         if is_own(&shown.rater) && is_current(db, &shown).await? {
             return Ok(Some(CurrentAnswer::Blind(shown.id)));
         }
@@ -150,11 +148,11 @@ pub async fn current_answer(
 }
 
 /// Whether a rater's answer counts: staff can retract the preference derived from it.
-async fn is_current(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
+async fn is_current(db: &mut Connection, shown: &BlindPair) -> Result<bool, Error> {
     if shown.answer.is_none_or(|judgement| judgement == Judgement::Retracted) {
         return Ok(false);
     }
-    Ok(match presentations::feedback_of(db, shown.id).await? {
+    Ok(match blind_pairs::feedback_of(db, shown.id).await? {
         Some(feedback_id) => feedback::get(db, feedback_id).await?.retraction.is_none(),
         None => true,
     })

@@ -3,14 +3,14 @@
 use super::same_motion::GaitMotion;
 use crate::access::Reach;
 use gait_optimizer::TunedBounds;
-use gaitwright_store::presentations::Judgement;
+use gaitwright_store::blind_pairs::Judgement;
 use gaitwright_store::safety_reports as reports;
 use gaitwright_store::safety_reviews::{self, SafetyDecision, SafetyReview};
 use gaitwright_store::studies::{self, Study};
 use gaitwright_store::trials::{self, Trial};
 use gaitwright_store::{
-    AssessmentId, Connection, Instant, LabSessionId, PresentationId, SafetyReportId, StoreResult, StudyId, TrialId,
-    assessments, lab_sessions, presentations,
+    AssessmentId, BlindPairId, Connection, Instant, LabSessionId, SafetyReportId, StoreResult, StudyId, TrialId,
+    assessments, blind_pairs, lab_sessions,
 };
 use std::collections::HashSet;
 
@@ -36,7 +36,7 @@ pub struct ReportedGait {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SafetyReportSource {
     /// In a blind comparison by a rater.
-    Rater(PresentationId),
+    Rater(BlindPairId),
     /// In an assessment.
     Staff(AssessmentId),
     /// In a report about this gait alone.
@@ -157,7 +157,7 @@ impl SafetyReports {
     /// The reports of one study.
     async fn given_in(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::default();
-        for shown in presentations::assessments_of_study(db, study).await? {
+        for shown in blind_pairs::assessments_of_study(db, study).await? {
             if let Some((judgement, at)) = shown.answer.zip(shown.answered_at) {
                 let by = format!("rater {}", shown.rater);
                 let report = |trial| ReportedGait {
@@ -168,7 +168,7 @@ impl SafetyReports {
                     source: SafetyReportSource::Rater(shown.id),
                     review: None,
                 };
-                found.add(judgement, shown.pair(), report);
+                found.add(judgement, shown.trials(), report);
             }
         }
         for assessment in

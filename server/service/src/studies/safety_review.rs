@@ -6,8 +6,8 @@ use crate::error::Error;
 use crate::printable;
 use gaitwright_store::safety_reviews::{self, NewSafetyReview, SafetyDecision, SafetyReview};
 use gaitwright_store::{
-    Connection, FeedbackId, SafetyReportId, StoreResult, TrialId, Writer, assessments, audit, consents, events,
-    feedback, presentations, trials,
+    Connection, FeedbackId, SafetyReportId, StoreResult, TrialId, Writer, assessments, audit, blind_pairs, consents,
+    events, feedback, trials,
 };
 use serde::Deserialize;
 use serde_json::json;
@@ -104,7 +104,7 @@ async fn retract_derived_preferences(
 
 async fn derived_preference(db: &mut Connection, source: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
     match source {
-        SafetyReportSource::Rater(id) => presentations::feedback_of(db, id).await,
+        SafetyReportSource::Rater(id) => blind_pairs::feedback_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(assessments::get(db, id).await?.feedback_id),
         // The learner receives the answer of a subject only at unblinding, and does not receive reports about one gait.
         SafetyReportSource::Subject(_) | SafetyReportSource::Alone(_) => Ok(None),

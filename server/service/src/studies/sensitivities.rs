@@ -46,7 +46,7 @@ pub struct BoundStep {
 /// [`Error::Conflict`] with the reason if the trial has no sensitivities; errors of the database.
 pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSolution, Error> {
     let number = trial.number;
-    if trial.asked_by.is_some() {
+    if trial.script.is_some() {
         return Err(Error::conflict(format!(
             "Trial {number} was evaluated by a script, which gives no solution to compute sensitivities from."
         )));

@@ -2,12 +2,10 @@
 
 use super::device;
 use crate::error::Error;
-use gait_optimizer::{GaitProblem, SolveOptions, Subject, TunedBounds, WarmStart};
+use gait_optimizer::{GaitProblem, SolveOptions, TunedBounds, WarmStart};
 use gaitwright_compute::OnPool;
 use gaitwright_store::studies::StudyPlan;
-use gaitwright_store::{
-    Connection, Packed, StoreResult, TrialId, devices, gaits, reference_gaits, studies, subjects, trials,
-};
+use gaitwright_store::{Connection, Packed, TrialId, devices, gaits, reference_gaits, studies, trials};
 use serde::{Deserialize, Serialize};
 
 /// Everything that a solve depends on. The same input gives the same outcome, bit for bit.
@@ -48,17 +46,6 @@ impl SolveInput {
     }
 }
 
-/// Height and mass with which the trials of a study are solved.
-///
-/// # Errors
-/// Errors of the database.
-pub(super) async fn body_of(db: &mut Connection, plan: &StudyPlan) -> StoreResult<Subject> {
-    match plan.body {
-        Some(body) => Ok(body),
-        None => subjects::body_as_entered(db, plan.subject_id).await,
-    }
-}
-
 /// A stored solve input, whose warm start is still compressed.
 #[derive(Debug)]
 pub struct PackedInput {
@@ -88,7 +75,7 @@ impl PackedInput {
         bounds: TunedBounds,
         start: Option<TrialId>,
     ) -> Result<Self, Error> {
-        let subject = body_of(db, plan).await?;
+        let subject = plan.body;
         let device = devices::get(db, plan.device_id).await?.definition;
         let reference = reference_gaits::get(db, plan.reference_gait_id).await?.definition;
         let warm_start = match start {

@@ -303,7 +303,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     let plan = StudyPlan {
         name,
         subject_id: new.subject_id,
-        body: Some(body),
+        body,
         device_id,
         reference_gait_id,
         muscles: new.muscles,

@@ -12,7 +12,7 @@ use gaitwright_store::gaits::PackedGait;
 use gaitwright_store::jobs::{FailureCounts, Lease};
 use gaitwright_store::studies::FeedbackMode;
 use gaitwright_store::trials::{TrialEnd, TrialState};
-use gaitwright_store::{Store, TrialId, Writer, commit, events, gaits, jobs, results, studies, trials};
+use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, jobs, studies, trials};
 use serde_json::json;
 use std::time::Duration;
 
@@ -58,7 +58,7 @@ pub async fn ended(
             continue;
         }
         let used = jobs::finish(&mut writer, lease).await?;
-        results::insert(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, used).await?;
+        attempts::insert(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, used).await?;
         if !used {
             commit(writer).await?;
             return Ok(false);
@@ -138,7 +138,7 @@ pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Res
 pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
     trial_state::after(row.state, TrialEvent::Retried).map_err(|e| Error::conflict(e.to_string()))?;
-    if row.asked_by.is_some() {
+    if row.script.is_some() {
         return Err(Error::conflict(
             "A script evaluates this trial, so it cannot be queued again. The script must ask for another trial.",
         ));

@@ -221,7 +221,7 @@ impl Grounds {
             });
         }
         let certified = match self.certificates.get(&trial.id) {
-            _ if trial.asked_by.is_some() => Certified::ByLab,
+            _ if trial.script.is_some() => Certified::ByLab,
             Some(CertificateOnRecord::Passed) => Certified::Passed,
             Some(CertificateOnRecord::Failed) => Certified::Failed,
             Some(CertificateOnRecord::NotCertified) => {

@@ -49,7 +49,7 @@ impl RandomDraw {
 
     /// Whether gait A comes first. `lead` is how many more unblinded sessions gait A came first in than gait B.
     /// The coin is fair up to a lead of two; at three or more, the rarer order has a probability of three quarters.
-    pub(super) fn one_first(self, lead: i64) -> bool {
+    pub(super) fn gait_a_first(self, lead: i64) -> bool {
         if lead.unsigned_abs() < TOLERANCE {
             return self.coin();
         }
@@ -85,9 +85,9 @@ mod tests {
     fn in_order(sessions: u64) -> Vec<(i64, bool)> {
         let mut lead = 0;
         let next = |counter| {
-            let one_first = random(counter).one_first(lead);
-            let drawn = (lead, one_first);
-            lead += if one_first { 1 } else { -1 };
+            let gait_a_first = random(counter).gait_a_first(lead);
+            let drawn = (lead, gait_a_first);
+            lead += if gait_a_first { 1 } else { -1 };
             drawn
         };
         (0..sessions).map(next).collect()
@@ -108,11 +108,11 @@ mod tests {
     fn best_guesser_is_right_in_four_of_seven_and_never_above_75_percent_certain() {
         let drawn = in_order(100_000);
         let (mut right, mut at_bias) = (0_u32, (0_u32, 0_u32));
-        for (lead, one_first) in &drawn {
+        for (lead, gait_a_first) in &drawn {
             let guess = *lead < 0;
-            right += u32::from(guess == *one_first);
+            right += u32::from(guess == *gait_a_first);
             if lead.unsigned_abs() >= TOLERANCE {
-                at_bias = (at_bias.0 + u32::from(guess == *one_first), at_bias.1 + 1);
+                at_bias = (at_bias.0 + u32::from(guess == *gait_a_first), at_bias.1 + 1);
             }
         }
         let share = f64::from(right) / drawn.len() as f64;
@@ -130,17 +130,17 @@ mod tests {
         for counter in 0..200_000_u64 {
             let RandomDraw { number: choice, .. } = random(1_000_000 + counter);
             if concealed.len() < 2 || (concealed.len() < 6 && choice % 2 == 0) {
-                concealed.push((lead, random(counter).one_first(lead)));
+                concealed.push((lead, random(counter).gait_a_first(lead)));
                 continue;
             }
             let at = usize::try_from(choice >> 1).unwrap_or(usize::MAX) % concealed.len();
-            let (lead_then, one_first) = concealed.swap_remove(at);
+            let (lead_then, gait_a_first) = concealed.swap_remove(at);
             // The rarer order when it was planned; at a fair coin, what would even out the present lead.
             let guess = if lead_then.unsigned_abs() >= TOLERANCE { lead_then < 0 } else { lead < 0 };
             expected += best_guess(lead_then);
-            right += u32::from(guess == one_first);
+            right += u32::from(guess == gait_a_first);
             of += 1;
-            lead += if one_first { 1 } else { -1 };
+            lead += if gait_a_first { 1 } else { -1 };
         }
         let deviation = 0.5 * f64::from(of).sqrt();
         assert!((f64::from(right) - expected).abs() < 4.0 * deviation, "{right} of {of}, expected {expected}");

@@ -9,9 +9,9 @@ mod biased_coin;
 pub use biased_coin::RandomDraw;
 
 use super::audit::Actor;
-use super::presentations::{Judgement, Presentation, SELECT};
+use super::blind_pairs::{BlindPair, Judgement, SELECT};
 use super::{
-    Connection, Instant, LabControllerFileId, LabSessionId, PresentationId, StoreResult, StudyId, TrialId, now,
+    BlindPairId, Connection, ControllerFileDownloadId, Instant, LabSessionId, StoreResult, StudyId, TrialId, now,
 };
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
@@ -26,10 +26,10 @@ pub async fn of_session(
     number: u32,
     random: RandomDraw,
 ) -> StoreResult<()> {
-    let one_first = random.one_first(lead(db, number).await?);
-    sqlx::query("insert into lab_allocations (session_id, gait_one_first, nonce, created_at) values (?, ?, ?, ?)")
+    let gait_a_first = random.gait_a_first(lead(db, number).await?);
+    sqlx::query("insert into lab_allocations (session_id, gait_a_first, nonce, created_at) values (?, ?, ?, ?)")
         .bind(session)
-        .bind(one_first)
+        .bind(gait_a_first)
         .bind(random.nonce())
         .bind(now())
         .execute(db)
@@ -42,8 +42,8 @@ pub async fn of_session(
 /// imported one, which another service balanced.
 async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
     let row = sqlx::query(
-        "select coalesce(sum(2 * a.gait_one_first - 1), 0) from lab_sessions l \
-         join lab_acts t on t.session_id = l.id and t.act = 'unblinded' \
+        "select coalesce(sum(2 * a.gait_a_first - 1), 0) from lab_sessions l \
+         join lab_session_steps t on t.session_id = l.id and t.step = 'unblinded' \
          join lab_allocations a on a.session_id = l.id \
          where l.number = ? and l.study_id not in (select study_id from imports)",
     );
@@ -81,13 +81,13 @@ pub struct ControllerFileDownload {
 /// Errors of the database.
 pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<SessionAllocation> {
     let order = sqlx::query(
-        "select iif(exists (select 1 from lab_acts t where t.session_id = a.session_id and t.act = 'unblinded'), \
-         a.gait_one_first, null) from lab_allocations a where a.session_id = ?",
+        "select iif(exists (select 1 from lab_session_steps t where t.session_id = a.session_id and t.step = 'unblinded'), \
+         a.gait_a_first, null) from lab_allocations a where a.session_id = ?",
     );
     let order = order.bind(id).fetch_optional(&mut *db).await?;
     let included = order.is_some();
     let gait_a_first = order.map(|row| row.try_get(0)).transpose()?.flatten();
-    let files = sqlx::query("select * from lab_device_files where session_id = ? order by id").bind(id);
+    let files = sqlx::query("select * from controller_file_downloads where session_id = ? order by id").bind(id);
     let files = files.fetch_all(db).await?.iter().map(controller_file).collect::<StoreResult<_>>()?;
     Ok(SessionAllocation { included, gait_a_first, files })
 }
@@ -112,9 +112,9 @@ pub async fn for_device(
     walk: u8,
     (actor, to_device): (&Actor, bool),
 ) -> StoreResult<Option<bool>> {
-    let id = LabControllerFileId::fresh();
+    let id = ControllerFileDownloadId::fresh();
     sqlx::query(
-        "insert into lab_device_files (id, session_id, walk, to_device, actor, created_at) values (?, ?, ?, ?, ?, ?)",
+        "insert into controller_file_downloads (id, session_id, walk, to_device, actor, created_at) values (?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(session)
@@ -125,8 +125,8 @@ pub async fn for_device(
     .execute(&mut *db)
     .await?;
     let row = sqlx::query(
-        "select a.gait_one_first = (f.walk = 2) from lab_allocations a \
-         join lab_device_files f on f.session_id = a.session_id where f.id = ?",
+        "select a.gait_a_first = (f.walk = 2) from lab_allocations a \
+         join controller_file_downloads f on f.session_id = a.session_id where f.id = ?",
     );
     Ok(row.bind(id).fetch_optional(db).await?.map(|row| row.try_get(0)).transpose()?)
 }
@@ -138,7 +138,7 @@ pub async fn for_device(
 /// Errors of the database.
 pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> StoreResult<bool> {
     let row = sqlx::query(
-        "select 1 from lab_device_files f join lab_sessions l on l.id = f.session_id \
+        "select 1 from controller_file_downloads f join lab_sessions l on l.id = f.session_id \
          where l.study_id = ?1 and (f.actor = ?2 or ?3 or f.actor glob ?4) and f.to_device = 0 limit 1",
     );
     let (is_token, of_tokens) = (Actor::is_token(actor.as_str()), format!("{}*", Actor::OF_TOKENS));
@@ -147,19 +147,19 @@ pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> Sto
 
 /// Draws which gait of a pair is shown first, by a fair coin. A biased one would not do: answers in the study reveal
 /// earlier allocations to readers who know the answer of the rater. A pair that is shown again after a retraction keeps the
-/// sides of the earlier presentation (`same_sides_as`).
+/// sides of the earlier pair (`same_sides_as`).
 ///
 /// # Errors
 /// A violated constraint if the pair has an allocation; errors of the database.
 pub async fn of_pair(
     db: &mut Connection,
-    id: PresentationId,
-    same_sides_as: Option<PresentationId>,
+    id: BlindPairId,
+    same_sides_as: Option<BlindPairId>,
     random: RandomDraw,
 ) -> StoreResult<()> {
     sqlx::query(
-        "insert into presentation_allocations (presentation_id, swapped, nonce, created_at) \
-         values (?1, coalesce((select swapped from presentation_allocations where presentation_id = ?2), ?3), ?4, ?5)",
+        "insert into blind_pair_allocations (pair_id, swapped, nonce, created_at) \
+         values (?1, coalesce((select swapped from blind_pair_allocations where pair_id = ?2), ?3), ?4, ?5)",
     )
     .bind(id)
     .bind(same_sides_as)
@@ -175,15 +175,15 @@ pub async fn of_pair(
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairWithSides {
     /// The pair.
-    pub presentation: Presentation,
+    pub pair: BlindPair,
     swapped: bool,
 }
 
 impl PairWithSides {
     /// The gaits, in the order in which they are shown.
     pub fn shown(&self) -> (TrialId, TrialId) {
-        let (one, other) = self.presentation.pair();
-        if self.swapped { (other, one) } else { (one, other) }
+        let (a, b) = self.pair.trials();
+        if self.swapped { (b, a) } else { (a, b) }
     }
 
     /// Converts an answer from sides to gaits of the pair, or back.
@@ -193,7 +193,7 @@ impl PairWithSides {
 
     /// The answer in terms of sides.
     pub fn answer(&self) -> Option<Judgement> {
-        self.presentation.answer.map(|judgement| self.turned(judgement))
+        self.pair.answer.map(|judgement| self.turned(judgement))
     }
 }
 
@@ -219,13 +219,13 @@ pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreRe
 /// Reads pairs with their sides. `rest` states why the sides may be known.
 async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> StoreResult<Vec<PairWithSides>> {
     let columns = SELECT.replacen("select p.*", "select p.*, s.swapped", 1);
-    let sql = format!("{columns} join presentation_allocations s on s.presentation_id = p.id {rest}");
+    let sql = format!("{columns} join blind_pair_allocations s on s.pair_id = p.id {rest}");
     let mut query = sqlx::query(AssertSqlSafe(sql));
     for value in values {
         query = query.bind((*value).to_owned());
     }
     let row = |row: &SqliteRow| -> StoreResult<PairWithSides> {
-        Ok(PairWithSides { presentation: Presentation::from_row(row)?, swapped: row.try_get("swapped")? })
+        Ok(PairWithSides { pair: BlindPair::from_row(row)?, swapped: row.try_get("swapped")? })
     };
     query.fetch_all(db).await?.iter().map(row).collect()
 }
@@ -234,7 +234,7 @@ async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> Stor
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn is_included(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
-    let row = sqlx::query("select 1 from presentation_allocations where presentation_id = ?").bind(id);
+pub async fn is_included(db: &mut Connection, id: BlindPairId) -> StoreResult<bool> {
+    let row = sqlx::query("select 1 from blind_pair_allocations where pair_id = ?").bind(id);
     Ok(row.fetch_optional(db).await?.is_some())
 }

@@ -130,11 +130,11 @@ pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reaso
 /// Selects entries with their retraction and the rater's blinding.
 const SELECT: &str = "select f.*, r.author as retracted_by, r.reason as retracted_because, \
                       r.created_at as retracted_at, \
-                      p.presentation_id is not null as by_rater, \
-                      coalesce(p.could_have_known, 0) = 1 or coalesce(q.unblinded, 0) = 1 as could_have_known \
+                      p.pair_id is not null as by_rater, \
+                      coalesce(p.could_have_known, 0) or coalesce(q.unblinded, 0) as could_have_known \
                       from feedback f left join retractions r on r.feedback_seq = f.seq \
-                      left join presentation_answers p on p.feedback_id = f.id \
-                      left join presentations q on q.id = p.presentation_id ";
+                      left join blind_pair_answers p on p.feedback_id = f.id \
+                      left join blind_pairs q on q.id = p.pair_id ";
 
 fn select(rest: &str) -> AssertSqlSafe<String> {
     AssertSqlSafe(format!("{SELECT} {rest}"))
@@ -252,7 +252,7 @@ pub async fn authors_of_pair(
          where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) \
          and f.source in ('subject', 'clinician', 'script') \
          and not exists (select 1 from retractions r where r.feedback_seq = f.seq) \
-         and not exists (select 1 from presentation_answers p where p.feedback_id = f.id) order by f.seq desc",
+         and not exists (select 1 from blind_pair_answers p where p.feedback_id = f.id) order by f.seq desc",
     )
     .bind(a)
     .bind(b)

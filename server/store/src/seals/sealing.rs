@@ -17,7 +17,7 @@ pub(in super::super) async fn adopt(db: &mut Connection, before: &[Sealed]) -> S
     let added = present(db).await?.into_iter().filter(|sealed| !before.iter().any(|known| known.table == sealed.table));
     for sealed in added {
         let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
-        let all = format!("insert into unsealed (evidence, key) select '{table}', {key} from {table}");
+        let all = format!("insert into unsealed (table_name, key) select '{table}', {key} from {table}");
         sqlx::query(AssertSqlSafe(all)).execute(&mut *db).await?;
     }
     seal(db).await
@@ -43,7 +43,7 @@ struct ChangedRow {
 /// [`StoreError::Damaged`] if another program had changed, added or deleted one of these rows before.
 pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
     // A single query, because every change waits for it.
-    let changed = "select place, evidence, key, event, known, (select hash from seals order by seq desc limit 1) \
+    let changed = "select place, table_name, key, event, known, (select hash from seals order by seq desc limit 1) \
                  from unsealed order by place";
     let changed = sqlx::query(changed).fetch_all(&mut *db).await?;
     let Some(first) = changed.first() else { return Ok(()) };
@@ -100,12 +100,12 @@ pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
         }
     }
     if !seals.is_empty() {
-        let sql = "insert into seals (evidence, key, sha256, previous, hash) \
+        let sql = "insert into seals (table_name, key, sha256, previous, hash) \
                    select value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 from json_each(?) order by key";
         sqlx::query(sql).bind(json_columns::to_text("seals", &seals)?).execute(&mut *db).await?;
     }
     if !checksums.is_empty() {
-        let sql = "insert or replace into checksums (evidence, key, sha256) \
+        let sql = "insert or replace into checksums (table_name, key, sha256) \
                    select value ->> 0, value ->> 1, value ->> 2 from json_each(?)";
         sqlx::query(sql).bind(json_columns::to_text("checksums", &checksums)?).execute(&mut *db).await?;
     }

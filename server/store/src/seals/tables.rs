@@ -30,16 +30,16 @@ pub const TABLES: &[Sealed] = &[
     sealed("studies", &["id"]),
     sealed("trials", &["id"]),
     sealed("gaits", &["trial_id"]),
-    sealed("results", &["trial_id", "attempt"]),
+    sealed("attempts", &["trial_id", "attempt"]),
     sealed("certificates", &["trial_id", "format_version"]),
     sealed("explanation_requests", &["trial_id"]),
     sealed("explanations", &["trial_id"]),
     sealed("feedback", &["seq"]),
     sealed("retractions", &["feedback_seq"]),
-    sealed("presentations", &["id"]),
-    sealed("presentation_answers", &["presentation_id"]),
-    sealed("presentation_retractions", &["presentation_id"]),
-    sealed("presentation_allocations", &["presentation_id"]),
+    sealed("blind_pairs", &["id"]),
+    sealed("blind_pair_answers", &["pair_id"]),
+    sealed("blind_pair_retractions", &["pair_id"]),
+    sealed("blind_pair_allocations", &["pair_id"]),
     sealed("unblindings", &["seq"]),
     sealed("assessments", &["id"]),
     sealed("assessment_retractions", &["assessment_id"]),
@@ -48,8 +48,8 @@ pub const TABLES: &[Sealed] = &[
     sealed("safety_review_reports", &["review_id", "report_id"]),
     sealed("lab_sessions", &["id"]),
     sealed("lab_allocations", &["session_id"]),
-    sealed("lab_device_files", &["id"]),
-    sealed("lab_acts", &["session_id", "act"]),
+    sealed("controller_file_downloads", &["id"]),
+    sealed("lab_session_steps", &["session_id", "step"]),
     sealed("lab_answers", &["session_id", "number"]),
     sealed("lab_answer_retractions", &["session_id", "number"]),
     sealed("measurement_files", &["id"]),
@@ -62,14 +62,6 @@ pub const TABLES: &[Sealed] = &[
     sealed("access_log", &["seq"]),
     sealed("access_prunings", &["seq"]),
     sealed("imports", &["seq"]),
-];
-
-/// Tables of earlier schema versions, each with the table to which a migration copied its rows under the same keys. Their
-/// seals stay in the chain, before those of the copies.
-pub(super) const RETIRED: &[(Sealed, &str)] = &[
-    (sealed("remarks", &["id"]), "assessments"),
-    (sealed("remark_retractions", &["remark_id"]), "assessment_retractions"),
-    (sealed("lab_recordings", &["id"]), "measurement_files"),
 ];
 
 /// Tables with checksums: their rows change often, or only repeat other data.
@@ -107,10 +99,10 @@ impl Sealed {
     pub(super) fn known_hash(&self, key: &str) -> String {
         let table = self.table;
         if self.is_checked() {
-            format!("(select c.sha256 from checksums c where c.evidence = '{table}' and c.key = cast({key} as text))")
+            format!("(select c.sha256 from checksums c where c.table_name = '{table}' and c.key = cast({key} as text))")
         } else {
             format!(
-                "(select s.sha256 from seals s where s.evidence = '{table}' and s.key = cast({key} as text) \
+                "(select s.sha256 from seals s where s.table_name = '{table}' and s.key = cast({key} as text) \
                  order by s.seq desc limit 1)"
             )
         }
@@ -134,7 +126,7 @@ pub(in super::super) async fn present(db: &mut Connection) -> StoreResult<Vec<Se
     let names: Vec<String> =
         sqlx::query_scalar("select name from sqlite_master where type = 'table'").fetch_all(db).await?;
     let is_there = |table: &str| names.iter().any(|name| name == table);
-    let sealed = TABLES.iter().chain(RETIRED.iter().map(|(retired, _)| retired)).filter(|_| is_there("seals"));
-    let all = sealed.chain(CHECKED.iter().filter(|_| is_there("checksums")));
+    // A process that was killed while creating the record can leave the list of migrations alone.
+    let all = TABLES.iter().chain(CHECKED).filter(|_| is_there("seals"));
     Ok(all.filter(|sealed| is_there(sealed.table)).copied().collect())
 }

@@ -42,7 +42,7 @@ impl Sealed {
             Some(_) => (name, self.known_hash(&key)),
             None => (RowEvent::MIGRATED, "null".to_owned()),
         };
-        let note = "insert into unsealed (evidence, key, event, known)";
+        let note = "insert into unsealed (table_name, key, event, known)";
         let mut statements = vec![format!("{note} values ('{table}', {key}, '{written}', {known});")];
         if let Some(columns) = keep.filter(|_| event != RowEvent::Insert) {
             let old: Vec<String> = columns.iter().map(|column| format!("old.\"{column}\"")).collect();
@@ -51,7 +51,7 @@ impl Sealed {
         }
         if event != RowEvent::Insert && self.is_checked() {
             let old = self.key_of("old.");
-            statements.push(format!("delete from checksums where evidence = '{table}' and key = {old};"));
+            statements.push(format!("delete from checksums where table_name = '{table}' and key = {old};"));
         }
         let statements = statements.join(" ");
         format!(
@@ -96,7 +96,7 @@ pub(in super::super) async fn end_watch(db: &mut Connection) -> StoreResult<()> 
 
 async fn install(db: &mut Connection, sealed: Sealed, keep: Option<&[String]>) -> StoreResult<()> {
     // Seals follow the order of writing. `known` is the hash that the record has of the row at that time.
-    let notes = "create temp table if not exists unsealed (place integer primary key, evidence text not null, \
+    let notes = "create temp table if not exists unsealed (place integer primary key, table_name text not null, \
                  key text not null, event text not null default 'migrated', known text)";
     sqlx::query(notes).execute(&mut *db).await?;
     for event in RowEvent::ALL {

@@ -3,7 +3,7 @@
 use super::super::audit::{ORIGIN, last_ever};
 use super::super::{Connection, StoreResult};
 use super::row_hash::hash_of_row;
-use super::tables::{RETIRED, Sealed, present};
+use super::tables::{Sealed, present};
 use super::{JOINT, chained};
 use futures_util::TryStreamExt;
 use sqlx::{AssertSqlSafe, Row};
@@ -21,8 +21,6 @@ pub enum SealCheck {
         /// Hash of the last seal.
         last: String,
     },
-    /// The record has a schema version without seals.
-    None,
     /// A seal does not match the previous one.
     Broken {
         /// Sequence number of the seal.
@@ -49,10 +47,6 @@ pub enum SealCheck {
 /// # Errors
 /// Errors of the database.
 pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
-    let table = "select name from sqlite_master where type = 'table' and name = 'seals'";
-    if sqlx::query(table).fetch_optional(&mut *db).await?.is_none() {
-        return Ok(SealCheck::None);
-    }
     let chain = walk(db).await?;
     if !matches!(chain, SealCheck::Intact { .. }) {
         return Ok(chain);
@@ -68,40 +62,19 @@ pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
             });
         }
     }
-    let stray = match of_no_table(db, &known).await? {
-        None => of_no_copy(db, &known).await?,
-        found => found,
-    };
+    let stray = of_no_table(db, &known).await?;
     Ok(stray.map_or(chain, |(table, key)| SealCheck::Touched { table, key }))
 }
 
 /// A seal or checksum of an unknown table.
 async fn of_no_table(db: &mut Connection, known: &[Sealed]) -> StoreResult<Option<(String, String)>> {
-    let checksums =
-        if known.iter().any(Sealed::is_checked) { "union all select evidence, key from checksums" } else { "" };
-    let names = known.iter().chain(RETIRED.iter().map(|(retired, _)| retired));
-    let names: Vec<String> = names.map(|sealed| format!("'{}'", sealed.table)).collect();
+    let names: Vec<String> = known.iter().map(|sealed| format!("'{}'", sealed.table)).collect();
     let sql = format!(
-        "select evidence, key from (select evidence, key from seals {checksums}) where evidence not in ({}) limit 1",
+        "select table_name, key from (select table_name, key from seals union all select table_name, key from checksums) \
+         where table_name not in ({}) limit 1",
         names.join(", ")
     );
     Ok(sqlx::query_as(AssertSqlSafe(sql)).fetch_optional(db).await?)
-}
-
-/// A seal of a retired table that does not precede the seal of the copied row. The migration left no such seal.
-async fn of_no_copy(db: &mut Connection, known: &[Sealed]) -> StoreResult<Option<(String, String)>> {
-    for (retired, copy) in RETIRED {
-        if known.iter().any(|sealed| sealed.table == retired.table) {
-            continue;
-        }
-        let sql = "select evidence, key from seals s where evidence = ?1 and seq > coalesce(\
-                   (select min(seq) from seals c where c.evidence = ?2 and c.key = s.key), 0) limit 1";
-        let found = sqlx::query_as(sql).bind(retired.table).bind(copy).fetch_optional(&mut *db).await?;
-        if found.is_some() {
-            return Ok(found);
-        }
-    }
-    Ok(None)
 }
 
 async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
@@ -140,11 +113,11 @@ async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
 async fn unlike(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<(String, bool)>> {
     let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
     let hashes = if sealed.is_checked() {
-        format!("select key from checksums where evidence = '{table}'")
+        format!("select key from checksums where table_name = '{table}'")
     } else {
         format!(
-            "select key from seals s where evidence = '{table}' and sha256 <> '' and not exists \
-             (select 1 from seals n where n.evidence = s.evidence and n.key = s.key and n.seq > s.seq)"
+            "select key from seals s where table_name = '{table}' and sha256 <> '' and not exists \
+             (select 1 from seals n where n.table_name = s.table_name and n.key = s.key and n.seq > s.seq)"
         )
     };
     let gone = format!("{hashes} except select cast({key} as text) from {table} limit 1");

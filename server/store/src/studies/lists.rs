@@ -126,7 +126,7 @@ macro_rules! reported {
         "select t.study_id from safety_reports r join trials t on t.id = r.trial_id \
          union select m.study_id from assessments m where m.answer glob 'unsafe*' \
          and m.id not in (select assessment_id from assessment_retractions) \
-         union select p.study_id from presentations p join presentation_answers a on a.presentation_id = p.id \
+         union select p.study_id from blind_pairs p join blind_pair_answers a on a.pair_id = p.id \
          where a.answer glob 'unsafe*' \
          union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
          where a.answer glob 'unsafe*'"
@@ -166,8 +166,8 @@ pub async fn of_subject_with_safety_reports(db: &mut Connection, study: StudyId)
         "select s.id, s.device_id = own.device_id from studies own join studies s on s.subject_id = own.subject_id \
          where own.id = ?1 and (s.id in (",
         reported!(),
-        ") or s.id = ?1 and (exists (select 1 from assessments where study_id = ?1) or exists (select 1 from presentations p \
-         join presentation_answers a on a.presentation_id = p.id where p.study_id = ?1 and a.answer = 'cannot_tell'))) \
+        ") or s.id = ?1 and (exists (select 1 from assessments where study_id = ?1) or exists (select 1 from blind_pairs p \
+         join blind_pair_answers a on a.pair_id = p.id where p.study_id = ?1 and a.answer = 'cannot_tell'))) \
          order by s.id <> ?1, s.id"
     );
     Ok(sqlx::query_as(sql).bind(study).fetch_all(db).await?)

@@ -11,8 +11,7 @@ pub use lists::{
 pub use plan::{Evaluation, FeedbackMode, StudyPlan};
 pub use state::StudyState;
 
-use super::{Connection, Instant, StoreError, StoreResult, StudyId, former_documents, json_columns, now};
-use gait_learner::LearnerSettings;
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
 use gait_optimizer::Subject as Body;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -86,8 +85,8 @@ pub async fn insert(
     .bind(forked_from)
     .bind(at)
     .bind(at)
-    .bind(plan.body.map(|body| body.height_m))
-    .bind(plan.body.map(|body| body.body_mass_kg))
+    .bind(plan.body.height_m)
+    .bind(plan.body.body_mass_kg)
     .bind(plan.repeat_results)
     .execute(db)
     .await?;
@@ -189,50 +188,27 @@ pub async fn set_state(db: &mut Connection, study: &Study, state: StudyState, re
     Ok(done.rows_affected() == 1)
 }
 
-fn body_of(row: &SqliteRow) -> StoreResult<Option<Body>> {
-    let (height, mass): (Option<f64>, Option<f64>) = (row.try_get("height_m")?, row.try_get("body_mass_kg")?);
-    Ok(height.zip(mass).map(|(height_m, body_mass_kg)| Body { height_m, body_mass_kg }))
-}
-
-fn learner_of(row: &SqliteRow) -> StoreResult<LearnerSettings> {
-    former_documents::learner_settings(row.try_get("name")?, row.try_get("learner")?)
-}
-
-/// Refuses a record with a study that this version cannot continue, because every list that contains the study would
-/// fail.
-///
-/// # Errors
-/// [`StoreError::FormerSetting`]; errors of the database.
-pub(super) async fn refuse_former_settings(db: &mut Connection) -> StoreResult<()> {
-    for row in &sqlx::query("select name, learner from studies order by id").fetch_all(db).await? {
-        if let Err(refusal @ StoreError::FormerSetting { .. }) = learner_of(row) {
-            return Err(refusal);
-        }
-    }
-    Ok(())
-}
-
 fn from_row(row: &SqliteRow) -> StoreResult<Study> {
     Ok(Study {
         id: row.try_get("id")?,
         plan: StudyPlan {
             name: row.try_get("name")?,
             subject_id: row.try_get("subject_id")?,
-            body: body_of(row)?,
+            body: Body { height_m: row.try_get("height_m")?, body_mass_kg: row.try_get("body_mass_kg")? },
             device_id: row.try_get("device_id")?,
             reference_gait_id: row.try_get("reference_gait_id")?,
             muscles: row.try_get("muscles")?,
-            gait_settings: Box::new(former_documents::gait_settings(row.try_get("gait_settings")?)?),
-            solve_options: former_documents::solve_options(row.try_get("solve_options")?)?,
+            gait_settings: Box::new(json_columns::column(row, "gait_settings")?),
+            solve_options: json_columns::column(row, "solve_options")?,
             base_bounds: json_columns::column(row, "base_bounds")?,
             search_space: json_columns::column(row, "search_space")?,
-            learner: learner_of(row)?,
+            learner: json_columns::column(row, "learner")?,
             feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
             evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
             trial_budget: row.try_get("trial_budget")?,
             solve_seconds_budget: row.try_get("solve_seconds_budget")?,
             unchanged_limit: row.try_get("unchanged_limit")?,
-            repeat_results: row.try_get::<Option<bool>, _>("repeat_results")?.unwrap_or(true),
+            repeat_results: row.try_get("repeat_results")?,
             parallel_trials: row.try_get("parallel_trials")?,
             priority: row.try_get("priority")?,
             seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),

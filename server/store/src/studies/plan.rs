@@ -78,9 +78,8 @@ pub struct StudyPlan {
     pub name: String,
     /// Identifier of the subject.
     pub subject_id: SubjectId,
-    /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
-    /// entered first.
-    pub body: Option<Body>,
+    /// Height and mass used by solves, independent of later corrections.
+    pub body: Body,
     /// Identifier of the device.
     pub device_id: DeviceId,
     /// Identifier of the reference gait for Gait RMSE.
@@ -109,7 +108,6 @@ pub struct StudyPlan {
     /// The study finishes when the best action has not changed over this many results.
     pub unchanged_limit: Option<u32>,
     /// Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
-    /// Always true for studies created by versions without this setting.
     pub repeat_results: bool,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     pub parallel_trials: u32,
@@ -128,13 +126,7 @@ impl StudyPlan {
     /// Whether a study with the other plan would try the same trials: same subject, problem, learner and seed. Name,
     /// priority and parallel trials do not matter.
     pub fn has_same_trials_as(&self, other: &Self) -> bool {
-        // Older studies without a body use the values entered first.
-        let bodies_differ = self.body.is_some() && other.body.is_some() && self.body != other.body;
-        if bodies_differ {
-            return false;
-        }
-        let own =
-            |plan: &Self| Self { name: String::new(), body: None, priority: 0, parallel_trials: 1, ..plan.clone() };
+        let own = |plan: &Self| Self { name: String::new(), priority: 0, parallel_trials: 1, ..plan.clone() };
         own(self) == own(other)
     }
 }

@@ -7,7 +7,7 @@ pub use progress::{SolveTimes, TrialCounts, counts, improvements, measured};
 pub use state::TrialState;
 
 use super::many_rows::read_many;
-use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, former_documents, json_columns, now};
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now};
 use gait_learner::ActionIndex;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
 use sqlx::Row;
@@ -33,7 +33,7 @@ pub struct Trial {
     /// Trial whose gait is the warm start. Absent for a cold start.
     pub warm_started_from: Option<TrialId>,
     /// Script that evaluates the trial. Absent if the service does.
-    pub asked_by: Option<String>,
+    pub script: Option<String>,
     /// State of the trial.
     pub state: TrialState,
     /// How the solve ended.
@@ -270,7 +270,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
 /// # Errors
 /// Errors of the database.
 pub async fn assign(db: &mut Connection, id: TrialId, worker: &str) -> StoreResult<()> {
-    sqlx::query("update trials set state = 'running', started_at = ?, asked_by = ? where id = ?")
+    sqlx::query("update trials set state = 'running', started_at = ?, script = ? where id = ?")
         .bind(now())
         .bind(worker)
         .bind(id)
@@ -284,7 +284,7 @@ pub async fn assign(db: &mut Connection, id: TrialId, worker: &str) -> StoreResu
 /// # Errors
 /// Errors of the database.
 pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> StoreResult<Option<TrialId>> {
-    let row = sqlx::query("select id from trials where study_id = ? and state = 'running' and asked_by = ?")
+    let row = sqlx::query("select id from trials where study_id = ? and state = 'running' and script = ?")
         .bind(study)
         .bind(worker)
         .fetch_optional(db)
@@ -329,7 +329,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
         reason: row.try_get("reason")?,
         best_before: row.try_get("best_before")?,
         warm_started_from: row.try_get("warm_started_from")?,
-        asked_by: row.try_get("asked_by")?,
+        script: row.try_get("script")?,
         state,
         status: json_columns::optional_column(row, "status")?,
         gait_rmse_rad: of_a_gait(row, state, "gait_rmse_rad")?,
@@ -338,7 +338,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
         max_violation: row.try_get("max_violation")?,
         iterations: row.try_get("iterations")?,
         seconds_total: row.try_get("seconds_total")?,
-        report: row.try_get::<Option<&str>, _>("report")?.map(former_documents::solve_report).transpose()?,
+        report: json_columns::optional_column(row, "report")?,
         violations: json_columns::optional_column(row, "violations")?.unwrap_or_default(),
         message: row.try_get("message")?,
         created_at: row.try_get("created_at")?,

@@ -29,10 +29,7 @@ pub(super) struct ReferenceChoice {
 
 impl ReferenceChoice {
     pub(super) async fn read(db: &mut Connection, plan: &StudyPlan) -> Result<Self, Error> {
-        let matches = match &plan.body {
-            Some(body) => nearest_reference::matches(db, body).await?,
-            None => Vec::new(),
-        };
+        let matches = nearest_reference::matches(db, &plan.body).await?;
         Ok(Self { matches, chosen: plan.reference_gait_id })
     }
 

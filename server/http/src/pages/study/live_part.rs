@@ -301,7 +301,7 @@ fn view(
         cost: format::figure(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
         has_gait,
-        by_script: trial.asked_by.is_some(),
+        by_script: trial.script.is_some(),
         passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,

@@ -4,7 +4,6 @@ use super::file::Packer;
 use super::signature::SigningKey;
 use crate::error::Error;
 use gaitwright_store::archive::{self, Read};
-use gaitwright_store::archived_allocations::masked;
 use gaitwright_store::{StoreError, StudyId, read_only};
 use std::io::Write;
 use std::path::Path;
@@ -42,7 +41,7 @@ pub async fn export<W: Write + Send + 'static>(
                     format!("a row of {table} was changed outside the program. Run `gaitwright audit verify`.");
                 return Err(Error::conflict(format!("The study cannot be exported: {reason}")));
             }
-            packer.add(table, &masked(table, row)).map_err(Error::Output)?;
+            packer.add(table, &row).map_err(Error::Output)?;
         }
         Ok(None)
     });

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use std::io::{BufRead, BufReader, Read, Write};
 
 /// Name and version of the format.
-const FORMAT: &str = "gaitwright study 4";
+const FORMAT: &str = "gaitwright study 5";
 /// zstd level.
 const COMPRESSION: i32 = 3;
 /// Largest accepted zstd window, as a power of two. The level above needs 2 MiB.

@@ -3,7 +3,7 @@
 use crate::access::{Caller, Right};
 use crate::error::Error;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::{Connection, StudyId, allocations, presentations, users};
+use gaitwright_store::{Connection, StudyId, allocations, blind_pairs, users};
 
 /// Whether a caller is never blind: users who may read can open the trials, and the holder of a token is unknown.
 fn sees_gaits(caller: &Caller) -> bool {
@@ -29,6 +29,6 @@ pub async fn is_never_blind(db: &mut Connection, caller: &Caller) -> Result<bool
 /// Errors of the database.
 pub async fn could_have_known(db: &mut Connection, caller: &Caller, study: StudyId) -> Result<bool, Error> {
     Ok(is_never_blind(db, caller).await?
-        || presentations::is_unblinded(db, study, &caller.name).await?
+        || blind_pairs::is_unblinded(db, study, &caller.name).await?
         || allocations::has_file(db, study, &caller.actor).await?)
 }

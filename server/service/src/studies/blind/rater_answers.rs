@@ -14,10 +14,8 @@ use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
 use gaitwright_store::allocations::{self, PairWithSides, RandomDraw};
 use gaitwright_store::audit;
+use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind, Judgement, NewBlindPair, NewPairAnswer};
 use gaitwright_store::feedback::{self, Attribution, Source};
-use gaitwright_store::presentations::{
-    self, Judgement, NewPairAnswer, NewPresentation, Presentation, PresentationKind,
-};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::{
     BorrowedWriter, Connection, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
@@ -72,7 +70,7 @@ async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, 
     Ok(found.trials())
 }
 
-/// The presentation for a rater: the open one, or a new one. `None` if no comparison is pending.
+/// The pair for a rater: the open one, or a new one. `None` if no comparison is pending.
 ///
 /// # Errors
 /// [`Error::NotFound`], or errors of the database and the learner.
@@ -84,18 +82,18 @@ pub async fn next<'a>(
     let question = question(store, study).await?;
     let mut writer = store.write().await?;
     let safety_reports = SafetyReports::read(&mut writer, study).await?;
-    let mut own = presentations::of_study(&mut writer, study).await?;
+    let mut own = blind_pairs::of_study(&mut writer, study).await?;
     own.retain(|shown| shown.rater == caller.name);
-    let reported = reported_among(&mut writer, &safety_reports, own.iter().map(Presentation::pair)).await?;
+    let reported = reported_among(&mut writer, &safety_reports, own.iter().map(BlindPair::trials)).await?;
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
         // An imported study does not have the sides of pairs that were still blinded.
         let settled =
-            open.kind == PresentationKind::New && is_answered(&mut writer, study, open.pair(), &caller.name).await?;
+            open.kind == BlindPairKind::New && is_answered(&mut writer, study, open.trials(), &caller.name).await?;
         if !settled
-            && walkable::are_walkable(&mut writer, open.pair()).await?
+            && walkable::are_walkable(&mut writer, open.trials()).await?
             && allocations::is_included(&mut writer, open.id).await?
         {
-            note(&mut writer, caller, open, "presentation.show").await?;
+            note(&mut writer, caller, open, "blind_pair.show").await?;
             let open = own_pair(&mut writer, caller, &open.token).await?;
             return Ok((writer, Some(open)));
         }
@@ -108,7 +106,7 @@ pub async fn next<'a>(
     }
     let next = next_pair(RandomDraw::draw()?.number(), pair, &own, &reported);
     let token = secret::fresh()?;
-    let new = NewPresentation {
+    let new = NewBlindPair {
         token: token.clone(),
         study_id: study,
         rater: caller.name.clone(),
@@ -118,10 +116,10 @@ pub async fn next<'a>(
         repeats: next.repeats,
         could_have_known: could_have_known(&mut writer, caller, study).await?,
     };
-    let id = presentations::insert(&mut writer, &new).await?;
+    let id = blind_pairs::insert(&mut writer, &new).await?;
     allocations::of_pair(&mut writer, id, next.same_sides_as, RandomDraw::draw()?).await?;
     let shown = own_pair(&mut writer, caller, &token).await?;
-    note(&mut writer, caller, &shown.presentation, "presentation.draw").await?;
+    note(&mut writer, caller, &shown.pair, "blind_pair.draw").await?;
     Ok((writer, Some(shown)))
 }
 
@@ -149,7 +147,7 @@ async fn is_answered(
     Ok(preference::current_answer(db, study, pair, rater).await?.is_some())
 }
 
-async fn cancel(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
+async fn cancel(writer: &mut Writer, open: &BlindPair) -> Result<(), Error> {
     let retracted = NewPairAnswer {
         judgement: Judgement::Retracted,
         response_ms: None,
@@ -157,13 +155,13 @@ async fn cancel(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
         feedback: None,
         could_have_known: open.could_have_known,
     };
-    presentations::answer(writer, open.id, retracted).await?;
+    blind_pairs::answer(writer, open.id, retracted).await?;
     Ok(())
 }
 
-async fn note(writer: &mut Writer, caller: &Caller, shown: &Presentation, action: &str) -> Result<(), Error> {
+async fn note(writer: &mut Writer, caller: &Caller, shown: &BlindPair, action: &str) -> Result<(), Error> {
     let detail = json!({ "study": shown.study_id, "rater": shown.rater, "number": shown.number });
-    Ok(audit::append(writer, &caller.actor, action, &format!("presentation {}", shown.id), &detail).await?)
+    Ok(audit::append(writer, &caller.actor, action, &format!("blind pair {}", shown.id), &detail).await?)
 }
 
 /// Records the answer of a rater. A pair has one answer, but a safety report is accepted at any time.
@@ -178,7 +176,7 @@ pub async fn answer(
     given: &RaterAnswer,
 ) -> Result<(StudyId, AnswerReceipt), Error> {
     let sided = own(writer, caller, token).await?;
-    let shown = &sided.presentation;
+    let shown = &sided.pair;
     answering::refuse_retracted(given.answer)?;
     printable::note("note", &given.note, 2000)?;
     if given.response_ms.is_some_and(|ms| ms < 0) {
@@ -192,24 +190,17 @@ pub async fn answer(
         if !judgement.is_about_safety() {
             return Err(Error::conflict(answered_already(sided.answer())));
         }
-        let gaits = judgement.unsafe_of(shown.pair());
+        let gaits = judgement.unsafe_of(shown.trials());
         let is_repeated = shown.answer == Some(judgement) && shown.note == given.note;
         if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.are_all_in_force(&gaits)) {
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
         return Ok((shown.study_id, AnswerReceipt { number: shown.number }));
     }
-    // A presentation of the same gait twice, as in older records, states no preference.
-    let feedback_id = if shown.kind == PresentationKind::Null {
-        None
-    } else {
-        let fields = ("first", "second");
-        let (study, pair) = (shown.study_id, shown.pair());
-        let second_answer =
-            if shown.kind == PresentationKind::Repeat { SecondAnswer::Allowed } else { SecondAnswer::Refused };
-        let statement = AttributedJudgement { study, pair, fields, judgement, attribution, second_answer };
-        preference::record(writer, statement).await.map_err(without_gaits)?
-    };
+    let second_answer = if shown.kind == BlindPairKind::Repeat { SecondAnswer::Allowed } else { SecondAnswer::Refused };
+    let (study, pair, fields) = (shown.study_id, shown.trials(), ("first", "second"));
+    let statement = AttributedJudgement { study, pair, fields, judgement, attribution, second_answer };
+    let feedback_id = preference::record(writer, statement).await.map_err(without_gaits)?;
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
     let row = NewPairAnswer {
         judgement,
@@ -218,14 +209,14 @@ pub async fn answer(
         feedback: feedback_id,
         could_have_known,
     };
-    if !presentations::answer(writer, shown.id, row).await? {
+    if !blind_pairs::answer(writer, shown.id, row).await? {
         return Err(Error::conflict(answered_already(sided.answer())));
     }
-    let payload = json!({ "feedback_id": feedback_id, "presentation_id": shown.id });
+    let payload = json!({ "feedback_id": feedback_id, "pair_id": shown.id });
     events::append(writer, shown.study_id, "feedback_given", &payload).await?;
     // The audit trail omits the answer in terms of sides, because it would reveal the allocation.
     let detail = json!({ "study": shown.study_id, "number": shown.number, "could_have_known": could_have_known });
-    audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
+    audit::append(writer, &caller.actor, "blind_pair.answer", &format!("blind pair {}", shown.id), &detail).await?;
     Ok((shown.study_id, AnswerReceipt { number: shown.number }))
 }
 
@@ -267,20 +258,20 @@ pub fn sides_in_words(answer: Judgement) -> &'static str {
 /// # Errors
 /// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] if the answer cannot be retracted.
 pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Result<AnswerReceipt, Error> {
-    let shown = own(writer, caller, token).await?.presentation;
+    let shown = own(writer, caller, token).await?.pair;
     if !can_be_retracted(writer, &shown).await? {
         let why = "Only the last answer can be retracted, and only once. A safety report cannot be retracted: staff \
                    review it.";
         return Err(Error::conflict(why));
     }
-    if let Some(feedback_id) = presentations::feedback_of(writer, shown.id).await?
+    if let Some(feedback_id) = blind_pairs::feedback_of(writer, shown.id).await?
         // Staff may have retracted it already.
         && feedback::get(writer, feedback_id).await?.retraction.is_none()
     {
         answering::retract(writer, caller, Some(shown.study_id), feedback_id, None, "by the rater").await?;
     }
-    presentations::retract(writer, shown.id).await?;
-    note(writer, caller, &shown, "presentation.retract").await?;
+    blind_pairs::retract(writer, shown.id).await?;
+    note(writer, caller, &shown, "blind_pair.retract").await?;
     Ok(AnswerReceipt { number: shown.number })
 }
 
@@ -288,8 +279,8 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Resul
 ///
 /// # Errors
 /// What the record reports.
-pub async fn can_be_retracted(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
-    let all = presentations::of_study(db, shown.study_id).await?;
+pub async fn can_be_retracted(db: &mut Connection, shown: &BlindPair) -> Result<bool, Error> {
+    let all = blind_pairs::of_study(db, shown.study_id).await?;
     let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
     let is_retractable = matches!(
         shown.answer,
@@ -304,10 +295,10 @@ pub async fn can_be_retracted(db: &mut Connection, shown: &Presentation) -> Resu
 /// What the record reports, and [`Error::NotFound`] for a token that is not of this rater.
 pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
     let shown = own_pair(db, caller, token).await?;
-    if !members::reaches(db, caller.reach(), shown.presentation.study_id).await? {
+    if !members::reaches(db, caller.reach(), shown.pair.study_id).await? {
         return Err(unknown_pair());
     }
-    consents::may_be_shown(db, shown.presentation.study_id).await?;
+    consents::may_be_shown(db, shown.pair.study_id).await?;
     Ok(shown)
 }
 
@@ -317,7 +308,7 @@ pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Pa
 /// As [`own`], and [`Error::Conflict`] if a gait of the pair must no longer be shown.
 pub async fn own_showable_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
     let shown = own(db, caller, token).await?;
-    if !walkable::are_walkable(db, shown.presentation.pair()).await? {
+    if !walkable::are_walkable(db, shown.pair.trials()).await? {
         return Err(Error::conflict(NO_LONGER_SHOWN));
     }
     Ok(shown)

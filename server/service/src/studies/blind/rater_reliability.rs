@@ -3,7 +3,7 @@
 use super::next_pair::{is_plain, is_same_pair};
 use crate::error::Error;
 use gaitwright_store::allocations::{self, PairWithSides};
-use gaitwright_store::presentations::{self, Judgement, Presentation, PresentationKind};
+use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
 use gaitwright_store::{Connection, StudyId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -43,7 +43,7 @@ impl Share {
 pub struct RaterReliability {
     /// Name of the rater.
     pub rater: String,
-    /// Number of presentations.
+    /// Number of blind pairs.
     pub shown: u32,
     /// Number of answers.
     pub answered: u32,
@@ -56,7 +56,7 @@ pub struct RaterReliability {
     pub cannot_tell: u32,
     /// Number of answers that reported a gait as unsafe.
     pub unsafe_gaits: u32,
-    /// Number of presentations in which the rater could have known the allocation. The shares exclude them.
+    /// Number of blind pairs in which the rater could have known the allocation. The shares exclude them.
     pub could_have_known: u32,
 }
 
@@ -65,25 +65,25 @@ pub struct RaterReliability {
 /// # Errors
 /// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> Result<Vec<RaterReliability>, Error> {
-    let shown = presentations::of_study(db, study).await?;
+    let shown = blind_pairs::of_study(db, study).await?;
     let sides = allocations::of_unblinded_raters(db, study).await?;
     Ok(figures(&shown, &sides))
 }
 
 /// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-fn figures(presentations: &[Presentation], sides: &[PairWithSides]) -> Vec<RaterReliability> {
-    let mut raters: Vec<&str> = presentations.iter().map(|shown| shown.rater.as_str()).collect();
+fn figures(pairs: &[BlindPair], sides: &[PairWithSides]) -> Vec<RaterReliability> {
+    let mut raters: Vec<&str> = pairs.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
-    raters.into_iter().map(|rater| of_rater(rater, presentations, sides)).collect()
+    raters.into_iter().map(|rater| of_rater(rater, pairs, sides)).collect()
 }
 
-fn of_rater(rater: &str, all: &[Presentation], sides: &[PairWithSides]) -> RaterReliability {
-    let own: Vec<&Presentation> = all.iter().filter(|shown| shown.rater == rater).collect();
-    let count = |wanted: &dyn Fn(&Presentation) -> bool| {
+fn of_rater(rater: &str, all: &[BlindPair], sides: &[PairWithSides]) -> RaterReliability {
+    let own: Vec<&BlindPair> = all.iter().filter(|shown| shown.rater == rater).collect();
+    let count = |wanted: &dyn Fn(&BlindPair) -> bool| {
         u32::try_from(own.iter().filter(|shown| wanted(shown)).count()).unwrap_or(u32::MAX)
     };
-    let is_unsafe = |shown: &Presentation| shown.answer.is_some_and(Judgement::is_about_safety);
+    let is_unsafe = |shown: &BlindPair| shown.answer.is_some_and(Judgement::is_about_safety);
     RaterReliability {
         rater: rater.to_owned(),
         shown: count(&|_| true),
@@ -97,10 +97,9 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[PairWithSides]) -> Rater
 }
 
 fn first_preferred(rater: &str, sides: &[PairWithSides]) -> Option<Share> {
-    let mut own = sides.iter().filter(|sided| sided.presentation.rater == rater).peekable();
+    let mut own = sides.iter().filter(|sided| sided.pair.rater == rater).peekable();
     own.peek()?;
-    let blind =
-        own.filter(|sided| !sided.presentation.could_have_known && sided.presentation.kind != PresentationKind::Null);
+    let blind = own.filter(|sided| !sided.pair.could_have_known);
     let answers: Vec<Judgement> = blind.filter_map(PairWithSides::answer).collect();
     let count =
         |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
@@ -109,16 +108,15 @@ fn first_preferred(rater: &str, sides: &[PairWithSides]) -> Option<Share> {
 }
 
 /// Compares each plain answer with the previous one to the same pair.
-fn repeats_agree(own: &[&Presentation]) -> Share {
-    let plain = |shown: &&Presentation| {
-        !shown.could_have_known && shown.kind != PresentationKind::Null && shown.answer.is_some_and(is_plain)
-    };
-    let answered: Vec<&Presentation> = own.iter().copied().filter(plain).collect();
+fn repeats_agree(own: &[&BlindPair]) -> Share {
+    let plain = |shown: &&BlindPair| !shown.could_have_known && shown.answer.is_some_and(is_plain);
+    let answered: Vec<&BlindPair> = own.iter().copied().filter(plain).collect();
     let (mut agree, mut of) = (0_u32, 0_u32);
     for (place, shown) in answered.iter().enumerate() {
-        let before = answered[..place].iter().rfind(|other| is_same_pair(other.pair(), shown.pair()));
+        let before = answered[..place].iter().rfind(|other| is_same_pair(other.trials(), shown.trials()));
         let Some(before) = before else { continue };
-        let turned = if before.pair() == shown.pair() { before.answer } else { before.answer.map(Judgement::swapped) };
+        let turned =
+            if before.trials() == shown.trials() { before.answer } else { before.answer.map(Judgement::swapped) };
         of += 1;
         agree += u32::from(turned == shown.answer);
     }

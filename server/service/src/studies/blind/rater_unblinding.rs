@@ -4,18 +4,17 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::allocations::{self, PairWithSides};
-use gaitwright_store::presentations::{self, Judgement, PresentationKind};
-use gaitwright_store::{Instant, PresentationId, StudyId, TrialId, Writer, audit, consents, studies};
+use gaitwright_store::blind_pairs::{self, BlindPairKind, Judgement};
+use gaitwright_store::{BlindPairId, Instant, StudyId, TrialId, Writer, audit, consents, studies};
 use serde::Serialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
 /// Pair shown to a rater who has been unblinded, with the trial shown on each side.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[schema(as = Presentation)]
 pub struct UnblindedPair {
     /// Identifier.
-    pub id: PresentationId,
+    pub id: BlindPairId,
     /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
@@ -23,13 +22,13 @@ pub struct UnblindedPair {
     /// Number of the pair for this rater in this study, from 1.
     pub number: u32,
     /// Why it was shown.
-    pub kind: PresentationKind,
+    pub kind: BlindPairKind,
     /// Trial shown first.
     pub shown_first: TrialId,
     /// Trial shown second.
     pub shown_second: TrialId,
-    /// Earlier presentation that it repeats. Null if it is not a repeat.
-    pub repeats: Option<PresentationId>,
+    /// Earlier pair that it repeats. Null if it is not a repeat.
+    pub repeats: Option<BlindPairId>,
     /// Whether the rater could have known the allocation.
     pub could_have_known: bool,
     /// Time at which the pair was drawn.
@@ -42,7 +41,7 @@ pub struct UnblindedPair {
 
 impl From<&PairWithSides> for UnblindedPair {
     fn from(sided: &PairWithSides) -> Self {
-        let row = &sided.presentation;
+        let row = &sided.pair;
         let (shown_first, shown_second) = sided.shown();
         Self {
             id: row.id,
@@ -76,12 +75,12 @@ pub async fn unblind(
     studies::get(writer, study).await?;
     consents::may_be_shown(writer, study).await?;
     let reason = printable::reason("reason", reason, " that say why the rater is unblinded")?;
-    if !presentations::of_study(writer, study).await?.iter().any(|shown| shown.rater == rater) {
+    if !blind_pairs::of_study(writer, study).await?.iter().any(|shown| shown.rater == rater) {
         return Err(Error::invalid("rater", rater, "a rater who was shown a pair of this study"));
     }
-    presentations::unblind(writer, study, rater, caller.actor.as_str(), reason).await?;
+    blind_pairs::unblind(writer, study, rater, caller.actor.as_str(), reason).await?;
     let mut pairs = allocations::of_unblinded_raters(writer, study).await?;
-    pairs.retain(|sided| sided.presentation.rater == rater);
+    pairs.retain(|sided| sided.pair.rater == rater);
     if pairs.is_empty() {
         return Err(Error::conflict(
             "The archive of this study did not record which gait was on which side in this rater's pairs. \

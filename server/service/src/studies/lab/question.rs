@@ -3,9 +3,9 @@
 
 use gaitwright_store::Instant;
 use gaitwright_store::audit::Actor;
+use gaitwright_store::blind_pairs::Judgement;
 use gaitwright_store::lab_answers::LabAnswer;
 use gaitwright_store::lab_sessions::{LabSession, SessionStep};
-use gaitwright_store::presentations::Judgement;
 use serde::Serialize;
 use utoipa::ToSchema;
 

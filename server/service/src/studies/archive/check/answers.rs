@@ -10,12 +10,12 @@ use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::studies::{FeedbackMode, Study};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
-    Connection, FeedbackId, Instant, SafetyReportId, TrialId, assessments, feedback, presentations, safety_reports,
+    Connection, FeedbackId, Instant, SafetyReportId, TrialId, assessments, blind_pairs, feedback, safety_reports,
     safety_reviews,
 };
 use std::collections::{HashMap, HashSet};
 
-/// Checks the feedback log, assessments, presentations and safety reviews. The subject answers each lab session.
+/// Checks the feedback log, assessments, blind pairs and safety reviews. The subject answers each lab session.
 pub(super) async fn answers(
     db: &mut Connection,
     study: &Study,
@@ -66,8 +66,8 @@ pub(super) async fn answers(
     reports.extend(
         assessments.iter().filter(|assessment| assessment.answer.is_about_safety()).map(|a| SafetyReportId::from(a.id)),
     );
-    for shown in at("presentations", presentations::of_study(db, id).await)? {
-        at(format!("presentation {}", shown.id), of_gaits(trials, [shown.one, shown.other]))?;
+    for shown in at("blind_pairs", blind_pairs::of_study(db, id).await)? {
+        at(format!("blind pair {}", shown.id), of_gaits(trials, [shown.trial_a, shown.trial_b]))?;
         reports.extend(
             shown.answer.filter(|judgement| judgement.is_about_safety()).map(|_| SafetyReportId::from(shown.id)),
         );

@@ -9,7 +9,7 @@ use crate::access::Reach;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::lab::EmgResult;
-use crate::studies::{device, lab, reference_import, solve_input, study_change, study_plan, subject};
+use crate::studies::{device, lab, reference_import, study_change, study_plan, subject};
 use gait_optimizer::ReferenceGait;
 use gaitwright_compute::Pool;
 use gaitwright_store::archive::Definition;
@@ -126,7 +126,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     of_definition("reference_gaits", &reference.name, &written)?;
 
     let id = study.id;
-    let body = at("subject", solve_input::body_of(db, &study.plan).await)?;
+    let body = study.plan.body;
     let context = Arc::new(Context { study, body, device, reference });
     let trials = at("trials", trials::of_study(db, id).await)?;
     let mut unchecked_rmse = 0;

@@ -8,7 +8,7 @@ use gait_optimizer::{Gait, GaitResults, ReferenceGait, WarmStart};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::studies::StudyPlan;
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, StoreError, gaits, results};
+use gaitwright_store::{Connection, StoreError, attempts, gaits};
 use std::sync::Arc;
 
 /// Tolerance for the hip position that follows from the durations of a converged gait, m: ten times that of a row. The
@@ -35,7 +35,7 @@ pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
             return Err(format!("{field} is {value}; it must be a finite number of at least 0"));
         }
     }
-    if trial.asked_by.is_some() || !trial.state.is_result() {
+    if trial.script.is_some() || !trial.state.is_result() {
         let none = trial.report.is_none() && trial.status.is_none();
         return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
     }
@@ -79,7 +79,7 @@ pub(super) async fn gait(
     if !gaits::exists(db, trial.id).await.map_err(text)? {
         return Ok(false);
     }
-    if trial.asked_by.is_some() || !trial.state.is_result() {
+    if trial.script.is_some() || !trial.state.is_result() {
         return Err("it has a gait but no solve".to_owned());
     }
     let gait = gaits::get(db, trial.id).await.map_err(text)?;
@@ -141,7 +141,7 @@ fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result
 
 /// Checks the results that workers delivered for a trial.
 pub(super) async fn check_results(db: &mut Connection, trial: &Trial) -> Result<(), String> {
-    let results = results::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
+    let results = attempts::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
     let mut used = results.iter().filter(|result| result.used);
     let Some(result) = used.next() else { return Ok(()) };
     if used.next().is_some() {

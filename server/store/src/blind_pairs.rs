@@ -1,49 +1,42 @@
-//! Stored presentations: the pairs shown to raters, and their answers.
+//! Stored blind pairs: the pairs shown to raters, and their answers.
 //!
 //! The sides are an allocation (`super::allocations`). Rows and answers here refer to the pair, with the newer gait
 //! first.
 
-use super::{
-    Connection, FeedbackId, Instant, PresentationId, StoreError, StoreResult, StudyId, TrialId, feedback, now,
-};
+use super::{BlindPairId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, feedback, now};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement; `null`,
-/// the same gait twice, in older records only.
+/// Why a pair is shown: `new`, the pending comparison; `repeat`, an earlier pair again, to measure agreement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-#[schema(as = PresentationKind)]
-pub enum PresentationKind {
+pub enum BlindPairKind {
     /// The pending comparison of the study.
     New,
     /// Repetition of an earlier pair, to measure the agreement of the rater.
     Repeat,
-    /// The same gait twice, in older records only. The learner does not use it.
-    Null,
 }
 
-impl PresentationKind {
+impl BlindPairKind {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::New => "new",
             Self::Repeat => "repeat",
-            Self::Null => "null",
         }
     }
 }
 
-impl FromStr for PresentationKind {
+impl FromStr for BlindPairKind {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::New, Self::Repeat, Self::Null]
+        [Self::New, Self::Repeat]
             .into_iter()
             .find(|kind| kind.as_str() == text)
-            .ok_or_else(|| StoreError::unknown_value("presentation kind", text))
+            .ok_or_else(|| StoreError::unknown_value("kind of a blind pair", text))
     }
 }
 
@@ -129,7 +122,7 @@ impl Judgement {
         }
     }
 
-    /// The name in the record.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::First => "first",
@@ -139,8 +132,27 @@ impl Judgement {
             Self::UnsafeFirst => "unsafe_first",
             Self::UnsafeSecond => "unsafe_second",
             Self::UnsafeBoth => "unsafe_both",
-            Self::Retracted => "withdrawn",
+            Self::Retracted => "retracted",
         }
+    }
+
+    /// The name in the record of an answer about gait A and gait B, if gait A is the first one.
+    pub(super) fn about_gaits(self) -> &'static str {
+        match self {
+            Self::First => "a",
+            Self::Second => "b",
+            Self::UnsafeFirst => "unsafe_a",
+            Self::UnsafeSecond => "unsafe_b",
+            Self::NoDifference | Self::CannotTell | Self::UnsafeBoth | Self::Retracted => self.as_str(),
+        }
+    }
+
+    /// Reads [`about_gaits`](Self::about_gaits).
+    pub(super) fn from_gaits(text: &str) -> StoreResult<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|judgement| judgement.about_gaits() == text)
+            .ok_or_else(|| StoreError::unknown_value("answer about two gaits", text))
     }
 }
 
@@ -150,15 +162,15 @@ impl FromStr for Judgement {
         Self::ALL
             .into_iter()
             .find(|judgement| judgement.as_str() == text)
-            .ok_or_else(|| StoreError::unknown_value("presentation answer", text))
+            .ok_or_else(|| StoreError::unknown_value("answer in a lab session", text))
     }
 }
 
-/// A presentation, without its sides.
+/// A pair shown to a rater, without its sides.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Presentation {
+pub struct BlindPair {
     /// Identifier.
-    pub id: PresentationId,
+    pub id: BlindPairId,
     /// Token by which the rater knows the pair.
     pub token: String,
     /// Identifier of the study.
@@ -168,18 +180,18 @@ pub struct Presentation {
     /// Number for this rater in this study, from 1.
     pub number: u32,
     /// Why it was shown.
-    pub kind: PresentationKind,
-    /// The newer gait, independent of its side.
-    pub one: TrialId,
-    /// The other gait.
-    pub other: TrialId,
-    /// The presentation that it repeats.
-    pub repeats: Option<PresentationId>,
+    pub kind: BlindPairKind,
+    /// Gait A, which is the newer one, independent of its side.
+    pub trial_a: TrialId,
+    /// Gait B.
+    pub trial_b: TrialId,
+    /// The earlier pair that it repeats.
+    pub repeats: Option<BlindPairId>,
     /// Whether the rater could have known the allocation.
     pub could_have_known: bool,
     /// Time at which the pair was drawn.
     pub created_at: Instant,
-    /// The answer about the pair, where `First` is `one`; `None` if there is none yet.
+    /// The answer about the pair, where `First` is gait A; `None` if there is none yet.
     pub answer: Option<Judgement>,
     /// Time of the answer.
     pub answered_at: Option<Instant>,
@@ -187,21 +199,21 @@ pub struct Presentation {
     pub note: String,
 }
 
-impl Presentation {
+impl BlindPair {
     /// The two gaits, in an order that does not reveal the sides.
-    pub fn pair(&self) -> (TrialId, TrialId) {
-        (self.one, self.other)
+    pub fn trials(&self) -> (TrialId, TrialId) {
+        (self.trial_a, self.trial_b)
     }
 
     /// Whether one of the two gaits is among these trials.
     pub fn has_one_of(&self, trials: &[TrialId]) -> bool {
-        trials.contains(&self.one) || trials.contains(&self.other)
+        trials.contains(&self.trial_a) || trials.contains(&self.trial_b)
     }
 }
 
-/// A presentation to add.
+/// A pair to add.
 #[derive(Debug, Clone)]
-pub struct NewPresentation {
+pub struct NewBlindPair {
     /// Token by which the rater knows the pair.
     pub token: String,
     /// Identifier of the study.
@@ -211,23 +223,23 @@ pub struct NewPresentation {
     /// Number for this rater in this study, from 1.
     pub number: u32,
     /// Why it is shown.
-    pub kind: PresentationKind,
+    pub kind: BlindPairKind,
     /// The two gaits, the newer one first.
     pub pair: (TrialId, TrialId),
-    /// The presentation that it repeats.
-    pub repeats: Option<PresentationId>,
+    /// The earlier pair that it repeats.
+    pub repeats: Option<BlindPairId>,
     /// Whether the rater could have known the allocation.
     pub could_have_known: bool,
 }
 
-/// Adds a presentation.
+/// Adds a pair.
 ///
 /// # Errors
 /// A violated constraint; errors of the database.
-pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<PresentationId> {
-    let id = PresentationId::fresh();
+pub async fn insert(db: &mut Connection, new: &NewBlindPair) -> StoreResult<BlindPairId> {
+    let id = BlindPairId::fresh();
     sqlx::query(
-        "insert into presentations (id, token, study_id, rater, number, kind, shown_first, shown_second, repeats, \
+        "insert into blind_pairs (id, token, study_id, rater, number, kind, trial_a, trial_b, repeats, \
          unblinded, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
@@ -261,17 +273,17 @@ pub struct NewPairAnswer<'a> {
     pub could_have_known: bool,
 }
 
-/// Records the answer of a presentation. Returns `false` if it has one already.
+/// Records the answer about a pair. Returns `false` if it has one already.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn answer(db: &mut Connection, id: PresentationId, new: NewPairAnswer<'_>) -> StoreResult<bool> {
+pub async fn answer(db: &mut Connection, id: BlindPairId, new: NewPairAnswer<'_>) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into presentation_answers (presentation_id, answer, response_ms, note, feedback_id, could_have_known, \
-         created_at) values (?, ?, ?, ?, ?, ?, ?) on conflict (presentation_id) do nothing",
+        "insert into blind_pair_answers (pair_id, answer, response_ms, note, feedback_id, could_have_known, \
+         created_at) values (?, ?, ?, ?, ?, ?, ?) on conflict (pair_id) do nothing",
     )
     .bind(id)
-    .bind(new.judgement.as_str())
+    .bind(new.judgement.about_gaits())
     .bind(new.response_ms)
     .bind(new.note)
     .bind(new.feedback)
@@ -282,14 +294,14 @@ pub async fn answer(db: &mut Connection, id: PresentationId, new: NewPairAnswer<
     Ok(done.rows_affected() == 1)
 }
 
-/// Retracts the answer of a presentation. Returns `false` if it was already retracted.
+/// Retracts the answer about a pair. Returns `false` if it was already retracted.
 ///
 /// # Errors
 /// A violated constraint if there is no answer; errors of the database.
-pub async fn retract(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
+pub async fn retract(db: &mut Connection, id: BlindPairId) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into presentation_retractions (presentation_id, created_at) values (?, ?) \
-         on conflict (presentation_id) do nothing",
+        "insert into blind_pair_retractions (pair_id, created_at) values (?, ?) \
+         on conflict (pair_id) do nothing",
     )
     .bind(id)
     .bind(now())
@@ -298,62 +310,59 @@ pub async fn retract(db: &mut Connection, id: PresentationId) -> StoreResult<boo
     Ok(done.rows_affected() == 1)
 }
 
-/// The entry of the feedback log derived from a presentation's answer.
+/// The entry of the feedback log derived from the answer about a pair.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn feedback_of(db: &mut Connection, id: PresentationId) -> StoreResult<Option<FeedbackId>> {
-    let row = sqlx::query("select feedback_id from presentation_answers where presentation_id = ?")
-        .bind(id)
-        .fetch_optional(db)
-        .await?;
+pub async fn feedback_of(db: &mut Connection, id: BlindPairId) -> StoreResult<Option<FeedbackId>> {
+    let row =
+        sqlx::query("select feedback_id from blind_pair_answers where pair_id = ?").bind(id).fetch_optional(db).await?;
     Ok(row.map(|row| row.try_get(0)).transpose()?.flatten())
 }
 
-/// Selects presentations. A retracted answer reads as withdrawn.
-pub(super) const SELECT: &str = "select p.*, iif(r.presentation_id is null, a.answer, 'withdrawn') as answer, \
+/// Selects blind pairs, with the answer as retracted if its author retracted it.
+pub(super) const SELECT: &str = "select p.*, iif(r.pair_id is null, a.answer, 'retracted') as answer, \
                       a.created_at as answered_at, coalesce(a.note, '') as note, \
-                      p.unblinded = 1 or coalesce(a.could_have_known, 0) = 1 as could_have_known from presentations p \
-                      left join presentation_answers a on a.presentation_id = p.id \
-                      left join presentation_retractions r on r.presentation_id = p.id ";
+                      p.unblinded or coalesce(a.could_have_known, 0) as could_have_known from blind_pairs p \
+                      left join blind_pair_answers a on a.pair_id = p.id \
+                      left join blind_pair_retractions r on r.pair_id = p.id ";
 
-/// The presentations of two trials in either order, in the order of the draws.
+/// The blind pairs of two trials in either order, in the order of the draws.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_pair(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<Vec<Presentation>> {
-    let pair = "(p.shown_first = ?1 and p.shown_second = ?2) or (p.shown_first = ?2 and p.shown_second = ?1)";
+pub async fn of_pair(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<Vec<BlindPair>> {
+    let pair = "(p.trial_a = ?1 and p.trial_b = ?2) or (p.trial_a = ?2 and p.trial_b = ?1)";
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where {pair} order by p.id"));
     let rows = sqlx::query(sql).bind(a).bind(b).fetch_all(db).await?;
-    rows.iter().map(Presentation::from_row).collect()
+    rows.iter().map(BlindPair::from_row).collect()
 }
 
-/// Every presentation of a study, in the order of the draws.
+/// Every pair of a study, in the order of the draws.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<BlindPair>> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where p.study_id = ? order by p.id"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
-    rows.iter().map(Presentation::from_row).collect()
+    rows.iter().map(BlindPair::from_row).collect()
 }
 
-/// The presentations of a study whose answer is an assessment and was not retracted, in the order of the draws.
+/// The blind pairs of a study whose answer is an assessment and was not retracted, in the order of the draws.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
+pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<BlindPair>> {
     let assessments: Vec<&str> = Judgement::ALL
         .iter()
         .filter(|judgement| judgement.is_assessment())
-        .map(|judgement| judgement.as_str())
+        .map(|judgement| judgement.about_gaits())
         .collect();
     let assessments = assessments.join("', '");
-    let sql = format!(
-        "{SELECT} where p.study_id = ? and a.answer in ('{assessments}') and r.presentation_id is null order by p.id"
-    );
+    let sql =
+        format!("{SELECT} where p.study_id = ? and a.answer in ('{assessments}') and r.pair_id is null order by p.id");
     let rows = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(study).fetch_all(db).await?;
-    rows.iter().map(Presentation::from_row).collect()
+    rows.iter().map(BlindPair::from_row).collect()
 }
 
 /// Records that a rater was unblinded.
@@ -385,7 +394,7 @@ pub async fn is_unblinded(db: &mut Connection, study: StudyId, rater: &str) -> S
     Ok(row.is_some())
 }
 
-impl Presentation {
+impl BlindPair {
     pub(super) fn from_row(row: &SqliteRow) -> StoreResult<Self> {
         Ok(Self {
             id: row.try_get("id")?,
@@ -394,12 +403,12 @@ impl Presentation {
             rater: row.try_get("rater")?,
             number: row.try_get("number")?,
             kind: row.try_get::<&str, _>("kind")?.parse()?,
-            one: row.try_get("shown_first")?,
-            other: row.try_get("shown_second")?,
+            trial_a: row.try_get("trial_a")?,
+            trial_b: row.try_get("trial_b")?,
             repeats: row.try_get("repeats")?,
             could_have_known: row.try_get("could_have_known")?,
             created_at: row.try_get("created_at")?,
-            answer: row.try_get::<Option<&str>, _>("answer")?.map(str::parse).transpose()?,
+            answer: row.try_get::<Option<&str>, _>("answer")?.map(Judgement::from_gaits).transpose()?,
             answered_at: row.try_get("answered_at")?,
             note: row.try_get("note")?,
         })

@@ -1,6 +1,6 @@
-//! Stored results of attempts, including results that arrived too late.
+//! Stored attempts at trials, with their results, including results that arrived too late.
 
-use super::{Connection, Instant, StoreResult, TrialId, former_documents, json_columns, now};
+use super::{Connection, Instant, StoreResult, TrialId, json_columns, now};
 use gait_optimizer::{SolveReport, SolveStatus};
 use sqlx::Row;
 
@@ -33,7 +33,7 @@ pub async fn insert(
     used: bool,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into results (trial_id, attempt, worker, taken, status, report, received_at) \
+        "insert into attempts (trial_id, attempt, worker, used, status, report, received_at) \
          values (?, ?, ?, ?, ?, ?, ?) on conflict do nothing",
     )
     .bind(trial)
@@ -54,15 +54,15 @@ pub async fn insert(
 /// Errors of the database.
 pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<AttemptResult>> {
     let rows =
-        sqlx::query("select * from results where trial_id = ? order by attempt").bind(trial).fetch_all(db).await?;
+        sqlx::query("select * from attempts where trial_id = ? order by attempt").bind(trial).fetch_all(db).await?;
     rows.iter()
         .map(|row| {
             Ok(AttemptResult {
                 attempt: row.try_get("attempt")?,
                 worker: row.try_get("worker")?,
-                used: row.try_get("taken")?,
+                used: row.try_get("used")?,
                 status: json_columns::column(row, "status")?,
-                report: row.try_get::<Option<&str>, _>("report")?.map(former_documents::solve_report).transpose()?,
+                report: json_columns::optional_column(row, "report")?,
                 received_at: row.try_get("received_at")?,
             })
         })
