@@ -146,15 +146,11 @@ fn finish(
         }
         tally.attempts.push(one.attempt);
     }
-    match answer {
-        Some((candidate, margins)) => {
-            let outcome = outcome(context, candidate, &margins, tally, started_from);
-            Ok(SolveOutcome { other_local_optima: others, ..outcome })
-        }
-        None => {
-            let field = "number of guesses".to_owned();
-            let (minimum, maximum, unit, relation) = (1.0, 1e3, "", String::new());
-            Err(ModelError::OutOfRange { field, value: 0.0, minimum, maximum, unit, relation }.into())
-        }
-    }
+    let Some((candidate, margins)) = answer else {
+        let field = "number of guesses".to_owned();
+        let (minimum, maximum, unit, relation) = (1.0, 1e3, "", String::new());
+        return Err(ModelError::OutOfRange { field, value: 0.0, minimum, maximum, unit, relation }.into());
+    };
+    let outcome = outcome(context, candidate, &margins, tally, started_from);
+    Ok(SolveOutcome { other_local_optima: others, ..outcome })
 }

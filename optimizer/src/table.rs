@@ -59,7 +59,7 @@ impl Separator {
         match self {
             Self::Blank => line.split_whitespace().map(Cow::Borrowed).collect(),
             // A quote that is not closed stays in its cell, which is then no number.
-            Self::Comma if line.contains('"') && line.matches('"').count() % 2 == 0 => quoted_cells(line),
+            Self::Comma if line.contains('"') && line.matches('"').count().is_multiple_of(2) => quoted_cells(line),
             Self::Comma => line.split(',').map(|cell| Cow::Borrowed(cell.trim())).collect(),
         }
     }

@@ -335,7 +335,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
         }
         let last = shown(&service, study).await.pop().unwrap();
         if let Some(closed) = unsafe_trial {
-            assert!(last.one != closed && last.other != closed, "an unsafe gait was shown again");
+            assert!(last.trial_a != closed && last.trial_b != closed, "an unsafe gait was shown again");
         }
         let word = if turn == 0 {
             "cannot_tell"
