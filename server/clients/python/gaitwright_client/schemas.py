@@ -2323,6 +2323,9 @@ class _SafetyReportRequired(TypedDict):
     # Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. If so, the gait
     # must not be used for walking.
     in_force: bool
+    # What was reported. Empty for reports of raters and of subjects in blinded lab sessions, whose notes could tell
+    # which gait was shown first.
+    note: str
     # Trial of the gait.
     trial_id: TrialId
 
