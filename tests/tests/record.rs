@@ -162,8 +162,8 @@ async fn evidence_tables_are_append_only_for_other_programs() {
         ("delete from events", "events are append-only"),
         ("update gaits set speed_m_s = 0", "gaits are append-only"),
         ("delete from trials", "trials are never deleted"),
-        ("update trials set gait_rmse_rad = 0.001", "the result of a trial is fixed"),
-        ("update trials set action_index = 0 where id = 'X'", "the proposal of a trial is fixed"),
+        ("update trials set gait_rmse_rad = 0.001", "the result of a trial cannot be changed"),
+        ("update trials set action_index = 0 where id = 'X'", "the proposal of a trial cannot be changed"),
     ] {
         match sqlx::query(sql).execute(&pool).await {
             Err(sqlx::Error::Database(refused)) => assert_eq!(refused.message(), reason, "{sql}"),

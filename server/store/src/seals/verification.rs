@@ -91,7 +91,7 @@ async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
         for row in &batch {
             let seq: i64 = row.try_get("seq")?;
             let text = |name: &str| row.try_get::<String, _>(name);
-            let (Ok(table), Ok(key), Ok(sha256)) = (text("evidence"), text("key"), text("sha256")) else {
+            let (Ok(table), Ok(key), Ok(sha256)) = (text("table_name"), text("key"), text("sha256")) else {
                 return Ok(SealCheck::Broken { seq });
             };
             let hash = chained(&last, &table, &key, &sha256);
