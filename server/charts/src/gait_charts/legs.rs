@@ -13,7 +13,7 @@ const JOINTS: [&str; 3] = ["Hip", "Knee", "Ankle"];
 /// Title, and place among the muscles of the left and the right leg.
 const MUSCLES: [(&str, usize, Option<usize>); 7] = [
     ("Hamstrings", 0, Some(7)),
-    ("Glutei", 1, Some(8)),
+    ("Gluteus", 1, Some(8)),
     ("Hip flexors", 2, Some(9)),
     ("Vasti", 4, None),
     ("Gastrocnemius", 3, None),

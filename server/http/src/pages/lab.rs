@@ -93,7 +93,7 @@ async fn show_list(
     let gaits = lab::gaits_to_plan_with(&mut reader, id, OFFERED).await?;
     drop(reader);
     let named = |trial: ListedTrial| {
-        (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)))
+        (trial.id, format!("trial {} (Gait RMSE {} rad)", trial.number, format::figure(trial.gait_rmse_rad)))
     };
     let shown = |session| {
         let view = LabSessionView::from(&session);
@@ -197,7 +197,7 @@ impl MeasuredActivity {
         };
         let mut rows: Vec<(String, Vec<String>, Vec<String>)> = channels.iter().enumerate().map(row).collect();
         let totals = compared.iter().map(|(_, rmse)| format::figure(Some(rmse.total))).collect();
-        rows.push(("all muscles".to_owned(), totals, walks().map(|_| String::new()).collect()));
+        rows.push(("sum of all muscles".to_owned(), totals, walks().map(|_| String::new()).collect()));
         let model = emg.model.iter().flat_map(|walk| {
             walk.muscles.iter().map(|muscle| {
                 [

@@ -91,9 +91,9 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
     let candidates =
         if may_run && !withdrawn { membership::candidates(&mut reader, &access.members).await? } else { Vec::new() };
     let raters = if withdrawn { Vec::new() } else { blind::reliability(&mut reader, id).await? };
-    let candidates = candidates.into_iter().map(|(kind, name, what)| {
+    let candidates = candidates.into_iter().map(|(kind, name, role)| {
         let kind = if kind == MemberKind::User { "user" } else { "token" };
-        (format!("{kind} {name}"), format!("{name} ({what})"))
+        (format!("{kind} {name}"), format!("{name} ({})", role.as_ref().map_or("token", format::role)))
     });
     page(&MembersPage {
         study,

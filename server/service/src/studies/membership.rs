@@ -137,15 +137,18 @@ pub async fn invite(
     Ok((user, member, secret))
 }
 
-/// Users and tokens that can be added to a study, sorted by name.
+/// Users, with their roles, and tokens that can be added to a study, sorted by name.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn candidates(db: &mut Connection, present: &[Member]) -> Result<Vec<(MemberKind, String, String)>, Error> {
+pub async fn candidates(
+    db: &mut Connection,
+    present: &[Member],
+) -> Result<Vec<(MemberKind, String, Option<Role>)>, Error> {
     let is_new = |kind, name: &str| !present.iter().any(|member| member.kind == kind && member.name == name);
     let users = users::all(db).await?.into_iter().filter(|user| user.disabled_at.is_none());
-    let users = users.map(|user| (MemberKind::User, user.name, user.role.as_str().to_owned()));
+    let users = users.map(|user| (MemberKind::User, user.name, Some(user.role)));
     let tokens = tokens::all(db).await?.into_iter().filter(tokens::Token::is_good);
-    let tokens = tokens.map(|token| (MemberKind::Token, token.name, "token".to_owned()));
+    let tokens = tokens.map(|token| (MemberKind::Token, token.name, None));
     Ok(users.chain(tokens).filter(|(kind, name, _)| is_new(*kind, name)).collect())
 }

@@ -283,7 +283,7 @@ async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error>
     Ok(match trials::measured(db, plan.muscles).await?.map(took) {
         Some(seconds) => format!("{size} and takes about {}{people}.", format::duration(seconds)),
         None => format!(
-            "{size}. No solve times with{} muscles measured yet: the first trial takes up to a minute, later ones a few \
+            "{size}. No solve with{} muscles has been timed here yet: the first trial takes up to a minute, later ones a few \
              seconds{people}.",
             if plan.muscles { "" } else { "out" }
         ),
