@@ -117,9 +117,15 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     let (bottom, ..) = page.lowest(".outcome svg.gait-figure").await;
     assert!(bottom <= 800.0, "{bottom}");
     page.is_clean(&site.origin).await;
-    let fresh = site.service.study(|new| new.trial_budget = 2).await;
-    let told = site.service.fetch(&format!("/studies/{fresh}")).await.text;
-    assert!(told.contains("No estimate of the time left yet: it needs 3 more solves."), "{told}");
+    let told = async |trials: u32| {
+        let fresh = site.service.study(|new| new.trial_budget = trials).await;
+        site.service.fetch(&format!("/studies/{fresh}")).await.text
+    };
+    let long = told(8).await;
+    assert!(long.contains("No estimate of the time left yet: it needs 3 more solves."), "{long}");
+    // An estimate that can never come is not announced.
+    let short = told(2).await;
+    assert!(!short.contains("No estimate"), "{short}");
     browser.close().await;
 }
 

@@ -177,7 +177,7 @@ pub async fn live(
 pub enum SignInLookup {
     /// The secret is unknown, or was ended.
     Nobody,
-    /// The session or token has expired, which must be recorded with [`note_ended`].
+    /// The session or token has expired, which must be recorded with [`record_expiry`].
     Ended(Option<SessionId>),
     /// The secret is valid.
     Known {
