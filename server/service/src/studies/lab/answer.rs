@@ -99,7 +99,7 @@ async fn report_unsafe(
     let walked = session.walked();
     let (gaits, blinded) = match walked {
         Some(pair) => (new.answer.unsafe_of(pair), ""),
-        None => (vec![session.trial_a, session.trial_b], "; blinded, so either gait may be meant"),
+        None => (vec![session.trial_a, session.trial_b], "; blinded: either gait"),
     };
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,
@@ -119,6 +119,7 @@ async fn report_unsafe(
                 Judgement::UnsafeSecond => "walk 3",
                 _ => "walks 2 and 3",
             };
+            // At most 80 characters, as every author.
             let author = format!("the subject in lab session {} ({walks}{blinded})", session.number);
             let attribution = Attribution { source: Source::Subject, author: &author, note: &new.note };
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
