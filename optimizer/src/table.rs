@@ -65,7 +65,8 @@ impl Separator {
     }
 }
 
-/// The cells of a line with quotes (RFC 4180). Text is valid in every record, so that there is no error.
+/// The cells of a line with quotes (RFC 4180). One record of valid UTF-8 always parses; a line without cells would be refused
+/// for their number.
 fn quoted_cells(line: &str) -> Vec<Cow<'_, str>> {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).trim(csv::Trim::All).from_reader(line.as_bytes());
     let record = reader.records().next().and_then(Result::ok).unwrap_or_default();
