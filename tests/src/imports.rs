@@ -1,6 +1,5 @@
-//! Imports between the files of a crate, read from their text: `use` declarations and paths that begin with `crate` or
-//! `super`. A re-export leads to the file that defines the name. Modules of unit tests are left out, in files of their own
-//! as well.
+//! Imports between the files of a crate, read from their text: `use` declarations and paths in code. A re-export leads to
+//! the file that defines the name. Modules of unit tests are left out, in files of their own as well.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -207,21 +206,20 @@ fn expand(prefix: &str, tree: &str, is_export: bool, uses: &mut Vec<Use>) {
     }
 }
 
-/// Paths in code that begin with `crate::` or `super::`.
+/// Paths in code of more than one segment: from the crate, from a parent, or from a module of this file.
 fn inline_paths(code: &str) -> Vec<Vec<String>> {
+    let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
     let mut paths = Vec::new();
-    for head in ["crate::", "super::"] {
-        for (at, _) in code.match_indices(head) {
-            let before = code[..at].chars().next_back();
-            let is_whole = !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':' || c == '$');
-            // `pub(in crate::a)` imports nothing.
-            if !is_whole || code[..at].ends_with("(in ") {
-                continue;
-            }
-            let end = code[at..].find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
-            let path = code[at..end.map_or(code.len(), |end| at + end)].trim_end_matches(':');
+    let mut at = 0;
+    while let Some(start) = code[at..].find(is_part).map(|found| at + found) {
+        let end = code[start..].find(|c| !is_part(c)).map_or(code.len(), |found| start + found);
+        let path = code[start..end].trim_end_matches(':');
+        // `<T as Trait>::name` and `$crate::name` begin before the word; `pub(in crate::a)` imports nothing.
+        let is_whole = !path.starts_with(':') && !code[..start].ends_with('$') && !code[..start].ends_with("(in ");
+        if is_whole && path.contains("::") {
             paths.push(path.split("::").map(str::to_owned).collect());
         }
+        at = end;
     }
     paths
 }
@@ -281,6 +279,13 @@ mod tests {
         assert_eq!(found["b/mod.rs"], BTreeSet::from(["a.rs".to_owned()]));
         assert_eq!(found["b/c.rs"], BTreeSet::from(["a.rs".to_owned()]));
         assert_eq!(circle(&found), None);
+    }
+
+    #[test]
+    fn paths_that_begin_with_a_child_module_are_imports() {
+        let parent = "mod child;\npub struct Part;\nfn f() -> u8 { child::g(std::u8::MAX) }\n";
+        let found = imports(&[("lib.rs", parent), ("child.rs", "use super::Part;\npub fn g() {}\n")]);
+        assert_eq!(circle(&found), Some(vec!["child.rs".to_owned(), "lib.rs".to_owned()]));
     }
 
     #[test]

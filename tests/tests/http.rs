@@ -115,11 +115,12 @@ async fn unknown_objects_are_not_found() {
         format!("/api/v1/studies/{unknown}/events"),
         format!("/api/v1/subjects/{unknown}"),
         "/api/v1/trials/seven".to_owned(),
-        "/api/v1/nothing".to_owned(),
     ] {
         let answer = service.fetch(&path).await;
         is_problem(&answer, StatusCode::NOT_FOUND, "/problems/not-found", "There is no ");
     }
+    let nowhere = "The address /api/v1/nothing does not exist.";
+    is_problem(&service.fetch("/api/v1/nothing").await, StatusCode::NOT_FOUND, "/problems/not-found", nowhere);
     for path in [format!("/studies/{unknown}"), format!("/trials/{unknown}"), "/nothing".to_owned()] {
         let answer = service.fetch(&path).await;
         assert_eq!(answer.status, StatusCode::NOT_FOUND);

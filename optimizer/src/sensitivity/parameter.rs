@@ -1,8 +1,8 @@
 //! How the gait problem depends on a tuned bound, and how its solution follows.
 
 use super::active::{self, ActiveSet};
+use super::bound_sensitivity::{BoundSensitivity, GaitSensitivityError};
 use super::result_derivatives::ResultDerivatives;
-use super::{BoundSensitivity, GaitSensitivityError};
 use crate::gait_problem::{GaitProblem, GaitProgram, gait_of};
 use crate::model_error::ModelError;
 use crate::solve::{GaitResults, SolveError, WarmStart, check_shape};

@@ -1,12 +1,14 @@
 //! The charts of a gait.
 
 mod cycle;
+mod group;
 mod legs;
 mod solve_progress;
 
+pub use group::Group;
 pub use solve_progress::solve;
 
-use crate::{Animation, Chart, Drawing, Figure, LegCycle, Stroke, WalkerFigure, over_reference};
+use crate::{Animation, Chart, Figure, LegCycle, Stroke, WalkerFigure, over_reference};
 use cycle::Cycle;
 use gait_optimizer::gait::stick_figure::StickFigure;
 use gait_optimizer::gait::{PhaseProgress, progress};
@@ -32,35 +34,6 @@ const ANGLES: [(&str, usize, usize); 5] = [
 /// Names of q, apart from the place of the hip.
 const COORDINATES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
-
-/// Figures that belong together.
-#[derive(Debug)]
-pub struct Group {
-    /// Name in addresses.
-    pub id: &'static str,
-    /// Heading on the page.
-    pub heading: &'static str,
-    /// What the figures show, in a sentence; empty: the heading says it.
-    pub hint: String,
-    /// The figures, in reading order.
-    pub figures: Vec<Figure>,
-}
-
-impl Group {
-    fn new(id: &'static str, heading: &'static str, hint: impl Into<String>, charts: Vec<Chart>) -> Self {
-        let figures = charts.into_iter().map(|chart| Figure::chart(id, chart)).collect();
-        Self { id, heading, hint: hint.into(), figures }
-    }
-
-    /// Whether its charts mark the stance and swing of the legs.
-    pub fn marks_stances(&self) -> bool {
-        let marks = |figure: &Figure| match &figure.drawing {
-            Drawing::Chart(chart) => chart.cycles.iter().any(|cycle| cycle.toe_off_percent.is_some()),
-            _ => false,
-        };
-        self.figures.iter().any(marks)
-    }
-}
 
 /// Number of drawn points for each node of a gait.
 const DRAWN_PARTS: usize = 6;

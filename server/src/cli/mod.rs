@@ -5,6 +5,7 @@ pub mod archive_commands;
 mod audit;
 mod backup;
 mod certify;
+mod command_end;
 mod config;
 mod convert;
 mod database_file;
@@ -38,6 +39,7 @@ mod users;
 mod worker;
 
 use clap::{Parser, Subcommand};
+use command_end::CommandEnd;
 use gaitwright_http::openapi;
 use gaitwright_service::error::Error;
 use output::{data, tell};
@@ -49,17 +51,6 @@ const INPUT_FAULT: u8 = 2;
 
 /// Exit code after Ctrl-C or SIGTERM, as in shells.
 const INTERRUPTED: u8 = 130;
-
-/// How a command ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum CommandEnd {
-    /// It succeeded.
-    Done,
-    /// A person stopped it.
-    Interrupted,
-    /// Part of it failed because of the program or the machine.
-    Failed,
-}
 
 /// Tunes walking gaits for powered prostheses by preference learning.
 ///

@@ -1,6 +1,6 @@
 //! `gaitwright solve`: optimises one gait.
 
-use super::CommandEnd;
+use super::command_end::CommandEnd;
 use super::flag_numbers::local_optimum;
 use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
 use super::multi_start_flags::MultiStartFlags;

@@ -1,7 +1,7 @@
 //! `gaitwright sweep`: optimises a gait for each row of a table of actions, in parallel. Results keep the order of the
 //! rows.
 
-use super::CommandEnd;
+use super::command_end::CommandEnd;
 use super::flag_numbers::workers;
 use super::out_file::OutFile;
 use super::output::{data, tell};

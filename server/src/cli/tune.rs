@@ -1,6 +1,6 @@
 //! `gaitwright tune`: runs an unattended study.
 
-use super::CommandEnd;
+use super::command_end::CommandEnd;
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};

@@ -74,6 +74,7 @@ pub mod totals;
 pub mod trials;
 pub mod trials_table;
 pub mod users;
+mod verified_copy;
 pub mod verify;
 mod wal_check;
 mod writer;

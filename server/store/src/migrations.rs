@@ -2,7 +2,8 @@
 
 use super::record_files::path_with_suffix;
 use super::schema_versions::{FILES, SchemaFile, check_version, migrator};
-use super::{StoreError, StoreResult, backup, seals, verify};
+use super::verified_copy::whole_copy;
+use super::{StoreError, StoreResult, seals, verify};
 use sqlx::SqlitePool;
 use std::path::{Path, PathBuf};
 
@@ -40,7 +41,7 @@ async fn migrate(pool: &SqlitePool, path: &Path, files: &[SchemaFile]) -> StoreR
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
     let name = path_with_suffix(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
-    let copy = backup::whole_copy(pool, path, &name, path).await?;
+    let copy = whole_copy(pool, path, &name, path).await?;
     match free_name(&name, copy.part()).map_err(cannot_write)? {
         Some(free) => copy.keep_as(&free).map_err(cannot_write),
         None => Ok(()),

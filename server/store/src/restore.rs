@@ -9,7 +9,8 @@ use super::ownership::Ownership;
 use super::record_files::free_name;
 use super::record_files::path_with_suffix;
 use super::restore_marker::{self, Marker, mark, unmark};
-use super::{StoreError, StoreResult, anchor, backup, read_only};
+use super::verified_copy::{self, whole_copy};
+use super::{StoreError, StoreResult, anchor, read_only};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -53,14 +54,14 @@ async fn replace(
     let pool = read_only::open(from).await?;
     let copied = async {
         let ends = anchor::ends(&mut *pool.acquire().await?).await?;
-        Ok::<_, StoreError>((ends, backup::whole_copy(&pool, from, to, to).await?))
+        Ok::<_, StoreError>((ends, whole_copy(&pool, from, to, to).await?))
     };
     let copied = copied.await;
     pool.close().await;
     let (ends, copy) = copied?;
     let kept = to.exists().then(|| free_name(to, "before"));
     if let Some(kept) = &kept {
-        keep(to, kept).map_err(|error| backup::cannot_write(kept, error))?;
+        keep(to, kept).map_err(|error| verified_copy::cannot_write(kept, error))?;
         like(to, copy.part());
     }
     reached(RestoreStep::OldRecordKept);
@@ -152,7 +153,7 @@ fn like(present: &Path, copy: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Store, commit, verify};
+    use crate::{Store, backup, commit, verify};
     use std::process::Command;
 
     /// Step, backup and record of the process that is killed.

@@ -1,8 +1,8 @@
 //! The charts in which both legs are compared, as gait laboratories draw them: each leg over its own cycle, torques and
 //! powers per body mass, forces in body weights.
 
-use super::Group;
 use super::cycle::{Cycle, Leg};
+use super::group::Group;
 use crate::gait_series::Point;
 use crate::{Chart, Stroke, band_in_words, over_reference_of_leg};
 use gait_optimizer::ReferenceGait;

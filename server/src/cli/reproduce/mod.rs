@@ -4,7 +4,7 @@ mod comparison;
 mod report;
 mod statements;
 
-use super::CommandEnd;
+use super::command_end::CommandEnd;
 use super::flag_numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};

@@ -1,7 +1,7 @@
 //! Checks the answers in an imported archive: each against its trials, and how often a person answered.
 
 use super::super::file::refuse;
-use super::{at, of_gaits};
+use super::context::{at, of_gaits};
 use crate::error::Error;
 use crate::printable;
 use crate::studies::comparison::by_gait_rmse;

@@ -2,6 +2,7 @@
 //! computing it again.
 
 mod answers;
+mod context;
 mod trial;
 
 use super::file::refuse;
@@ -10,14 +11,14 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::lab::EmgResult;
 use crate::studies::{device, lab, reference_import, study_change, study_plan, subject};
-use gait_optimizer::ReferenceGait;
+use context::{Context, at, of_gaits};
 use gaitwright_compute::Pool;
 use gaitwright_store::archive::Definition;
 use gaitwright_store::archived_row::{Cell, Row};
 use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::quarantine::Quarantine;
-use gaitwright_store::studies::{Study, StudyFilter};
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::studies::StudyFilter;
+use gaitwright_store::trials::Trial;
 use gaitwright_store::{
     Connection, Instant, StudyId, TrialId, archive, devices, lab_sessions, measurement_files, now, reference_gaits,
     studies, subjects, trials,
@@ -82,19 +83,6 @@ pub(super) struct CheckedArchive {
     pub(super) study: StudyId,
     /// Number of trials whose Gait RMSE could not be computed again.
     pub(super) unchecked_rmse: u32,
-}
-
-/// The study data that trials must agree with.
-struct Context {
-    study: Study,
-    body: gait_optimizer::Subject,
-    device: gait_optimizer::Device,
-    reference: ReferenceGait,
-}
-
-/// Adds to an error where it occurred.
-fn at<T, E: std::fmt::Display>(what: impl std::fmt::Display, result: Result<T, E>) -> Result<T, Error> {
-    result.map_err(|error| refuse(format!("{what}: {error}")))
 }
 
 /// Checks everything in quarantine.
@@ -162,14 +150,6 @@ fn of_definition(table: &str, name: &str, written: &Definition) -> Result<(), Er
         return Err(refuse(format!("{table}: name, definition and hash do not match")));
     }
     Ok(())
-}
-
-/// Checks that comparisons are about gaits of the study.
-fn of_gaits<const N: usize>(trials: &HashMap<TrialId, &Trial>, asked: [TrialId; N]) -> Result<(), String> {
-    match asked.iter().find(|id| trials.get(*id).is_none_or(|trial| trial.state != TrialState::Converged)) {
-        Some(id) => Err(format!("trial {id} is not a converged trial of this study")),
-        None => Ok(()),
-    }
 }
 
 /// Checks lab sessions and their measurement files.

@@ -1,6 +1,6 @@
 //! Checks the trials of an imported archive: their figures, gaits and results.
 
-use super::Context;
+use super::context::Context;
 use crate::studies::{search_space, trial_state};
 use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::solve::CONVERGED_VIOLATION;

@@ -1,0 +1,32 @@
+//! Groups of figures, as pages show them under one heading.
+
+use crate::{Chart, Drawing, Figure};
+
+/// Figures that belong together.
+#[derive(Debug)]
+pub struct Group {
+    /// Name in addresses.
+    pub id: &'static str,
+    /// Heading on the page.
+    pub heading: &'static str,
+    /// What the figures show, in a sentence; empty: the heading says it.
+    pub hint: String,
+    /// The figures, in reading order.
+    pub figures: Vec<Figure>,
+}
+
+impl Group {
+    pub(super) fn new(id: &'static str, heading: &'static str, hint: impl Into<String>, charts: Vec<Chart>) -> Self {
+        let figures = charts.into_iter().map(|chart| Figure::chart(id, chart)).collect();
+        Self { id, heading, hint: hint.into(), figures }
+    }
+
+    /// Whether its charts mark the stance and swing of the legs.
+    pub fn marks_stances(&self) -> bool {
+        let marks = |figure: &Figure| match &figure.drawing {
+            Drawing::Chart(chart) => chart.cycles.iter().any(|cycle| cycle.toe_off_percent.is_some()),
+            _ => false,
+        };
+        self.figures.iter().any(marks)
+    }
+}

@@ -1,0 +1,30 @@
+//! What the checks of an imported archive share.
+
+use super::super::file::refuse;
+use crate::error::Error;
+use gait_optimizer::ReferenceGait;
+use gaitwright_store::TrialId;
+use gaitwright_store::studies::Study;
+use gaitwright_store::trials::{Trial, TrialState};
+use std::collections::HashMap;
+
+/// The study data that trials must agree with.
+pub(super) struct Context {
+    pub(super) study: Study,
+    pub(super) body: gait_optimizer::Subject,
+    pub(super) device: gait_optimizer::Device,
+    pub(super) reference: ReferenceGait,
+}
+
+/// Adds to an error where it occurred.
+pub(super) fn at<T, E: std::fmt::Display>(what: impl std::fmt::Display, result: Result<T, E>) -> Result<T, Error> {
+    result.map_err(|error| refuse(format!("{what}: {error}")))
+}
+
+/// Checks that comparisons are about gaits of the study.
+pub(super) fn of_gaits<const N: usize>(trials: &HashMap<TrialId, &Trial>, asked: [TrialId; N]) -> Result<(), String> {
+    match asked.iter().find(|id| trials.get(*id).is_none_or(|trial| trial.state != TrialState::Converged)) {
+        Some(id) => Err(format!("trial {id} is not a converged trial of this study")),
+        None => Ok(()),
+    }
+}
