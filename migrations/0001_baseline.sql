@@ -134,6 +134,9 @@ create table studies (
                          check (unchanged_limit is null or unchanged_limit between 1 and 10000),
     -- Whether a trial may have an action whose gait is known from another trial.
     repeat_results       integer not null constraint studies_repeat_results_bool check (repeat_results in (0, 1)),
+    -- The gait from which trials are warm-started: the best one so far, or the first one of the study.
+    warm_start_from      text not null
+                         constraint studies_warm_start_from check (warm_start_from in ('incumbent', 'root')),
     parallel_trials      integer not null constraint studies_parallel_trials check (parallel_trials between 1 and 64),
     priority             integer not null default 0 constraint studies_priority check (priority between -10 and 10),
     -- At most 53 bits, because JSON readers keep no more of an integer.

@@ -9,7 +9,7 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::workers::{Attempt, InProcess};
 use gaitwright_store::feedback::{FeedbackContent, Source};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{FeedbackMode, StudyState, WarmStartFrom};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, trials};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
@@ -172,6 +172,32 @@ async fn study_ends_when_the_gait_of_every_action_is_known() {
         assert_eq!(service.trials(study).await.len(), expected);
         assert_eq!(ended.state_reason.contains("has the gait of one that was tried"), expected == 1, "{ended:?}");
     }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn gaits_from_a_root_do_not_depend_on_other_trials() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 2).await;
+    let mut roots = HashSet::new();
+    for (seed, parallel_trials) in [(1, 1), (2, 1), (3, 2)] {
+        let study = service
+            .study(|new| {
+                (new.seed, new.trial_budget, new.parallel_trials) = (seed, 8, parallel_trials);
+                new.warm_start_from = WarmStartFrom::Root;
+            })
+            .await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        let trials = service.trials(study).await;
+        assert_eq!(trials.len(), 8);
+        let root = trials.iter().find(|trial| trial.state == TrialState::Converged).unwrap();
+        assert_eq!((root.number, root.warm_started_from), (1, None));
+        for trial in &trials[1..] {
+            assert_eq!(trial.warm_started_from, Some(root.id), "trial {}", trial.number);
+        }
+        roots.insert((root.action_index, root.gait_rmse_rad.map(f64::to_bits)));
+    }
+    assert_eq!(roots.len(), 1, "the root depends on the problem only");
     service.stop().await;
 }
 

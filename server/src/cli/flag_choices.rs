@@ -31,6 +31,15 @@ pub(super) const HEEL_STRIKES: [FlagChoice; 3] = [
 pub(super) const EMG_FORMATS: [FlagChoice; 2] =
     [("csv", "CSV file whose header names the columns"), ("opensim", "OpenSim storage file (.sto)")];
 
+/// The gaits from which trials can be warm-started.
+pub(super) const WARM_STARTS: [FlagChoice; 2] = [
+    ("incumbent", "The best gait so far, as in the paper"),
+    (
+        "root",
+        "The first gait, which has the default bounds, so that the gait of an action does not depend on other trials",
+    ),
+];
+
 /// Reads one of these names as the REST interface reads it.
 pub(super) fn one_of<T>(choices: impl IntoIterator<Item = FlagChoice>) -> impl TypedValueParser<Value = T>
 where
@@ -45,6 +54,7 @@ mod tests {
     use super::*;
     use gaitwright_service::studies::lab::MeasurementFormat;
     use gaitwright_service::studies::reference_import::{JointAngleFormat, Strikes, Unit};
+    use gaitwright_store::studies::WarmStartFrom;
 
     fn all_are_known<T: DeserializeOwned>(choices: &[FlagChoice]) {
         for (name, _) in choices {
@@ -58,5 +68,6 @@ mod tests {
         all_are_known::<Unit>(&ANGLE_UNITS);
         all_are_known::<Strikes>(&HEEL_STRIKES);
         all_are_known::<MeasurementFormat>(&EMG_FORMATS);
+        all_are_known::<WarmStartFrom>(&WARM_STARTS);
     }
 }

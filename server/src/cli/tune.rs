@@ -1,6 +1,7 @@
 //! `gaitwright tune`: runs an unattended study.
 
 use super::command_end::CommandEnd;
+use super::flag_choices::{WARM_STARTS, one_of};
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
@@ -19,6 +20,7 @@ use gaitwright_service::studies::trial_choice::best_trial;
 use gaitwright_service::studies::{built_in_entries, device, reference_import};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::commit;
+use gaitwright_store::studies::WarmStartFrom;
 use std::sync::Arc;
 
 #[derive(Debug, Args)]
@@ -45,6 +47,9 @@ pub(super) struct Tune {
     /// Also try actions whose gait is known from another trial, as the paper does.
     #[arg(long)]
     repeat_results: bool,
+    /// The gait from which trials are warm-started (default: incumbent).
+    #[arg(long, default_value = "incumbent", hide_default_value = true, value_parser = one_of::<WarmStartFrom>(WARM_STARTS))]
+    warm_start_from: WarmStartFrom,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
     /// Print one JSON object at the end instead of a line for each trial.
@@ -76,6 +81,7 @@ impl Tune {
             parallel_trials: u32::try_from(workers).unwrap_or(1),
             seed: self.seed,
             repeat_results: Some(self.repeat_results),
+            warm_start_from: self.warm_start_from,
             ..NewStudy::of(subject.id)
         };
         let study = Box::pin(unattended::study(&store, new)).await?;

@@ -192,6 +192,11 @@ Unit = Literal["degrees", "radians"]
 # Identifier of a user.
 UserId = str
 
+# The gait from which a trial is warm-started: `incumbent`, the best gait so far, as in the published method; `root`,
+# the first gait of the study, which has the default bounds, so that the gait of an action does not depend on other
+# trials.
+WarmStartFrom = Literal["incumbent", "root"]
+
 
 class _AccessRowRequired(TypedDict):
     # Who made the request.
@@ -1917,6 +1922,8 @@ class NewStudy(_NewStudyRequired, total=False):
     trial_budget: int
     # The study finishes when the best action has not changed over this many results.
     unchanged_limit: Optional[int]
+    # The gait from which trials are warm-started.
+    warm_start_from: WarmStartFrom
 
 
 class _NewSubjectRequired(TypedDict):
@@ -2569,7 +2576,6 @@ class _StudyPlanRequired(TypedDict):
     # Identifier of the reference gait for Gait RMSE.
     reference_gait_id: ReferenceGaitId
     # Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
-    # Always true for studies created by versions without this setting.
     repeat_results: bool
     # Tuned bounds and their values, with each dimension named after its bound.
     search_space: SearchSpace
@@ -2581,6 +2587,8 @@ class _StudyPlanRequired(TypedDict):
     subject_id: SubjectId
     # Number of trials.
     trial_budget: int
+    # The gait from which trials are warm-started.
+    warm_start_from: WarmStartFrom
 
 
 class StudyPlan(_StudyPlanRequired, total=False):

@@ -3,7 +3,7 @@
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use gaitwright_service::studies::study_plan_schemas;
-use gaitwright_store::studies::{self, Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{self, Evaluation, FeedbackMode, StudyState, WarmStartFrom};
 use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -110,8 +110,9 @@ pub(crate) struct StudyPlan {
     /// The study finishes when the best action has not changed over this many results.
     unchanged_limit: Option<u32>,
     /// Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
-    /// Always true for studies created by versions without this setting.
     repeat_results: bool,
+    /// The gait from which trials are warm-started.
+    warm_start_from: WarmStartFrom,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     parallel_trials: u32,
     /// Priority, -10 to 10. Studies with a higher priority run first.
@@ -140,6 +141,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,
+            warm_start_from,
             parallel_trials,
             priority,
             seed,
@@ -162,6 +164,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,
+            warm_start_from,
             parallel_trials,
             priority,
             seed,

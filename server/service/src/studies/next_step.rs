@@ -67,7 +67,8 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
             PlanningStep::Nothing
         });
     }
-    if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
+    let is_full = open >= study.plan.parallel_trials as usize;
+    if is_full || study.plan.evaluation == Evaluation::Script || trial_choice::awaits_root(snapshot) {
         return Ok(PlanningStep::Nothing);
     }
     let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;

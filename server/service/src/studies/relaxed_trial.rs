@@ -8,7 +8,7 @@ use super::lifecycle::{self, StudyTransition};
 use super::search_space;
 use super::snapshot::StudySnapshot;
 use super::study_change;
-use super::trial_choice::{best_converged, best_trial};
+use super::trial_choice::{best_trial, warm_start_of_next};
 use crate::error::Error;
 use gait_learner::{ActionIndex, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
@@ -186,7 +186,7 @@ pub async fn choose(
     let rank = move |pool: &OnPool| {
         let belief = beliefs.posterior(pool, &snapshot);
         let ranked = belief.and_then(|belief| {
-            Ok::<_, LearnerError>((best_trial(&snapshot, &belief)?, best_converged(&snapshot, &belief)?))
+            Ok::<_, LearnerError>((best_trial(&snapshot, &belief)?, warm_start_of_next(&snapshot, &belief)?))
         });
         (snapshot, ranked)
     };

@@ -111,6 +111,21 @@ pub fn action_of(space: &SearchSpace, base: TunedBounds, bounds: TunedBounds) ->
     bounds_of(space, base, action).is_ok_and(|found| found == bounds).then_some(action)
 }
 
+/// The action whose values are nearest to these bounds. The smaller value wins a tie.
+///
+/// # Errors
+/// If a dimension is not a bound.
+pub fn nearest_action(space: &SearchSpace, bounds: TunedBounds) -> Result<ActionIndex, LearnerError> {
+    let all = bounds.to_array();
+    let nearest = |dimension: &Dimension| {
+        let bound = TunedBounds::NAMES.iter().position(|name| *name == dimension.name);
+        let wanted = bound.map_or(f64::NAN, |bound| all[bound]);
+        let distance = |level: &usize| (dimension.values[*level] - wanted).abs();
+        (0..dimension.values.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or_default()
+    };
+    space.index_of_levels(&space.dimensions().iter().map(nearest).collect::<Vec<_>>())
+}
+
 /// Checks that every dimension is a bound and that every combination of values makes valid bounds.
 ///
 /// # Errors
@@ -141,6 +156,15 @@ pub fn validate(space: &SearchSpace, base: TunedBounds) -> Result<(), FieldError
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nearest_action_has_the_nearest_value_of_each_bound() {
+        let (space, default) = (table_i().unwrap(), TunedBounds::default());
+        assert_eq!(nearest_action(&space, default).ok(), action_of(&space, default, default));
+        let between = TunedBounds { a1: 17.5, a2: 86.0, ..default };
+        let nearest = nearest_action(&space, between).unwrap();
+        assert_eq!(bounds_of(&space, default, nearest).unwrap(), TunedBounds { a1: 15.0, a2: 90.0, ..default });
+    }
 
     #[test]
     fn table_i_has_the_published_number_of_actions() {

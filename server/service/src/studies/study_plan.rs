@@ -9,7 +9,7 @@ use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
 use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState, WarmStartFrom};
 use gaitwright_store::{
     Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
     studies, subjects,
@@ -78,6 +78,9 @@ pub struct NewStudy {
     /// Defaults to the `repeats` setting of the learner. Has no effect if scripts evaluate the trials.
     #[serde(default)]
     pub repeat_results: Option<bool>,
+    /// The gait from which trials are warm-started.
+    #[serde(default = "incumbent")]
+    pub warm_start_from: WarmStartFrom,
     /// Number of trials that run in parallel.
     #[serde(default = "one")]
     pub parallel_trials: u32,
@@ -103,6 +106,9 @@ fn automatic() -> FeedbackMode {
 }
 fn optimizer() -> Evaluation {
     Evaluation::Optimizer
+}
+fn incumbent() -> WarmStartFrom {
+    WarmStartFrom::Incumbent
 }
 fn fifteen() -> u32 {
     15
@@ -134,6 +140,7 @@ impl NewStudy {
             solve_seconds_budget: None,
             unchanged_limit: None,
             repeat_results: None,
+            warm_start_from: incumbent(),
             parallel_trials: one(),
             priority: 0,
             seed: one_seed(),
@@ -163,6 +170,7 @@ impl NewStudy {
             solve_seconds_budget: plan.solve_seconds_budget,
             unchanged_limit: plan.unchanged_limit,
             repeat_results: Some(plan.repeat_results),
+            warm_start_from: plan.warm_start_from,
             parallel_trials: plan.parallel_trials,
             priority: plan.priority,
             seed: plan.seed,
@@ -317,6 +325,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
         solve_seconds_budget: new.solve_seconds_budget,
         unchanged_limit: new.unchanged_limit,
         repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
+        warm_start_from: new.warm_start_from,
         parallel_trials: new.parallel_trials,
         priority: new.priority,
         seed: new.seed,

@@ -10,6 +10,7 @@ use gait_learner::{LearnerError, Posterior, ProposalReason, propose, propose_out
 use gait_optimizer::ModelError;
 use gaitwright_compute::OnPool;
 use gaitwright_store::TrialId;
+use gaitwright_store::studies::WarmStartFrom;
 use gaitwright_store::trials::{NewTrial, TrialState};
 use thiserror::Error;
 
@@ -38,6 +39,9 @@ impl ChoiceError {
 pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
     let plan = &snapshot.study.plan;
     let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);
+    if plan.warm_start_from == WarmStartFrom::Root && snapshot.trials.is_empty() {
+        return root(snapshot);
+    }
     let log = snapshot.log();
     let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
     let barred = snapshot.barred_without_result();
@@ -53,11 +57,46 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> R
         action: search_space::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
         reason: reason_in_words(proposal.reason),
         best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
-        warm_started_from: best_converged(snapshot, belief)?,
+        warm_started_from: warm_start_of_next(snapshot, belief)?,
     })
 }
 
-/// The converged trial with the highest posterior mean, from whose gait the next solve starts. The earliest wins a tie.
+/// The trial of the root gait: the action nearest to the bounds that the study starts from.
+fn root(snapshot: &StudySnapshot) -> Result<NewTrial, ChoiceError> {
+    let plan = &snapshot.study.plan;
+    let action_index = search_space::nearest_action(&plan.search_space, plan.base_bounds)?;
+    Ok(NewTrial {
+        number: 1,
+        action_index,
+        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
+        reason: "nearest to the default bounds: its gait is the root of all others".to_owned(),
+        best_before: None,
+        warm_started_from: None,
+    })
+}
+
+/// The trial from whose gait the next solve starts.
+///
+/// # Errors
+/// When a trial's action is not in the search space.
+pub fn warm_start_of_next(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    match snapshot.study.plan.warm_start_from {
+        WarmStartFrom::Incumbent => best_converged(snapshot, belief),
+        WarmStartFrom::Root => Ok(root_trial(snapshot)),
+    }
+}
+
+/// The first converged trial.
+fn root_trial(snapshot: &StudySnapshot) -> Option<TrialId> {
+    snapshot.trials.iter().find(|trial| trial.state == TrialState::Converged).map(|trial| trial.id)
+}
+
+/// Whether a study has to wait for its root gait before the next trial.
+pub fn awaits_root(snapshot: &StudySnapshot) -> bool {
+    snapshot.study.plan.warm_start_from == WarmStartFrom::Root && root_trial(snapshot).is_none() && snapshot.open() > 0
+}
+
+/// The converged trial with the highest posterior mean. The earliest wins a tie.
 ///
 /// # Errors
 /// When a trial's action is not in the search space.

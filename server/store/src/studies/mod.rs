@@ -8,7 +8,7 @@ pub use lists::{
     StudyFilter, active, awaiting_raters, ended_before, is_named, of_subject, of_subject_with_safety_reports, open_of,
     page, tags, waiting_for_people, with_safety_reports,
 };
-pub use plan::{Evaluation, FeedbackMode, StudyPlan};
+pub use plan::{Evaluation, FeedbackMode, StudyPlan, WarmStartFrom};
 pub use state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
@@ -60,7 +60,7 @@ pub async fn insert(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
          solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
          seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at, \
-         height_m, body_mass_kg, repeat_results) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         height_m, body_mass_kg, repeat_results, warm_start_from) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(&plan.name)
@@ -88,6 +88,7 @@ pub async fn insert(
     .bind(plan.body.height_m)
     .bind(plan.body.body_mass_kg)
     .bind(plan.repeat_results)
+    .bind(plan.warm_start_from.as_str())
     .execute(db)
     .await?;
     Ok(Study {
@@ -209,6 +210,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             solve_seconds_budget: row.try_get("solve_seconds_budget")?,
             unchanged_limit: row.try_get("unchanged_limit")?,
             repeat_results: row.try_get("repeat_results")?,
+            warm_start_from: row.try_get::<&str, _>("warm_start_from")?.parse()?,
             parallel_trials: row.try_get("parallel_trials")?,
             priority: row.try_get("priority")?,
             seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),

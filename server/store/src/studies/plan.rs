@@ -71,6 +71,37 @@ impl FromStr for Evaluation {
     }
 }
 
+/// The gait from which a trial is warm-started: `incumbent`, the best gait so far, as in the published method; `root`, the
+/// first gait of the study, which has the default bounds, so that the gait of an action does not depend on other trials.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WarmStartFrom {
+    /// The converged gait with the highest posterior mean.
+    Incumbent,
+    /// The first converged gait of the study.
+    Root,
+}
+
+impl WarmStartFrom {
+    /// The name in the record and in REST.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Incumbent => "incumbent",
+            Self::Root => "root",
+        }
+    }
+}
+
+impl FromStr for WarmStartFrom {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Incumbent, Self::Root]
+            .into_iter()
+            .find(|from| from.as_str() == text)
+            .ok_or_else(|| StoreError::unknown_value("warm start", text))
+    }
+}
+
 /// Set-up of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyPlan {
@@ -109,6 +140,8 @@ pub struct StudyPlan {
     pub unchanged_limit: Option<u32>,
     /// Whether a trial may repeat an action whose gait another trial has already found, as in the published method.
     pub repeat_results: bool,
+    /// The gait from which trials are warm-started.
+    pub warm_start_from: WarmStartFrom,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     pub parallel_trials: u32,
     /// Priority, -10 to 10. Higher values run first.

@@ -71,7 +71,7 @@ class StudiesMethods(Transport):
 
         Fields: subject_id; optionally base_bounds, device_id, evaluation, feedback_mode, gait_settings, learner,
         muscles, name, parallel_trials, priority, reference_gait_id, repeat_results, restricted, search_space, seed,
-        solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit.
+        solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit, warm_start_from.
         """
         return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 

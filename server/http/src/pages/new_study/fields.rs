@@ -5,7 +5,7 @@ use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::{LocalOptimumChoice, TunedBounds};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::StudyId;
-use gaitwright_store::studies::{Study, StudyPlan};
+use gaitwright_store::studies::{Study, StudyPlan, WarmStartFrom};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -43,6 +43,9 @@ pub(crate) struct NewStudyFields {
     /// Present when ticked.
     #[serde(default)]
     pub(super) repeat_results: Option<String>,
+    /// Present when ticked.
+    #[serde(default)]
+    pub(super) warm_start_from_root: Option<String>,
     #[serde(default)]
     pub(super) nearest_within_percent: String,
     /// Whether bounds were relaxed in a clone, so that the table of bounds has to be shown.
@@ -78,6 +81,7 @@ impl Default for NewStudyFields {
             parallel_trials: text("1"),
             seed: text("1"),
             repeat_results: None,
+            warm_start_from_root: None,
             nearest_within_percent: String::new(),
             relaxed: false,
             space: BTreeMap::new(),
@@ -109,6 +113,7 @@ impl NewStudyFields {
             parallel_trials: plan.parallel_trials.to_string(),
             seed: plan.seed.to_string(),
             repeat_results: ticked(plan.repeat_results),
+            warm_start_from_root: ticked(plan.warm_start_from == WarmStartFrom::Root),
             nearest_within_percent: match plan.solve_options.local_optimum_choice {
                 LocalOptimumChoice::NearestToReference { within_percent } => within_percent.to_string(),
                 LocalOptimumChoice::LowestObjective => String::new(),

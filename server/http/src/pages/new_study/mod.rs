@@ -120,7 +120,7 @@ impl NewStudyPage {
                 fields.clone();
             [learner, unchanged_limit, parallel_trials, seed, nearest_within_percent]
         };
-        fields(typed) != fields(&default) || typed.repeat_results.is_some()
+        fields(typed) != fields(&default) || typed.repeat_results.is_some() || typed.warm_start_from_root.is_some()
     }
 
     /// Measured solve times, with and without muscles.

@@ -9,7 +9,7 @@ use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
-use gaitwright_store::studies::{self, FeedbackMode, Study, StudyPlan};
+use gaitwright_store::studies::{self, FeedbackMode, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, SubjectId, Writer, consents};
 use std::str::FromStr;
 
@@ -160,6 +160,11 @@ fn study_of(
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
         seed: number("seed", &fields.seed, &format!("0 to {}", study_plan::LARGEST_SEED))?,
         repeat_results: Some(fields.repeat_results.is_some()),
+        warm_start_from: if fields.warm_start_from_root.is_some() {
+            WarmStartFrom::Root
+        } else {
+            WarmStartFrom::Incumbent
+        },
         restricted: fields.restricted.is_some(),
         subject_id: subject,
         start: true,
