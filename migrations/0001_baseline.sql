@@ -565,7 +565,7 @@ begin select raise(abort, 'the subject withdrew consent'); end;
 create table safety_reviews (
     id         text primary key not null,
     trial_id   text not null references trials (id),
-    decision   text not null constraint safety_reviews_decision check (decision in ('walkable', 'unsafe')),
+    decision   text not null constraint safety_reviews_decision check (decision in ('cleared', 'unsafe')),
     author     text not null constraint safety_reviews_author_length check (length(author) between 1 and 80),
     reason     text not null constraint safety_reviews_reason_length check (length(reason) between 1 and 2000),
     created_at text not null

@@ -1,7 +1,7 @@
 //! A person who answers the comparisons of a study.
 
 use crate::service::Service;
-use gaitwright_service::studies::comparison::open_question;
+use gaitwright_service::studies::pending_comparison::open_question;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::{StudyId, TrialId};

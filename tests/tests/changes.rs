@@ -137,7 +137,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     scene.one(done, "post /trials/{id}/safety-reports", &report, json!({"note": "stumbled"})).await;
     let again = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "unsafe_both"});
     service.post(&format!("{api}/studies/{finished}/assessments"), &again).await;
-    for (trial, decision) in [(&trials[0], "walkable"), (&trials[1], "unsafe"), (&trials[1], "walkable")] {
+    for (trial, decision) in [(&trials[0], "cleared"), (&trials[1], "unsafe"), (&trials[1], "cleared")] {
         let review = format!("{api}/trials/{}/safety-reviews", trial.id);
         let decision = json!({"decision": decision, "reason": "looked at the video"});
         scene.one(done, "post /trials/{id}/safety-reviews", &review, decision).await;

@@ -23,7 +23,7 @@ async fn report_after_a_review_applies_although_the_clock_was_set_back() {
     let report = format!("/api/v1/trials/{trial}/safety-reports");
     let review = format!("/api/v1/trials/{trial}/safety-reviews");
     let controller = format!("/api/v1/trials/{trial}/controller.json");
-    let walkable = json!({"decision": "walkable", "reason": "seen again"});
+    let walkable = json!({"decision": "cleared", "reason": "seen again"});
     set_machine_clock(3600);
     assert_eq!(service.post(&report, &json!({})).await.status, StatusCode::CREATED);
     assert_eq!(service.post(&review, &walkable).await.status, StatusCode::CREATED);

@@ -38,7 +38,7 @@ fn names(trials: &[TrialId]) -> BTreeSet<String> {
 }
 
 async fn clear(service: &Service, gait: &str) {
-    let review = json!({"decision": "walkable", "reason": "seen again"});
+    let review = json!({"decision": "cleared", "reason": "seen again"});
     let cleared = service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await;
     assert_eq!(cleared.status, StatusCode::CREATED, "{}", cleared.text);
 }
@@ -98,7 +98,7 @@ async fn repeated_report_counts_once_until_staff_clear_the_gait() {
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
     assert_eq!(reports.as_array().unwrap().len(), 1, "{reports}");
     let gait = reports[0]["trial_id"].as_str().unwrap().to_owned();
-    let review = json!({"decision": "walkable", "reason": "seen again", "reports": [reports[0]["id"]]});
+    let review = json!({"decision": "cleared", "reason": "seen again", "reports": [reports[0]["id"]]});
     assert_eq!(
         service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status,
         StatusCode::CREATED

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_service::studies::comparison::open_question;
+use gaitwright_service::studies::pending_comparison::open_question;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::attempts;
 use gaitwright_store::studies::{FeedbackMode, StudyState};

@@ -5,8 +5,8 @@
 use axum::http::StatusCode;
 use gait_learner::{Agreement, SearchSpace, posterior};
 use gait_optimizer::{Gait, TunedBounds};
-use gaitwright::cli::archive_commands::prune;
 use gaitwright_service::studies::belief::{Belief, Beliefs};
+use gaitwright_service::studies::pruning::prune;
 use gaitwright_service::studies::same_motion::is_same_gait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;

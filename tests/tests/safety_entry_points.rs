@@ -53,7 +53,7 @@ async fn report(service: &Service, trial: &Trial) -> Value {
 
 async fn clear(service: &Service, trial: &Trial) -> StatusCode {
     let path = format!("/api/v1/trials/{}/safety-reviews", trial.id);
-    service.post(&path, &json!({"decision": "walkable", "reason": "seen again"})).await.status
+    service.post(&path, &json!({"decision": "cleared", "reason": "seen again"})).await.status
 }
 
 #[tokio::test]
@@ -82,7 +82,7 @@ async fn report_covers_every_trial_of_the_subject_with_the_same_motion() {
     let page = service.fetch(&format!("/trials/{}", best.id)).await.text;
     assert!(page.contains("Do not walk with it") && !page.contains("controller.json"), "{page}");
     // The report is reviewed in the study in which it was made.
-    let review = json!({"decision": "walkable", "reason": "r"});
+    let review = json!({"decision": "cleared", "reason": "r"});
     let there = service.post(&format!("/api/v1/trials/{}/safety-reviews", best.id), &review).await;
     assert!(there.status == StatusCode::CONFLICT && there.text.contains("Review the report there"), "{}", there.text);
     assert_eq!(clear(&service, &twin).await, StatusCode::CREATED);

@@ -70,7 +70,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     let heard = service.feedback(study).await;
     assert!(heard.iter().all(|row| row.retraction.is_none()));
 
-    let walkable = json!({"decision": "walkable", "reason": "the video was cut", "author": "K2"});
+    let walkable = json!({"decision": "cleared", "reason": "the video was cut", "author": "K2"});
     assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
     let said = safety_reports(&service, study).await;
     assert_eq!((&said[0]["in_force"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
@@ -117,7 +117,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     assert!(for_the_device.text.contains("It must not be walked until"), "{}", for_the_device.text);
     let seen = safety_reports(&service, study).await[0]["id"].clone();
     service.post(&remarks, &json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K3"})).await;
-    let late = decide(&service, best_id, &json!({"decision": "walkable", "reason": "r", "reports": [seen]})).await;
+    let late = decide(&service, best_id, &json!({"decision": "cleared", "reason": "r", "reports": [seen]})).await;
     assert_eq!(late.status, StatusCode::CONFLICT);
     assert!(late.text.contains("a safety report by K3 that is not among"), "{}", late.text);
 
@@ -136,11 +136,11 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     );
     let study_page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(study_page.contains("cleared for walking by K2: tried slowly"), "{study_page}");
-    let twice = decide(&service, best_id, &json!({"decision": "walkable", "reason": "r"})).await;
+    let twice = decide(&service, best_id, &json!({"decision": "cleared", "reason": "r"})).await;
     assert_eq!(twice.status, StatusCode::CONFLICT);
     for (decision, field) in [
-        (json!({"decision": "walkable", "reason": " "}), "reason"),
-        (json!({"decision": "walkable", "reason": "r", "author": ""}), "author"),
+        (json!({"decision": "cleared", "reason": " "}), "reason"),
+        (json!({"decision": "cleared", "reason": "r", "author": ""}), "author"),
     ] {
         let refused = decide(&service, best_id, &decision).await;
         assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!(field)));
@@ -162,7 +162,7 @@ async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
     assert_eq!(safety_reports(&service, study).await.len(), 2, "which of the two would tell the order");
     for gait in &gaits[..2] {
         let lifted =
-            decide(&service, gait, &json!({"decision": "walkable", "reason": "he stumbled over a cable"})).await;
+            decide(&service, gait, &json!({"decision": "cleared", "reason": "he stumbled over a cable"})).await;
         assert_eq!(lifted.status, StatusCode::CREATED, "{}", lifted.text);
     }
     let planned = service.post(&sessions, &plan).await;
@@ -181,7 +181,7 @@ async fn renumbered_rows_keep_the_order_of_reviews() {
     let (_folder, service, study) = started(FeedbackMode::Automatic, 4).await;
     let gait = converged(&service, study).await[0];
     service.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "stumbled"})).await;
-    for decision in ["unsafe", "walkable"] {
+    for decision in ["unsafe", "cleared"] {
         let reviewed = decide(&service, gait, &json!({"decision": decision, "reason": "seen"})).await;
         assert_eq!(reviewed.status, StatusCode::CREATED, "{}", reviewed.text);
     }
@@ -197,6 +197,6 @@ async fn renumbered_rows_keep_the_order_of_reviews() {
     let store = Store::open(&path).await.unwrap();
     let reviews = safety_reviews::of_study(&mut store.read().await.unwrap(), study).await.unwrap();
     let decisions: Vec<_> = reviews.iter().map(|review| review.decision).collect();
-    assert_eq!(decisions, [SafetyDecision::Unsafe, SafetyDecision::Walkable]);
+    assert_eq!(decisions, [SafetyDecision::Unsafe, SafetyDecision::Cleared]);
     store.close().await;
 }

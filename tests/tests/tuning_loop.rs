@@ -4,7 +4,7 @@
 
 use axum::http::StatusCode;
 use gait_learner::{LearnerSettings, Method, Partner};
-use gaitwright_service::studies::comparison::open_question;
+use gaitwright_service::studies::pending_comparison::open_question;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::workers::{Attempt, InProcess};

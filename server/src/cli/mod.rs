@@ -1,13 +1,14 @@
 //! The command line: parses arguments, runs a command, sets the exit code. Data goes to stdout, messages and logs to
 //! stderr.
 
-pub mod archive_commands;
+mod archive_commands;
 mod audit;
 mod backup;
 mod certify;
 mod command_end;
 mod config;
 mod convert;
+mod cores;
 mod database_file;
 mod doctor;
 mod emg;
@@ -15,16 +16,17 @@ mod flag_choices;
 mod flag_names;
 mod flag_numbers;
 mod gait_file;
+mod interruption;
 mod lineage;
 mod logging;
 mod multi_start_flags;
 mod out_file;
 mod output;
 mod problem_flags;
+mod prune;
 mod reference;
 mod reference_comparison;
 mod reproduce;
-mod scheduled_backups;
 mod serve;
 mod settings;
 mod simulate;
@@ -119,7 +121,7 @@ enum Command {
     /// Delete old trajectories, while the service is stopped.
     ///
     /// Results, answers and recommended gaits are kept. Expired idempotency keys, sessions and sign-in links are deleted.
-    Prune(archive_commands::Prune),
+    Prune(prune::Prune),
 }
 
 impl Command {

@@ -3,14 +3,11 @@
 use super::flag_names::of_flags;
 use super::flag_numbers::{iterations, number};
 use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
-use super::output::tell;
-use super::serve::interrupted;
 use super::subject_flags::{SubjectFlags, Switch};
 use clap::Args;
 use gait_optimizer::NlpSettings;
 use gait_optimizer::{
-    CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherLocalOptimum, ReferenceGait, SolveOptions, SolveOutcome,
-    TunedBounds,
+    Device, GaitProblem, GaitSettings, Mesh, OtherLocalOptimum, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds,
 };
 use gaitwright_service::error::Error;
 use gaitwright_service::json_document;
@@ -206,18 +203,6 @@ pub(super) fn read_document<T: DeserializeOwned>(
 ) -> Result<T, Error> {
     let read = json_document::read(read(path)?.as_bytes()).and_then(|read| check(&read).map(|()| read));
     read.map_err(|e| Error::Malformed(format!("{} is not {what}: {e}", path.display())))
-}
-
-/// A token that the first Ctrl-C cancels.
-pub(super) fn cancelled_by_signal() -> CancelToken {
-    let token = CancelToken::new();
-    let (on_signal, interrupted) = (token.clone(), interrupted());
-    tokio::spawn(async move {
-        interrupted.await;
-        tell("stopping");
-        on_signal.cancel();
-    });
-    token
 }
 
 fn parse_mesh(text: &str) -> Result<Mesh, String> {

@@ -1,7 +1,8 @@
 //! `gaitwright serve`: starts the service, and stops it on Ctrl-C or SIGTERM.
 
+use super::cores::cores_or;
+use super::interruption::interrupted;
 use super::output::tell;
-use super::scheduled_backups::ClaimedPlan;
 use super::settings::{Flags, Settings};
 #[cfg(feature = "tls")]
 use super::tls;
@@ -13,6 +14,7 @@ use gaitwright_http::{AccessState, AppState, Hosts, is_loopback_name, router};
 use gaitwright_service::access::user_administration;
 use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
+use gaitwright_service::scheduled_backups::ClaimedPlan;
 use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::retention;
 use gaitwright_service::studies::scheduler::Scheduler;
@@ -172,38 +174,6 @@ impl Serve {
 /// Closes connections that send no request.
 fn cut_off_silence(http: &mut Builder<TokioExecutor>) {
     http.http1().timer(TokioTimer::new()).header_read_timeout(SILENCE);
-}
-
-/// The given number, or the number of cores.
-pub(super) fn cores_or(given: Option<usize>) -> usize {
-    given.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
-}
-
-/// Waits for Ctrl-C or SIGTERM. From this call on, before the future is polled, these signals no longer end the
-/// process.
-#[cfg(unix)]
-pub(super) fn interrupted() -> impl Future<Output = ()> + use<> {
-    use tokio::signal::unix::{SignalKind, signal};
-    let signals = [SignalKind::interrupt(), SignalKind::terminate()].map(signal);
-    async move {
-        if let [Ok(mut interrupt), Ok(mut terminate)] = signals {
-            tokio::select! {
-                _ = interrupt.recv() => {}
-                _ = terminate.recv() => {}
-            }
-        } else {
-            // Without signal handlers the process is killed, which the record survives.
-            std::future::pending::<()>().await;
-        }
-    }
-}
-
-/// Ctrl-C.
-#[cfg(not(unix))]
-pub(super) async fn interrupted() {
-    if tokio::signal::ctrl_c().await.is_err() {
-        std::future::pending::<()>().await;
-    }
 }
 
 /// Runs the housekeeping tasks until the scheduler stops: deletes expired data and makes backups. Failures are logged

@@ -1,14 +1,15 @@
 //! `gaitwright solve`: optimises one gait.
 
 use super::command_end::CommandEnd;
+use super::cores::cores_or;
 use super::flag_numbers::local_optimum;
+use super::interruption::cancelled_by_signal;
 use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::{ProblemFlags, cancelled_by_signal, read_document};
+use super::problem_flags::{ProblemFlags, read_document};
 use super::reference_comparison;
-use super::serve::cores_or;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};

@@ -2,11 +2,12 @@
 //! rows.
 
 use super::command_end::CommandEnd;
+use super::cores::cores_or;
 use super::flag_numbers::workers;
+use super::interruption::cancelled_by_signal;
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::{ProblemFlags, cancelled_by_signal, read};
-use super::serve::cores_or;
+use super::problem_flags::{ProblemFlags, read};
 use super::solve::status_word;
 use clap::Args;
 use gait_optimizer::{

@@ -1,12 +1,12 @@
 //! `gaitwright tune`: runs an unattended study.
 
 use super::command_end::CommandEnd;
+use super::cores::cores_or;
 use super::flag_choices::{WARM_STARTS, one_of};
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
 use super::problem_flags::ProblemFiles;
-use super::serve::cores_or;
 use super::settings::{AnchoredFlags, Settings};
 use super::subject_flags::{SubjectFlags, Switch};
 use super::unattended::{self, Lines, action_line};

@@ -1,7 +1,7 @@
 //! Runs an unattended study from the command line: finds or creates it, shows progress, certifies its best gait.
 
+use super::interruption::interrupted;
 use super::output::{data, tell};
-use super::serve::interrupted;
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::belief::Beliefs;

@@ -1,8 +1,9 @@
 //! `gaitwright worker`: runs solves for a service on another machine.
 
-use super::flag_numbers::workers;
 #[cfg(feature = "nats")]
-use super::serve::{cores_or, interrupted};
+use super::cores::cores_or;
+use super::flag_numbers::workers;
+use super::interruption::interrupted;
 use super::settings::{Flags, Settings};
 use clap::Args;
 use gaitwright_service::error::Error;

@@ -7,12 +7,12 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Decision of a safety review: `walkable`, the gait is cleared for walking; `unsafe`, it remains marked as unsafe.
+/// Decision of a safety review: `cleared`, somebody may walk with the gait; `unsafe`, it remains marked as unsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SafetyDecision {
     /// The gait is cleared for walking.
-    Walkable,
+    Cleared,
     /// The gait remains marked as unsafe.
     Unsafe,
 }
@@ -21,7 +21,7 @@ impl SafetyDecision {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Walkable => "walkable",
+            Self::Cleared => "cleared",
             Self::Unsafe => "unsafe",
         }
     }
@@ -30,7 +30,7 @@ impl SafetyDecision {
 impl FromStr for SafetyDecision {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Walkable, Self::Unsafe]
+        [Self::Cleared, Self::Unsafe]
             .into_iter()
             .find(|decision| decision.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("decision of a safety review", text))

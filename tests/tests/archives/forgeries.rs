@@ -358,7 +358,7 @@ pub(super) const MORE: [Forgery; 9] = [
             r.0.push((
                 "safety_reviews".to_owned(),
                 json!({
-                    "id": review, "trial_id": trial, "decision": "walkable",
+                    "id": review, "trial_id": trial, "decision": "cleared",
                     "author": "K", "reason": "r", "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));
@@ -391,7 +391,7 @@ pub(super) const MORE: [Forgery; 9] = [
                 "safety_reviews".to_owned(),
                 json!({
                     "id": "01900000-0000-7000-8000-000000000001", "trial_id": "01900000-0000-7000-8000-000000000002",
-                    "decision": "walkable", "author": "K", "reason": "r",
+                    "decision": "cleared", "author": "K", "reason": "r",
                     "created_at": "2026-01-01T00:00:00.000Z"
                 }),
             ));

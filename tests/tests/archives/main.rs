@@ -49,7 +49,7 @@ async fn review_made_with_a_fast_clock_does_not_cover_later_reports() {
     let (folder, service, study, _) = study().await;
     let listed = format!("/api/v1/studies/{study}/safety-reports");
     let gait = service.fetch(&listed).await.items()[0]["trial_id"].as_str().unwrap().to_owned();
-    let review = json!({"decision": "walkable", "reason": "seen again"});
+    let review = json!({"decision": "cleared", "reason": "seen again"});
     assert_eq!(
         service.post(&format!("/api/v1/trials/{gait}/safety-reviews"), &review).await.status,
         StatusCode::CREATED

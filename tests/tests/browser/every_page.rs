@@ -120,7 +120,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let lifted = converged[4].id;
     let remark = json!({"trial_a": lifted, "trial_b": converged[3].id, "answer": "unsafe_a", "author": "K1"});
     site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
-    let decision = json!({"decision": "walkable", "author": "K2", "reason": "walked slowly, with a harness"});
+    let decision = json!({"decision": "cleared", "author": "K2", "reason": "walked slowly, with a harness"});
     site.service.post(&format!("/api/v1/trials/{lifted}/safety-reviews"), &decision).await;
     people(site).await;
     let (script, told) = by_script(site).await;

@@ -132,8 +132,8 @@ Right = Literal["read", "run", "answer", "rate", "device", "administer"]
 # and records walks and answers in lab sessions.
 Role = Literal["admin", "clinician", "rater"]
 
-# Decision of a safety review: `walkable`, the gait is cleared for walking; `unsafe`, it remains marked as unsafe.
-SafetyDecision = Literal["walkable", "unsafe"]
+# Decision of a safety review: `cleared`, somebody may walk with the gait; `unsafe`, it remains marked as unsafe.
+SafetyDecision = Literal["cleared", "unsafe"]
 
 # Identifier of a safety report.
 SafetyReportId = str

@@ -9,7 +9,6 @@ mod audit;
 mod backups;
 mod blind;
 mod certificates;
-mod comparison;
 mod devices;
 mod events;
 mod execution_reports;
@@ -31,6 +30,7 @@ mod safety_reports;
 mod sensitivities;
 mod sessions;
 mod studies;
+mod study_comparison;
 mod subjects;
 mod suggestions;
 mod tokens;
@@ -65,7 +65,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(studies::stop))
         .routes(routes!(studies::extend))
         .routes(routes!(studies::fork))
-        .routes(routes!(comparison::get))
+        .routes(routes!(study_comparison::get))
         .routes(routes!(trials::of_study))
         .routes(routes!(trials::of_study_csv))
         .routes(routes!(recommendation::of_study))

@@ -23,7 +23,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::answer;
-use gaitwright_service::studies::comparison::{Question, open_question};
+use gaitwright_service::studies::pending_comparison::{Question, open_question};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::walkable;

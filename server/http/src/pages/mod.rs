@@ -31,10 +31,10 @@ mod reached_bounds;
 mod reference_gaits;
 mod safety_review;
 mod sensitivities;
-mod side_by_side;
 mod sign_in;
 mod simulated_walks;
 mod study;
+mod study_comparison;
 mod study_details;
 mod subject;
 mod subjects;
@@ -57,7 +57,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/new", get(new_study::get).post(new_study::post))
         .route("/studies/new/check", post(new_study::check))
         .route("/studies/sample", post(new_study::sample))
-        .route("/studies/compare", get(side_by_side::get))
+        .route("/studies/compare", get(study_comparison::get))
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
         .route("/studies/{id}/belief", get(belief::get))

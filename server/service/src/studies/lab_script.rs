@@ -4,8 +4,8 @@
 //! only if the study has not changed.
 
 use super::belief::Beliefs;
-use super::comparison::{by_gait_rmse, partners};
 use super::lifecycle;
+use super::pending_comparison::{by_gait_rmse, partners};
 use super::preference;
 use super::safety_reports::SafetyReports;
 use super::snapshot::StudySnapshot;

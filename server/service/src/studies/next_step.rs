@@ -1,8 +1,8 @@
 //! Decides what a study needs next (a trial, a question, the end), as a pure function of its snapshot.
 
 use super::belief::Beliefs;
-use super::comparison::{self, Question};
 use super::lifecycle::StudyTransition;
+use super::pending_comparison::{self, Question};
 use super::snapshot::StudySnapshot;
 use super::trial_choice;
 use crate::error::Error;
@@ -28,7 +28,7 @@ pub(super) enum PlanningStep {
 pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<PlanningStep, Error> {
     let study = &snapshot.study;
     if study.plan.feedback_mode == FeedbackMode::Human {
-        match (study.state, comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
+        match (study.state, pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
             (StudyState::Running, Question::Pair(_)) => {
                 return Ok(PlanningStep::Transition(StudyTransition::Ask, "A comparison needs an answer.".into()));
             }
@@ -95,7 +95,7 @@ fn all_known(snapshot: &StudySnapshot) -> String {
 
 /// The trials that would be proposed next, one for each possible answer to the pending comparison.
 pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
-    let question = comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
+    let question = pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
     let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
     let mut likely: Vec<NewTrial> = Vec::new();
     for content in [

@@ -220,7 +220,7 @@ impl SafetyReports {
             let id = report.id();
             let of_it = |review: &&SafetyReview| review.trial_id == report.trial && review.reports.contains(&id);
             report.review = reviews.iter().rfind(of_it).cloned();
-            let is_cleared = report.review.as_ref().is_some_and(|review| review.decision == SafetyDecision::Walkable);
+            let is_cleared = report.review.as_ref().is_some_and(|review| review.decision == SafetyDecision::Cleared);
             if is_cleared { self.cleared.push(report) } else { self.in_force.push(report) }
         }
     }

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewSafetyReview)]
 pub struct Decision {
-    /// `walkable`: the gait is cleared for walking. `unsafe`: the gait remains marked as unsafe, and the review is
+    /// `cleared`: the gait is cleared for walking. `unsafe`: the gait remains marked as unsafe, and the review is
     /// complete.
     pub decision: SafetyDecision,
     /// Reason, 1 to 2000 characters.
@@ -74,7 +74,7 @@ pub async fn give(
     let decided: Vec<SafetyReportId> = in_force.iter().map(ReportedGait::id).collect();
     let new = NewSafetyReview { trial: id, reports: &decided, decision: taken, author, reason };
     let made = safety_reviews::insert(writer, new).await?;
-    if taken == SafetyDecision::Walkable {
+    if taken == SafetyDecision::Cleared {
         retract_derived_preferences(writer, &in_force, (author, reason)).await?;
     }
     let payload = json!({ "trial_id": id, "number": number, "decision": taken });

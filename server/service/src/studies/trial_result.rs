@@ -1,7 +1,7 @@
 //! Records the result of a trial exactly once: state, label, gait and the preferences that Gait RMSE implies, in one
 //! transaction.
 
-use super::comparison::{by_gait_rmse, partners};
+use super::pending_comparison::{by_gait_rmse, partners};
 use super::preference::{self, PROGRAM};
 use super::snapshot::StudySnapshot;
 use super::trial_state::{self, TrialEvent};

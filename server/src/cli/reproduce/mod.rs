@@ -1,8 +1,8 @@
 //! `gaitwright reproduce`: repeats the paper's comparison of gaits with and without muscles, unattended.
 
-mod comparison;
 mod report;
 mod statements;
+mod variants;
 
 use super::command_end::CommandEnd;
 use super::flag_numbers::{seed, trials, whole};
@@ -11,7 +11,6 @@ use super::output::{data, tell};
 use super::problem_flags::reference_of;
 use super::unattended::{self, Lines};
 use clap::{Args, ValueEnum};
-use comparison::ReproducedStudy;
 use gait_optimizer::{ReferenceGait, Subject};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Reach;
@@ -27,6 +26,7 @@ use gaitwright_store::studies::{self, Study, StudyFilter, StudyState};
 use gaitwright_store::{Store, commit, gaits, reference_gaits};
 use std::path::PathBuf;
 use std::sync::Arc;
+use variants::ReproducedStudy;
 
 /// Subjects from the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -95,17 +95,17 @@ impl Reproduce {
         };
         let texts = [
             report::html(&outcomes, self.trials)?,
-            comparison::iterations_csv(&outcomes),
-            comparison::studies_csv(&outcomes),
-            comparison::angles_csv(&outcomes),
+            variants::iterations_csv(&outcomes),
+            variants::studies_csv(&outcomes),
+            variants::angles_csv(&outcomes),
         ];
         for (file, text) in files.into_iter().zip(texts) {
             file.write(&text)?;
         }
-        for comparison in comparison::pair_comparisons(&outcomes) {
+        for comparison in variants::pair_comparisons(&outcomes) {
             data(&comparison.sentence())?;
         }
-        data(&comparison::conclusion(&comparison::pair_comparisons(&outcomes)))?;
+        data(&variants::conclusion(&variants::pair_comparisons(&outcomes)))?;
         tell(&format!("report: {}", self.folder.join("report.html").display()));
         for failure in &failures {
             tell(&format!("gaitwright: {failure}"));
@@ -221,7 +221,7 @@ async fn outcome(
         // `sum` of nothing is -0.0.
         solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).fold(0.0, |all, own| all + own),
         wall_seconds: wall_seconds(snapshot),
-        by_iteration: comparison::by_iteration(&milestones, history::results(snapshot).len()),
+        by_iteration: variants::by_iteration(&milestones, history::results(snapshot).len()),
         best_trial: best.map(|trial| trial.number),
         best_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),

@@ -1,7 +1,7 @@
 //! The report of `gaitwright reproduce`: one self-contained HTML file.
 
-use super::comparison::{PairComparison, ReproducedStudy, conclusion, pair_comparisons};
 use super::statements::{Statement, statements};
+use super::variants::{PairComparison, ReproducedStudy, conclusion, pair_comparisons};
 use askama::Template;
 use gait_optimizer::Gait;
 use gait_optimizer::gait::stick_figure::stick_figures;

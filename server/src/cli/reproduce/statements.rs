@@ -1,6 +1,6 @@
 //! The statements of the paper about its experiment, each with the result of this comparison.
 
-use super::comparison::{PairComparison, ReproducedStudy};
+use super::variants::{PairComparison, ReproducedStudy};
 use gaitwright_service::studies::certified_best::CertificateState;
 
 /// A statement of the paper.

@@ -1,11 +1,11 @@
 //! The settings with their types and ranges.
 
 use super::Settings;
-use crate::cli::scheduled_backups::BackupPlan;
 use gaitwright_http::connections::ConnectionLimits;
 use gaitwright_http::{NETWORKS, Network, Proxies, ProxyHeaders};
 use gaitwright_service::access::sign_in::SessionLimits;
 use gaitwright_service::error::Error;
+use gaitwright_service::scheduled_backups::BackupPlan;
 use gaitwright_store::{Store, StoreResult};
 use std::net::SocketAddr;
 use std::path::PathBuf;

@@ -6,7 +6,7 @@ use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
 use crate::studies::answer as answering;
-use crate::studies::comparison::open_question;
+use crate::studies::pending_comparison::open_question;
 use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;

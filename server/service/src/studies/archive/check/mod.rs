@@ -3,7 +3,7 @@
 
 mod answers;
 mod context;
-mod trial;
+mod trial_results;
 
 use super::file::refuse;
 use crate::access::Reach;
@@ -130,10 +130,10 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
             }
         }
         earlier.insert(trial.id);
-        at(&what, trial::figures(trial, &context.study.plan))?;
-        let has_gait = at(&what, trial::gait(db, pool, trial, &context).await)?;
+        at(&what, trial_results::figures(trial, &context.study.plan))?;
+        let has_gait = at(&what, trial_results::gait(db, pool, trial, &context).await)?;
         unchecked_rmse += u32::from(trial.gait_rmse_rad.is_some() && !has_gait);
-        at(&what, trial::check_results(db, trial).await)?;
+        at(&what, trial_results::check_results(db, trial).await)?;
     }
     if let Some(number) = at("jobs", archive::trial_unlike_its_job(db).await)? {
         return Err(refuse(format!("trial {number}: its state contradicts its job")));

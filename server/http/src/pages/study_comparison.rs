@@ -35,7 +35,7 @@ pub(super) struct StudiesQuery {
 }
 
 #[derive(Template)]
-#[template(path = "side_by_side.html")]
+#[template(path = "study_comparison.html")]
 struct SideBySide {
     offered: Vec<Study>,
     a: Option<StudyId>,
