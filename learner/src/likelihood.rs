@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::special_functions;
 
-/// Distribution function of the noise: maps a difference of utilities, divided by the noise scale, to a probability.
+/// Distribution function of the noise: maps a difference in utility, divided by the noise scale, to a probability.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Link {

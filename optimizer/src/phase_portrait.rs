@@ -109,8 +109,9 @@ impl JointRecording {
         }
         let times = table.times();
         if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S + ROUNDING_S) {
+            let gap_s = times[row + 1] - times[row];
             let reason =
-                format!("{:.3} s without a row; at most {LONGEST_GAP_S} s are allowed", times[row + 1] - times[row]);
+                format!("there is a gap of {gap_s:.3} s between rows; gaps may be at most {LONGEST_GAP_S} s long");
             return Err(table.malformed_row(row + 1, Some(1), reason));
         }
         let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);

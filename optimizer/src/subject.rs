@@ -30,7 +30,7 @@ impl Subject {
         Ok(subject)
     }
 
-    /// A subject of the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg).
+    /// A subject from the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg).
     ///
     /// # Errors
     /// [`ModelError::Unknown`] for any other number.
@@ -41,7 +41,7 @@ impl Subject {
             other => Err(ModelError::Unknown {
                 field: "subject".to_owned(),
                 value: other.to_string(),
-                known: "1 or 2, the subjects of the paper. For any other subject, give height and mass".to_owned(),
+                known: "1 or 2, the subjects from the paper. For any other subject, give height and mass".to_owned(),
             }),
         }
     }

@@ -268,7 +268,7 @@ fn malformed_emg_files_are_rejected_with_place_and_reason() {
             (
                 "time alone",
                 whole.lines().map(|l| l.split(',').next().unwrap()).collect::<Vec<_>>().join("\n"),
-                "emg.csv, line 1: the file has no channel, only the time",
+                "emg.csv, line 1: the file has a time column but no channels",
             ),
             (
                 "a channel twice",
@@ -322,7 +322,7 @@ fn malformed_emg_files_are_rejected_with_place_and_reason() {
         "emg.csv: column \"toe\" is missing; the columns are TA_L, BF_L, heel.",
         "emg.csv: column \"heel\" has no heel strike (a rise above 2); a stride needs two.",
         "heel_strikes_s is 9; it must be 0 to 0.999.",
-        "emg.csv: the heel strikes must increase.",
+        "emg.csv: the heel-strike times must increase.",
         "rate_hz is 5; it must be 100 to 20000.",
     ];
     for error in &refused {
@@ -355,7 +355,7 @@ fn malformed_joint_tables_are_rejected_with_place_and_reason() {
                     .map(|(_, line)| line)
                     .collect::<Vec<_>>()
                     .join("\n"),
-                "angles.csv, line 51, column 1: 0.210 s without a row; at most 0.05 s are allowed",
+                "angles.csv, line 51, column 1: there is a gap of 0.210 s between rows; gaps may be at most 0.05 s long",
             ),
         ],
     );

@@ -78,7 +78,7 @@ fn incomplete_recordings_are_rejected_with_their_place() {
     assert!(refusal(&csv().replace("knee_R_rad", "knee")).contains("no column is a joint angle; the columns are knee"));
     let gap: Vec<String> = csv().lines().filter(|line| !line.starts_with("0.5")).map(str::to_owned).collect();
     assert!(
-        refusal(&gap.join("\n")).contains("walk.csv, line 53, column 1: 0.110 s without a row"),
+        refusal(&gap.join("\n")).contains("walk.csv, line 53, column 1: there is a gap of 0.110 s between rows"),
         "0.49 s, then 0.6 s"
     );
     let short: Vec<String> = csv().lines().take(62).map(str::to_owned).collect();
@@ -132,5 +132,5 @@ fn two_seconds_at_twenty_hertz_are_sufficient() {
     let later = table("knee_R_rad", 400, 0.05, |time| vec![knee_at(time)]);
     assert!(JointRecording::from_csv("walk.csv", &later).is_ok());
     let slower = JointRecording::from_csv("walk.csv", &table("knee_R_rad", 41, 0.0501, |time| vec![knee_at(time)]));
-    assert!(slower.unwrap_err().to_string().contains("0.050 s without a row; at most 0.05 s are allowed"));
+    assert!(slower.unwrap_err().to_string().contains("a gap of 0.050 s between rows; gaps may be at most 0.05 s long"));
 }

@@ -238,7 +238,8 @@ fn exported_gait_is_imported_with_the_same_curves() {
         let within = recording.heel_strikes(&HeelStrikes::Kinematics).unwrap_err().to_string();
         assert!(
             within.ends_with(
-                "for a recording of exactly one stride, such as an exported gait, choose \"ends\": its first and last row."
+                "if the recording is exactly one stride, such as an exported gait, use its first and last rows as heel \
+                 strikes (ends)."
             ),
             "{within}"
         );

@@ -396,6 +396,8 @@ async fn corrected_height_and_mass_apply_to_new_studies_only() {
     assert!(page.contains("misread the scale") && page.contains("1.76 m"), "{page}");
     let trail = fetch("/api/v1/audit?limit=1".to_owned()).await;
     let audit = fetch("/audit?text=subject.correct".to_owned()).await.text;
+    let as_shown = fetch("/audit?text=subject%3A%20correct".to_owned()).await.text;
+    assert!(as_shown.contains("misread the scale") && as_shown.contains("<td>subject: correct</td>"), "{as_shown}");
     assert!(audit.contains("misread the scale") && trail.headers[header::CONTENT_TYPE] == "application/json");
     service.stop().await;
 }

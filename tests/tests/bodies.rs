@@ -33,6 +33,7 @@ async fn device_is_copied_from_another_and_errors_appear_at_their_field() {
     let before = service.fetch("/api/v1/devices").await.items();
     let path = format!("/devices/{}", before[0]["id"].as_str().unwrap());
     let page = service.fetch(&path).await.text;
+    assert!(!page.contains(">shank_mass_kg<"), "{page}");
     assert!(page.contains("name=\"shank_mass_kg\"") && page.contains("0.2 to 15") && page.contains("prosthetic shank"));
     for (field, value, expected) in [
         ("shank_mass_kg", "99", "is \u{201c}99\u{201d}; it must be 0.2 to 15."),

@@ -319,7 +319,7 @@ async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
         let sensitivities = service.fetch(&format!("/api/v1/trials/{trial}/sensitivities")).await;
         for refused in [walks, sensitivities] {
             assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
-            let reasons = ["was evaluated by a script", "is not converged"];
+            let reasons = ["was evaluated by a script", "the state \u{201c}not converged\u{201d}"];
             assert!(reasons.iter().any(|reason| refused.text.contains(reason)), "{}", refused.text);
         }
         let page = service.fetch(&format!("/trials/{trial}?sensitivities=true")).await.text;

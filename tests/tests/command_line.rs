@@ -36,7 +36,7 @@ fn impossible_height_is_refused_with_the_allowed_range() {
 
 #[test]
 fn unknown_subject_is_refused_with_the_known_ones() {
-    refused(&["tune", "--subject", "3"], "--subject is \"3\"; it must be 1 or 2, the subjects of the paper.");
+    refused(&["tune", "--subject", "3"], "--subject is \"3\"; it must be 1 or 2, the subjects from the paper.");
     refused(&["solve", "--subject", "0"], "it must be 1 or 2");
     refused(&["tune", "--subject", "1", "--height-m", "1.7", "--mass-kg", "70"], "cannot be used with");
 }

@@ -116,7 +116,7 @@ fn unprocessable_file_is_refused_and_writes_nothing() {
         (&["walk.csv", "--heel-strikes-s", "0.4,99"], "--heel-strikes-s is 99;"),
         (
             &["walk.csv", column[0], column[1], "--band-high-hz", "500"],
-            "--band-high-hz is 500; it must be 21 to 495, above band_low_hz.",
+            "--band-high-hz is 500; it must be 21 to 495 Hz, above the lower cut-off.",
         ),
         (&["walk.csv", column[0], column[1], "--order", "3"], "--order is \"3\"; it must be 2, 4, 6 or 8"),
         (&["walk.csv", column[0], column[1], "--channels", "TA"], "must be CHANNEL=COLUMN"),

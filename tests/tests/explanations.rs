@@ -263,7 +263,7 @@ async fn relaxation_within_the_search_space_is_tried_in_the_same_study() {
     explained(&service, trial.id).await;
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     assert!(page.contains("Try a5 = 0.02 m in this study"), "{page}");
-    assert!(page.contains("The study gets one more trial for it."), "{page}");
+    assert!(page.contains("This adds one trial to the study."), "{page}");
     assert_eq!(try_relaxation(&service, trial.id, 1).await.status, StatusCode::UNPROCESSABLE_ENTITY);
 
     // Two people press the button at the same time.

@@ -565,11 +565,15 @@ async fn ended_study_is_extended_on_its_page() {
     assert!(page.contains("min=\"6\"") && !page.contains("value=\"stop\""), "{page}");
     let path = format!("/studies/{study}/do");
     let same = service.post_text(&path, FORM, "transition=extend&trial_budget=5").await;
-    is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "trial_budget");
+    is_page(
+        &same,
+        StatusCode::UNPROCESSABLE_ENTITY,
+        "\u{201c}Total number of trials\u{201d} is 5; it must be 6 to 10000.",
+    );
     is_page(
         &service.post_text(&path, FORM, "transition=extend").await,
         StatusCode::UNPROCESSABLE_ENTITY,
-        "total number of trials",
+        "\u{201c}Total number of trials\u{201d} must be a whole number.",
     );
     assert_eq!(service.post_text(&path, FORM, "transition=extend&trial_budget=7").await.status, StatusCode::SEE_OTHER);
     service.wait_for_trials(study, 7).await;
@@ -625,7 +629,7 @@ async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
         "{STUDY}&subject=new&pseudonym=&height_m=173&body_mass_kg=65,7&trial_budget=0&seed=-1&values_a5=0,high"
     );
     let refused = service.post_text("/studies/new", FORM, &body).await;
-    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "6 fields need a correction");
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "6 fields need correcting");
     for says in [
         "\u{201c}Pseudonym\u{201d} must be",
         "Did you mean 1.73 m?",

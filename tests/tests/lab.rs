@@ -310,7 +310,7 @@ async fn lab_session_requires_two_converged_gaits_of_its_study() {
     let path = format!("/api/v1/studies/{study}/lab-sessions");
     for (two, expected) in [
         (foreign, "a trial of this study"),
-        (no_gait, "Only a converged gait can be walked"),
+        (no_gait, "Only a converged gait can be used for walking"),
         (gaits[0].id, "a different gait"),
     ] {
         let refused = service.post(&path, &json!({"trial_a": gaits[0].id, "trial_b": two})).await;
@@ -439,7 +439,7 @@ async fn emg_recordings_are_compared_with_normal_walking_and_can_be_reprocessed(
     }
     let missing = service.fetch(&format!("{api}/emg-results")).await;
     assert_eq!(missing.status, StatusCode::NOT_FOUND);
-    assert!(missing.json()["detail"].as_str().unwrap().starts_with("There is no EMG result of lab session "));
+    assert!(missing.json()["detail"].as_str().unwrap().starts_with("There is no EMG result for lab session "));
     assert_eq!(service.post(&format!("{api}/emg-results"), &json!({})).await.status, StatusCode::CONFLICT);
     for (walk, strength) in [(1, 9.0), (2, 1.5), (1, 1.0)] {
         let kept = service.post(&bring, &with_heel(walk, &electromyogram(strength))).await;

@@ -62,7 +62,7 @@ async fn rater_reports_a_gait_of_an_answered_pair() {
     assert_eq!(rate(&service, &token, "first").await.status, StatusCode::OK);
     assert_eq!(rate(&service, &token, "second").await.status, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/rate/pair/{token}")).await.text;
-    assert!(page.contains("A gait in this pair is unsafe"), "{page}");
+    assert!(page.contains("Report a gait in this pair as unsafe"), "{page}");
     let form = "answer=unsafe_second&note=knee+buckled";
     let sent = service.post_text(&format!("/rate/pair/{token}"), FORM, form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
@@ -192,7 +192,7 @@ async fn report_replaces_the_answer_of_a_blinded_session() {
     assert_eq!(lab.answer(&service, 1, "first").await, StatusCode::OK);
     assert_eq!(lab.answer(&service, 1, "second").await, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/lab/{}", lab.id)).await.text;
-    assert!(page.contains("A walk was unsafe"), "{page}");
+    assert!(page.contains("Report a walk as unsafe"), "{page}");
     let form = "number=2&answer=unsafe_second&note=fell";
     let sent = service.post_text(&format!("/lab/{}/answer", lab.id), FORM, form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
@@ -218,7 +218,7 @@ async fn second_report_of_a_session_is_also_recorded() {
         assert_eq!(closed(&service, lab.study).await, names(&lab.gaits), "{again}");
     }
     let reports = service.fetch(&format!("/api/v1/studies/{}/safety-reports", lab.study)).await.items().to_string();
-    assert!(reports.contains("the subject in lab session 1 (walk 3; blinded: either gait)"), "{reports}");
+    assert!(reports.contains("the subject in lab session 1 (walk 3; blinded, so either gait)"), "{reports}");
     service.stop().await;
 }
 
@@ -229,7 +229,7 @@ async fn unsafe_walk_is_reported_after_the_session_closed() {
     assert_eq!(lab.post(&service, "close", &json!({})).await.status, StatusCode::OK);
     assert_eq!(lab.answer(&service, 1, "first").await, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/lab/{}", lab.id)).await.text;
-    assert!(page.contains("A walk was unsafe"), "{page}");
+    assert!(page.contains("Report a walk as unsafe"), "{page}");
     assert_eq!(lab.answer(&service, 1, "unsafe_first").await, StatusCode::OK);
     assert_eq!(closed(&service, lab.study).await, names(&lab.gaits));
     service.stop().await;
@@ -251,7 +251,7 @@ async fn unsafe_walk_is_reported_after_answer_and_unblinding() {
 async fn unsafe_walk_with_a_fetched_file_is_reported_before_a_walk_is_recorded() {
     let (_folder, service) = service().await;
     let lab = Lab::planned(&service).await;
-    let offered = async || service.fetch(&format!("/lab/{}", lab.id)).await.text.contains("A walk was unsafe");
+    let offered = async || service.fetch(&format!("/lab/{}", lab.id)).await.text.contains("Report a walk as unsafe");
     assert!(!offered().await);
     let file = service.fetch(&format!("/api/v1/lab-sessions/{}/controller.json?walk=2", lab.id)).await;
     assert_eq!(file.status, StatusCode::OK, "{}", file.text);

@@ -202,7 +202,7 @@ async fn report_between_walks_ends_the_walks() {
     let better = service.post(&format!("{lab}/answers"), &json!({"number": 1, "answer": "first"})).await;
     assert_eq!(better.status, StatusCode::CONFLICT, "only a report is taken before the last walk");
     let page = service.fetch(&format!("/lab/{}", session["id"].as_str().unwrap())).await.text;
-    assert!(page.contains("A walk was unsafe"), "{page}");
+    assert!(page.contains("Report a walk as unsafe"), "{page}");
     let reported = service.post(&format!("{lab}/answers"), &unsafe_first).await;
     assert_eq!(reported.status, StatusCode::OK, "{}", reported.text);
     assert_eq!(reported.json()["walk"], Value::Null);

@@ -15,7 +15,7 @@ if (place) {
 
   const show = () => {
     const named = author.value.trim();
-    shown.textContent = named ? `${source.selectedOptions[0].text.toLowerCase()}, ${named}` : "name the person";
+    shown.textContent = named ? `${source.selectedOptions[0].text.toLowerCase()}, ${named}` : "(enter a name)";
   };
 
   if (kept && !user && !author.value) {

@@ -83,9 +83,7 @@ pub enum SensitivityError {
         expected: usize,
     },
     /// A parameter moves the value of a fixed variable.
-    #[error(
-        "no sensitivity with respect to a parameter that moves a fixed variable (variable {0}, whose bounds are equal)"
-    )]
+    #[error("sensitivities are undefined for a parameter that moves the fixed variable {0}, whose bounds are equal")]
     FixedVariable(usize),
     /// The point is no strict minimum of its active constraints, or these depend on each other.
     #[error(

@@ -55,7 +55,7 @@ impl EmgRecording {
         let channels: Vec<(String, Vec<f64>)> =
             table.names().iter().filter_map(|name| Some((name.clone(), table.find(name)?))).collect();
         if channels.is_empty() {
-            return Err(table.malformed_names("the file has no channel, only the time".to_owned()));
+            return Err(table.malformed_names("the file has a time column but no channels".to_owned()));
         }
         Ok(Self { start_s: table.times()[0], rate_hz, channels })
     }

@@ -39,7 +39,12 @@ impl EmgSettings {
         let (low, high) = ((0.9 * half).min(HIGHEST_LOW_HZ), (0.99 * half).min(HIGHEST_HZ));
         ModelError::check_range("emg.band_low_hz", self.band_low_hz, 1.0, low)?;
         let above_low = (self.band_low_hz + 1.0, high);
-        ModelError::check_related_range("emg.band_high_hz", self.band_high_hz, above_low, ("", "above band_low_hz"))?;
+        ModelError::check_related_range(
+            "emg.band_high_hz",
+            self.band_high_hz,
+            above_low,
+            ("Hz", "above the lower cut-off"),
+        )?;
         ModelError::check_range("emg.envelope_hz", self.envelope_hz, 0.5, low)?;
         ModelError::check_range("emg.order", self.order as f64, 2.0, 8.0)?;
         if self.order % 2 == 1 {

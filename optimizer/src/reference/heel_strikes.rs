@@ -4,9 +4,9 @@ use super::motion_recording::MotionRecording;
 use crate::model_error::ModelError;
 use std::ops::Range;
 
-/// The error if heel strikes cannot be detected by kinematics.
-const NO_KNEE: &str = "the recording has no right knee (column knee_R_rad), which the detection of heel strikes by kinematics needs; \
-                       give the times of the right heel strikes, or use a force under the right foot";
+/// The error if heel strikes cannot be found from joint angles.
+const NO_KNEE: &str = "the recording has no right knee angle (column knee_R_rad), which is needed to find heel strikes from joint \
+                       angles; give the times of the right heel strikes, or use a force under the right foot";
 /// Vertical force above which the foot is in contact, N.
 const CONTACT_FORCE_N: f64 = 20.0;
 /// Shortest time without contact before a heel strike, s.
@@ -72,7 +72,7 @@ pub(crate) fn given(what: &str, times: &[f64], first: f64, last: f64) -> Result<
         ModelError::check_range("heel_strikes_s", time, first, last)?;
     }
     if times.windows(2).any(|pair| pair[1] <= pair[0]) {
-        let reason = "the heel strikes must increase".to_owned();
+        let reason = "the heel-strike times must increase".to_owned();
         return Err(ModelError::Malformed { what: what.to_owned(), reason });
     }
     Ok(())
@@ -112,7 +112,8 @@ impl MotionRecording {
             });
             let hint = match how {
                 HeelStrikes::Kinematics => {
-                    "; for a recording of exactly one stride, such as an exported gait, choose \"ends\": its first and last row"
+                    "; if the recording is exactly one stride, such as an exported gait, use its first and last rows as heel \
+                     strikes (ends)"
                 }
                 _ => "",
             };

@@ -116,7 +116,7 @@ impl MotionRecording {
             Table::read(what, &lines[comments..], comments + 1, Separator::Comma, TimeColumn::Column("time_s"))?;
         let mut steps: Vec<String> =
             lines[..comments].iter().map(|line| line.trim_start_matches('#').trim().to_owned()).collect();
-        steps.push(format!("{what}: table in the walker's convention, {} rows", table.len()));
+        steps.push(format!("{what}: CSV table in Gaitwright's sign convention, {} rows", table.len()));
         let columns = REFERENCE_COLUMNS.map(|name| table.column(name));
         let mut angles = Vec::with_capacity(columns.len());
         for column in columns {

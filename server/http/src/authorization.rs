@@ -53,9 +53,8 @@ pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller
     let caller = extensions.get::<Caller>().ok_or_else(not_signed_in)?;
     match P::NEEDED {
         Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
-            "This requires the right {:?}, which {} does not have. Ask an administrator.",
-            needed.as_str(),
-            caller.name
+            "You do not have permission for this (right `{}`). Ask an administrator.",
+            needed.as_str()
         ))),
         _ => Ok(caller.clone()),
     }

@@ -87,8 +87,8 @@ fn client_address(extensions: &Extensions) -> ClientAddress {
 pub(super) async fn note(State(app): State<AppState>, mut request: Request, next: Next) -> Result<Response, Refusal> {
     let peer = client_address(request.extensions());
     if app.access.open && forwarded::is_forwarded(request.headers()) {
-        let reason = "A proxy forwarded this request, but the service runs without sign-in, for requests from this machine \
-                      only. Start it without --no-sign-in to use it through a proxy.";
+        let reason = "A proxy forwarded this request, but a service without sign-in accepts requests from this \
+                      machine only. Start it without --no-sign-in to use it through a proxy.";
         return Err(Error::Forbidden(reason.to_owned()).into());
     }
     let believed = app.proxies.believe(peer.ip(), request.headers())?;

@@ -37,6 +37,9 @@ const LABELS: &[(&str, &str)] = &[
     ("order", "Filter order"),
     ("walks", "Number of walks on each ground"),
     ("seed", "Seed"),
+    ("trial_budget", "Total number of trials"),
+    ("form", "Signed consent form"),
+    ("rater", "Rater"),
 ];
 
 /// The refusal of a field that the form does not have.

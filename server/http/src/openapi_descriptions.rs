@@ -49,7 +49,7 @@ const LEARNER: [Described; 21] = [
     ),
     ("LearnerSettings", "coactive_noise", "Noise scale of suggestions, in units of utility."),
     ("LearnerSettings", "tie_noise", "Noise scale of ties, in units of utility."),
-    ("LearnerSettings", "tie_width", "Difference of utilities below which two gaits feel equal."),
+    ("LearnerSettings", "tie_width", "Difference in utility below which two gaits feel equal."),
     (
         "LearnerSettings",
         "avoidance",

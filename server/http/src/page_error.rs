@@ -48,6 +48,9 @@ fn without_identifier(detail: &str) -> Option<String> {
     let what = start.strip_prefix("There is no ")?;
     // All identifiers are UUIDs.
     id.parse::<StudyId>().ok()?;
+    if let Some((missing, owner)) = what.split_once(" for ") {
+        return Some(format!("There is no {missing} for this {owner}."));
+    }
     Some(format!("There is no such {what}, or you have no access to it."))
 }
 
@@ -97,6 +100,8 @@ mod tests {
     fn page_names_no_identifier_of_a_missing_object() {
         let shown = without_identifier("There is no lab session 01890000-0000-7000-8000-000000000000.");
         assert_eq!(shown.as_deref(), Some("There is no such lab session, or you have no access to it."));
+        let shown = without_identifier("There is no gait for trial 01890000-0000-7000-8000-000000000000.");
+        assert_eq!(shown.as_deref(), Some("There is no gait for this trial."));
         assert_eq!(without_identifier("The address /nothing does not exist."), None);
     }
 }

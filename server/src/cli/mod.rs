@@ -88,7 +88,7 @@ enum Command {
     Certify(certify::Certify),
     /// Simulate walks with a gait on level and uneven ground, under laboratory controllers.
     Simulate(simulate::Simulate),
-    /// Convert a gait to a table, an OpenSim motion or a picture.
+    /// Convert a gait to a table, an OpenSim motion file or a picture.
     Convert(convert::Convert),
     /// Compute a reference gait from a recording of joint angles.
     Reference(reference::Reference),

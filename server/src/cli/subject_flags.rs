@@ -12,10 +12,10 @@ pub(super) struct SubjectFlags {
     /// Subject from the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg) (default: 1).
     #[arg(long, value_name = "NUMBER", value_parser = subject, allow_negative_numbers = true, conflicts_with_all = ["height_m", "mass_kg"])]
     subject: Option<u32>,
-    /// Body height, m; with --mass-kg, instead of --subject.
+    /// Body height, m. Give it with --mass-kg, in place of --subject.
     #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true, requires = "mass_kg")]
     height_m: Option<f64>,
-    /// Body mass, kg; with --height-m, instead of --subject.
+    /// Body mass, kg. Give it with --height-m, in place of --subject.
     #[arg(long, value_name = "KILOGRAMS", value_parser = number, allow_negative_numbers = true, requires = "height_m")]
     mass_kg: Option<f64>,
 }

@@ -189,7 +189,7 @@ impl Unpacking {
                 }
                 if matches!(row.text("state"), Some("running" | "waiting")) {
                     row.set("state", text("paused"));
-                    row.set("state_reason", text("imported while running"));
+                    row.set("state_reason", text("The study was running when it was exported."));
                 }
                 if let Some(parent) = row.text("forked_from") {
                     let found = sqlx::query("select 1 from studies where id = ?").bind(parent.to_owned());

@@ -14,11 +14,11 @@ use utoipa::ToSchema;
 pub enum AssessmentAnswer {
     /// The person cannot tell which gait is better.
     CannotTell,
-    /// Gait A must not be walked.
+    /// Gait A must not be used for walking.
     UnsafeA,
-    /// Gait B must not be walked.
+    /// Gait B must not be used for walking.
     UnsafeB,
-    /// Neither gait may be walked.
+    /// Neither gait may be used for walking.
     UnsafeBoth,
 }
 

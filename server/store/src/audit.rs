@@ -108,14 +108,16 @@ pub async fn append(db: &mut Connection, actor: &Actor, action: &str, object: &s
     Ok(())
 }
 
-/// At most `limit` rows before `before`, newest first: those that contain a text in actor, action, object or detail.
+/// At most `limit` rows before `before`, newest first: those that contain a text in actor, action, object or detail. The
+/// action is found in its own spelling (`lab_session.plan`) and in that of the page (`lab session: plan`).
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limit: u32) -> StoreResult<Vec<AuditRow>> {
     let rows = sqlx::query(
         "select * from audit where (?1 is null or seq < ?1)
-             and (?2 = '' or instr(lower(actor || ' ' || action || ' ' || object || ' ' || detail), lower(?2)) > 0)
+             and (?2 = '' or instr(lower(actor || ' ' || action || ' ' || replace(replace(action, '_', ' '), '.', ': ')
+                 || ' ' || object || ' ' || detail), lower(?2)) > 0)
          order by seq desc limit ?3",
     )
     .bind(before)

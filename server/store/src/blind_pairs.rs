@@ -53,11 +53,11 @@ pub enum Judgement {
     NoDifference,
     /// The person cannot tell.
     CannotTell,
-    /// The first gait must not be walked.
+    /// The first gait must not be used for walking.
     UnsafeFirst,
-    /// The second gait must not be walked.
+    /// The second gait must not be used for walking.
     UnsafeSecond,
-    /// Neither gait may be walked.
+    /// Neither gait may be used for walking.
     UnsafeBoth,
     /// Retracted by the service, because a gait was reported as unsafe in the meantime, or retracted by its author.
     Retracted,
@@ -112,7 +112,7 @@ impl Judgement {
         self == Self::CannotTell || self.is_about_safety()
     }
 
-    /// The gaits that must not be walked.
+    /// The gaits that must not be used for walking.
     pub fn unsafe_of(self, (first, second): (TrialId, TrialId)) -> Vec<TrialId> {
         match self {
             Self::UnsafeFirst => vec![first],

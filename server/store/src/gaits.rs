@@ -177,5 +177,5 @@ async fn column<T: DeserializeOwned>(
 }
 
 fn missing(trial: TrialId) -> StoreError {
-    StoreError::Missing { what: "gait of trial", id: trial.to_string() }
+    StoreError::Missing { what: "gait for trial", id: trial.to_string() }
 }

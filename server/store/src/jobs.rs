@@ -173,7 +173,7 @@ pub async fn lease_of(db: &mut Connection, trial: TrialId, attempt: u32) -> Stor
             .bind(trial)
             .fetch_optional(db)
             .await?
-            .ok_or_else(|| StoreError::Missing { what: "job of trial", id: trial.to_string() })?;
+            .ok_or_else(|| StoreError::Missing { what: "job for trial", id: trial.to_string() })?;
     Ok(Lease { job: row.try_get("id")?, trial, study: row.try_get("study_id")?, attempt })
 }
 

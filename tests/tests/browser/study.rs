@@ -122,10 +122,10 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
         site.service.fetch(&format!("/studies/{fresh}")).await.text
     };
     let long = told(8).await;
-    assert!(long.contains("No estimate of the time left yet: it needs 3 more solves."), "{long}");
+    assert!(long.contains("The time left can be estimated after 3 more solves."), "{long}");
     // An estimate that can never come is not announced.
     let short = told(2).await;
-    assert!(!short.contains("No estimate"), "{short}");
+    assert!(!short.contains("can be estimated"), "{short}");
     browser.close().await;
 }
 
@@ -288,7 +288,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     );
     // One legend for all charts of the marginals.
     assert_eq!((page.count("#marginals .legend.shared span").await, page.count("#marginals figcaption").await), (2, 0));
-    // Each dot leads to its trial.
+    // Each dot links to its trial.
     let results = site.service.trials(study).await.iter().filter(|trial| trial.state.is_result()).count();
     assert_eq!(page.count("#every-trial svg.parallel a").await, results);
     let dots = page.count("#maps svg.chart:not(.map) a circle.dot").await;

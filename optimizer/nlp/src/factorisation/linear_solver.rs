@@ -108,7 +108,7 @@ fn without_blocks(matrix: &KktMatrix, _: &NlpSettings) -> Result<Box<dyn KktSolv
 
 #[cfg(not(feature = "supernodal"))]
 fn not_built(order: usize) -> NlpError {
-    NlpError::Analysis { order, reason: "the feature supernodal of interior-point is off".to_owned() }
+    NlpError::Analysis { order, reason: "this build of interior-point lacks the feature `supernodal`".to_owned() }
 }
 
 /// By setting: the supernodal factorisation, the trusted one, or (auto) the supernodal one with the trusted one as

@@ -1,5 +1,5 @@
 //! The charts in which both legs are compared, as gait laboratories draw them: each leg over its own cycle, torques and
-//! powers per body mass, forces in body weights.
+//! powers normalised to body mass, forces in body weights.
 
 use super::cycle::{Cycle, Leg};
 use super::group::Group;
@@ -76,8 +76,8 @@ pub(super) fn torques(cycle: &Cycle<'_>, mass_kg: f64) -> Group {
         let torque = |joint: usize| move |p: &Point<'_>| -p.u[joint] / mass_kg;
         of_legs(cycle, Chart::new(JOINTS[place], CYCLE, "torque, N m/kg"), torque(place), torque(3 + place))
     };
-    let hint = "Internal torques per body mass of the subject: extension and plantarflexion are positive, the opposite of the angles \
-                and of the files. The prosthesis drives the right knee and ankle; the subject drives the other joints.";
+    let hint = "Internal torques, normalised to the subject's body mass. Extension and plantarflexion are positive, the opposite of the \
+                angles and of the files. The prosthesis drives the right knee and ankle; the subject drives the other joints.";
     Group::new("torques", "Joint torques", hint, (0..3).map(draw).collect())
 }
 
@@ -91,7 +91,8 @@ pub(super) fn powers(cycle: &Cycle<'_>, mass_kg: f64) -> Group {
         let chart = Chart::new(JOINTS[place], CYCLE, "power, W/kg");
         of_legs(cycle, chart, power(Side::Left, place), power(Side::Right, 3 + place))
     };
-    let hint = "Per body mass of the subject: a joint generates power above zero and absorbs it below.";
+    let hint =
+        "Normalised to the subject's body mass. A joint generates power above zero and absorbs power below zero.";
     Group::new("powers", "Joint powers", hint, (0..3).map(draw).collect())
 }
 

@@ -1362,7 +1362,7 @@ class LearnerSettings(TypedDict, total=False):
     start: Literal["random", "centre"]
     # Noise scale of ties, in units of utility.
     tie_noise: float
-    # Difference of utilities below which two gaits feel equal.
+    # Difference in utility below which two gaits feel equal.
     tie_width: float
 
 

@@ -36,6 +36,6 @@ def until(
             return now
         left = poll_s if timeout_s is None else begun + timeout_s - time.monotonic()
         if left <= 0:
-            raise TimeoutError(f"it did not end within {timeout_s} s")
+            raise TimeoutError(f"the job or study did not end within {timeout_s} s")
         last = now
         time.sleep(min(poll_s, left))

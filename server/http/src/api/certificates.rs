@@ -34,7 +34,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<Certificate>, Refusal> {
-    let missing = || Error::NotFound { what: "certificate of trial".to_owned(), id: id.to_string() };
+    let missing = || Error::NotFound { what: "certificate for trial".to_owned(), id: id.to_string() };
     let certificate = certificates::find(&mut *app.read().await?, id).await?.ok_or_else(missing)?;
     Ok(Json(certificate.into()))
 }

@@ -60,7 +60,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
 ) -> Result<Json<TrialExecutionReport>, Refusal> {
-    let missing = || Error::NotFound { what: "execution report of trial".to_owned(), id: id.to_string() };
+    let missing = || Error::NotFound { what: "execution report for trial".to_owned(), id: id.to_string() };
     let kept = execution::newest(&mut *app.read().await?, id).await?.ok_or_else(missing)?;
     Ok(Json(kept.into()))
 }

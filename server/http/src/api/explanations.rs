@@ -97,7 +97,7 @@ pub(super) async fn get(
         ExplanationState::Made(made) => Ok(Json(TrialExplanation::new(id, *made))),
         ExplanationState::Refused(reason) => Err(explanation::refusal(&trial, &reason).into()),
         ExplanationState::BeingMade | ExplanationState::Waiting | ExplanationState::NotAsked => {
-            Err(Error::NotFound { what: "explanation of trial".to_owned(), id: id.to_string() }.into())
+            Err(Error::NotFound { what: "explanation for trial".to_owned(), id: id.to_string() }.into())
         }
     }
 }

@@ -1,4 +1,4 @@
-//! REST: downloads of a trial: problem file, OpenSim motion, controller file.
+//! REST: downloads of a trial: problem file, OpenSim motion file, controller file.
 
 use crate::AppState;
 use crate::access_log::OnlyWhileWalkable;
@@ -58,7 +58,7 @@ pub(super) async fn problem(
     Ok(file("application/json", &format!("problem-trial-{number}.json"), text))
 }
 
-/// Download the gait as an OpenSim motion
+/// Download the gait as an OpenSim motion file
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.mot",

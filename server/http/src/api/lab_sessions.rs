@@ -250,7 +250,7 @@ pub(super) async fn session_progress(
 
 /// Record a walk
 ///
-/// Walks are recorded in order. A recorded walk cannot be undone.
+/// Walks are recorded in order. Recording a walk cannot be undone.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/walks",

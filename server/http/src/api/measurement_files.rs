@@ -226,7 +226,7 @@ pub(super) async fn result(
     Visible(id, _): Visible<LabSessionId, Read>,
 ) -> Result<Json<EmgView>, Refusal> {
     let found = lab::emg(app.store_mut(), id).await?;
-    let missing = || Error::NotFound { what: "EMG result of lab session".to_owned(), id: id.to_string() };
+    let missing = || Error::NotFound { what: "EMG result for lab session".to_owned(), id: id.to_string() };
     Ok(Json(found.ok_or_else(missing)?.into()))
 }
 

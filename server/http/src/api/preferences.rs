@@ -135,8 +135,8 @@ pub(super) struct CreatedPreference {
 
 /// Record a preference
 ///
-/// Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author has one
-/// answer to two gaits; to change it, retract it first.
+/// Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author can
+/// give only one answer per pair of gaits; to change an answer, retract it first.
 #[utoipa::path(
     post,
     path = "/studies/{id}/preferences",

@@ -89,7 +89,7 @@ pub(super) struct RelaxedTrialOffer {
     pub(super) bounds: String,
     /// Whether these values are looser than those of the relaxation.
     pub(super) is_looser: bool,
-    /// Whether the study gets one more trial for it.
+    /// Whether the relaxed trial adds one trial to the study.
     pub(super) extends: bool,
 }
 

@@ -71,7 +71,7 @@ struct GaitPage {
     phases: [(&'static str, &'static str); 4],
     /// Safety reports in force.
     unsafe_by: Vec<ReportedGait>,
-    /// Why the gait must not be walked, if the report is about another trial with the same motion.
+    /// Why the gait must not be used for walking, if the report is about another trial with the same motion.
     unsafe_elsewhere: Option<String>,
     /// Safety reports after which staff cleared the gait.
     cleared: Vec<ReportedGait>,

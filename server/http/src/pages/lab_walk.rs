@@ -113,7 +113,7 @@ pub(super) async fn record(
             if complete.as_deref() != Some("yes") {
                 return Err(Error::conflict(format!(
                     "Walk {walk} was not recorded. First tick the box to confirm that it is complete and \
-                     measured: a recorded walk cannot be undone."
+                     measured: recording a walk cannot be undone."
                 )));
             }
             lab::record_walk(&mut writer, &authorized.caller.actor, id, &walked).await?;

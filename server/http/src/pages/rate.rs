@@ -160,7 +160,7 @@ pub(super) async fn list(
         // Names of studies can reveal what is tuned, so raters see the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
-    // After an answer, and while there is no next pair, the page goes on with the same study.
+    // After an answer, and while there is no next pair, the page continues with the same study.
     let answered = saved.as_ref().filter(|_| is_answer);
     let undo = answered.and_then(|saved| undo_seconds(saved.at));
     let next = before.study.or(answered.filter(|_| undo.is_some()).map(|saved| saved.study));

@@ -13,7 +13,9 @@ use gaitwright_service::backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::job::JobState;
 use gaitwright_service::scheduled_backups::{Failure, ScheduledBackups};
+use gaitwright_service::studies::lifecycle;
 use gaitwright_store::backup::in_record_folder;
+use gaitwright_store::studies::StudyState;
 use gaitwright_store::totals::{self, Totals};
 use gaitwright_store::{SCHEMA_VERSION, commit, jobs, trials};
 use std::time::Duration;
@@ -72,12 +74,27 @@ impl SystemPage {
         format!("{:.1}", *bytes as f64 / 1e9)
     }
 
-    /// `3 finished, 1 running`.
-    fn by_state(counts: &[(String, i64)]) -> String {
+    /// `1 not started, 3 finished`.
+    fn studies_by_state(counts: &[(String, i64)]) -> String {
+        let shown = |known| lifecycle::in_words(known).to_owned();
+        Self::by_state(counts, |state| state.parse::<StudyState>().map_or_else(|_| words(state), shown))
+    }
+
+    /// `3 converged, 1 not converged`.
+    fn trials_by_state(counts: &[(String, i64)]) -> String {
+        Self::by_state(counts, words)
+    }
+
+    /// `3 done, 1 running`: the job of a running solve is leased.
+    fn solves_by_state(counts: &[(String, i64)]) -> String {
+        Self::by_state(counts, |state| if state == "leased" { "running".to_owned() } else { words(state) })
+    }
+
+    fn by_state(counts: &[(String, i64)], shown: impl Fn(&str) -> String) -> String {
         if counts.is_empty() {
             return "none".to_owned();
         }
-        counts.iter().map(|(state, count)| format!("{count} {}", words(state))).collect::<Vec<_>>().join(", ")
+        counts.iter().map(|(state, count)| format!("{count} {}", shown(state))).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -142,4 +159,18 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
         measured,
         may_administer,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SystemPage;
+
+    #[test]
+    fn states_are_shown_in_words() {
+        let counts = |states: &[&str]| states.iter().map(|state| ((*state).to_owned(), 1)).collect::<Vec<_>>();
+        assert_eq!(SystemPage::studies_by_state(&counts(&["draft", "finished"])), "1 not started, 1 finished");
+        assert_eq!(SystemPage::trials_by_state(&counts(&["not_converged"])), "1 not converged");
+        assert_eq!(SystemPage::solves_by_state(&counts(&["done", "leased"])), "1 done, 1 running");
+        assert_eq!(SystemPage::solves_by_state(&[]), "none");
+    }
 }

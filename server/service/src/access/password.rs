@@ -28,10 +28,10 @@ pub fn check(password: &str, name: &str) -> Result<(), Error> {
     }
     let known: Vec<&str> = name.split_whitespace().chain([name]).chain(LIKELY.iter().copied()).collect();
     if zxcvbn(password, &known).guesses_log10() < FEWEST_GUESSES {
-        let allowed = "hard to guess, for example four unrelated words. Your name, common words in any language, \
-                       well-known phrases, keyboard rows, dates, sequences such as 1234 and repetitions add \
-                       little strength";
-        return Err(FieldError::described("password", "easy to guess", allowed).into());
+        let message = "The new password is too easy to guess. Use, for example, four unrelated words. Names, common words \
+                       in any language, well-known phrases, keyboard rows, dates, sequences such as 1234 and \
+                       repetitions add little strength.";
+        return Err(FieldError::in_words("password", message).into());
     }
     Ok(())
 }

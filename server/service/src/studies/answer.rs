@@ -4,6 +4,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
+use crate::studies::trial_state::has_state;
 use crate::studies::walkable;
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::Judgement;
@@ -173,8 +174,7 @@ pub async fn retract(
 pub async fn comparable(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
     let trial = walkable::trial_of_study(db, study, field, id).await?;
     if trial.state != TrialState::Converged {
-        let allowed =
-            format!("a converged trial, but trial {} is {}", trial.number, trial.state.as_str().replace('_', " "));
+        let allowed = format!("a converged trial, but trial {} {}", trial.number, has_state(trial.state));
         return Err(Error::invalid(field, id.to_string(), &allowed));
     }
     Ok(trial)

@@ -1,4 +1,4 @@
-//! The built-in entries of a new record: the subjects of the paper, the device and the reference gaits.
+//! The built-in entries of a new record: the subjects from the paper, the device and the reference gaits.
 
 use crate::error::Error;
 use gait_optimizer as optimizer;
@@ -9,8 +9,8 @@ use gaitwright_store::{Connection, devices, reference_gaits, subjects};
 
 /// Pseudonyms of the paper's subjects.
 const PAPER: [(u32, &str, &str); 2] = [
-    (1, "paper-1", "First subject of the paper: female, 1.727 m, 65.7 kg."),
-    (2, "paper-2", "Second subject of the paper: male, 1.803 m, 75 kg."),
+    (1, "paper-1", "First subject from the paper: female, 1.727 m, 65.7 kg."),
+    (2, "paper-2", "Second subject from the paper: male, 1.803 m, 75 kg."),
 ];
 
 /// The built-in device of the record.

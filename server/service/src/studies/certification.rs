@@ -1,5 +1,6 @@
 //! Makes the certificate of one trial's gait and stores it.
 
+use super::trial_state::has_state;
 use crate::error::Error;
 use crate::workers::Certify;
 use gait_optimizer::Gait;
@@ -34,10 +35,10 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
         return Ok(Certification::Made(Box::new(certificate)));
     }
     if found.state != TrialState::Converged {
-        let state = found.state.as_str().replace('_', " ");
         return Err(Error::conflict(format!(
-            "Trial {} is {state}. Only a converged gait can be certified.",
-            found.number
+            "Trial {} {}. Only a converged gait can be certified.",
+            found.number,
+            has_state(found.state)
         )));
     }
     if found.script.is_some() {

@@ -1,6 +1,7 @@
 //! The execution report of one trial's gait: what it is of, its state, and its storage.
 
 use super::study_plan::LARGEST_SEED;
+use super::trial_state::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::execution::{ExecutionOptions, ExecutionReport};
@@ -102,8 +103,8 @@ pub(super) async fn gait_of(db: &mut Connection, id: TrialId) -> Result<Packed<G
 fn why_not(trial: &Trial) -> Option<String> {
     let number = trial.number;
     if trial.state != TrialState::Converged {
-        let state = trial.state.as_str().replace('_', " ");
-        return Some(format!("Trial {number} is {state}. Walks can be simulated with a converged gait only."));
+        let state = has_state(trial.state);
+        return Some(format!("Trial {number} {state}. Walks can be simulated only with a converged gait."));
     }
     let by_script = format!("Trial {number} was evaluated by a script, which gives no gait to walk with.");
     trial.script.is_some().then_some(by_script)

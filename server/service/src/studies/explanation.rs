@@ -1,6 +1,7 @@
 //! The infeasibility explanation of one trial: its state, requests for it, and its storage.
 
 use super::solve_input::{PackedInput, SolveInput};
+use super::trial_state::has_state;
 use crate::error::Error;
 use crate::workers::SolveToExplain;
 use gait_optimizer::explanation::Explanation;
@@ -165,9 +166,9 @@ async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, 
         )));
     }
     let Some(status) = trial.status.filter(|_| trial.state == TrialState::NotConverged) else {
-        let state = trial.state.as_str().replace('_', " ");
+        let state = has_state(trial.state);
         return Err(Error::conflict(format!(
-            "Trial {number} is {state}. Only a trial that did not converge can be explained."
+            "Trial {number} {state}. Only a trial that did not converge can be explained."
         )));
     };
     if !gaits::exists(db, trial.id).await? {

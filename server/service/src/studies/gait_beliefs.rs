@@ -18,7 +18,7 @@ pub struct GaitBelief {
     pub behind: Option<Prediction>,
 }
 
-/// Whether a difference of utilities, the larger less the smaller, can be told from none: it is larger than its standard
+/// Whether a difference in utility, the larger less the smaller, can be told from none: it is larger than its standard
 /// deviation, so that the order is right with a probability of at least 84 %.
 pub fn is_distinguishable(difference: &Prediction) -> bool {
     difference.mean > difference.standard_deviation

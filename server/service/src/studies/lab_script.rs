@@ -59,7 +59,8 @@ pub async fn suggest(
     let study = studies::get(&mut db, study).await?;
     if study.plan.evaluation != Evaluation::Script {
         return Err(Error::conflict(
-            "The service evaluates the trials of this study itself. Scripts need a study with evaluation \"script\".",
+            "The service evaluates the trials of this study itself. A script can evaluate trials only in a study whose \
+             `evaluation` is `script`.",
         ));
     }
     if let Some(open) = trials::open_of(&mut db, study.id, script).await? {

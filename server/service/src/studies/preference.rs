@@ -2,6 +2,7 @@
 //! ends here. A test fails if another module writes the table.
 
 use super::same_motion::is_same_gait;
+use super::trial_state::has_state;
 use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
 use crate::error::Error;
 use crate::printable;
@@ -93,8 +94,7 @@ async fn report_unsafe(writer: &mut Writer, statement: AttributedJudgement<'_>) 
 async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
     let trial = trial_of_study(db, study, field, id).await?;
     if trial.state != TrialState::Converged {
-        let allowed =
-            format!("a converged trial, but trial {} is {}", trial.number, trial.state.as_str().replace('_', " "));
+        let allowed = format!("a converged trial, but trial {} {}", trial.number, has_state(trial.state));
         return Err(Error::invalid(field, id.to_string(), &allowed));
     }
     Ok(trial)
@@ -200,7 +200,8 @@ pub(super) async fn suggest(
         grounds.admit(trial).map_err(|reason| refuse(format!("the bounds of a walkable gait. {reason}")))?;
         if is_same_gait(trial, over) {
             return Err(refuse(format!(
-                "the bounds of a different gait; trial {} already has these bounds, and its gait is that of the trial",
+                "the bounds of a different gait; trial {} already has these bounds, and its gait is the same as that of the \
+                 rated trial",
                 trial.number
             )));
         }

@@ -115,7 +115,7 @@ fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
         }
         StudyState::Running | StudyState::Finished => return Ok(()),
         StudyState::Draft => "The study has not started.",
-        StudyState::Waiting => "The study waits for an answer. Answer the comparison first.",
+        StudyState::Waiting => "The study is waiting for an answer. Answer the comparison first.",
         StudyState::Paused => "The study is paused. Resume it first.",
         StudyState::Stopped => "The study was stopped. Extend it first.",
     };
@@ -209,7 +209,7 @@ fn names(bounds: &Relaxation) -> String {
     bounds.iter().map(|(bound, _)| bound.as_str()).collect::<Vec<_>>().join(" and ")
 }
 
-/// Queues the trial. A finished study goes on, with a larger number of trials if it has made all of them. Returns `None` if
+/// Queues the trial. A finished study continues, with a larger number of trials if it has made all of them. Returns `None` if
 /// the study has changed, and the caller must choose again.
 ///
 /// # Errors

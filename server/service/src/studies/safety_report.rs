@@ -45,7 +45,7 @@ pub async fn give(
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     if trial.state != TrialState::Converged {
-        return Err(NotWalkable::NotConverged { number: trial.number, state: trial.state.as_str() }.into());
+        return Err(NotWalkable::NotConverged { number: trial.number, state: trial.state }.into());
     }
     let attribution = attribution(caller, report.source, report.author.as_deref(), &report.note)?;
     Ok(write(writer, caller, &trial, attribution).await?)

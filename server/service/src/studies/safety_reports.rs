@@ -112,7 +112,7 @@ impl ReportedMotion {
 /// The safety reports of a study, and the pairs that are not compared again.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SafetyReports {
-    /// Reports in force: their gaits must not be walked.
+    /// Reports in force: their gaits must not be used for walking.
     pub in_force: Vec<ReportedGait>,
     /// Reports in force of every study of the subject, with their motions.
     motions: Vec<ReportedMotion>,
@@ -203,7 +203,7 @@ impl SafetyReports {
             }
             if let Some(answer) = session.answer().filter(|answer| answer.judgement.is_about_safety()) {
                 // Naming one of the two gaits would reveal the allocation, so both are kept from walking until unblinding.
-                let by = format!("the subject in lab session {} (blinded: either gait)", session.number);
+                let by = format!("the subject in lab session {} (blinded, so either gait)", session.number);
                 let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
                 let report =
                     |trial| ReportedGait { trial, by: by.clone(), at, note: String::new(), source, review: None };

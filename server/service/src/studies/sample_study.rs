@@ -11,7 +11,7 @@ use gaitwright_store::studies::Study;
 /// Number of trials of a sample study.
 const TRIALS: u32 = 8;
 
-/// Creates and starts a study of the first subject of the paper without muscles, whose solves take seconds.
+/// Creates and starts a study of the first subject from the paper without muscles, whose solves take seconds.
 ///
 /// # Errors
 /// Errors of the database.

@@ -1,6 +1,7 @@
 //! The sensitivities of one trial's gait, computed from its stored solution.
 
 use super::solve_input::PackedInput;
+use super::trial_state::has_state;
 use crate::error::Error;
 use gait_learner::SearchSpace;
 use gait_optimizer::sensitivity::{BoundSensitivity, GaitSensitivities, GaitSensitivityError, sensitivities};
@@ -52,8 +53,8 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
         )));
     }
     if trial.state != TrialState::Converged {
-        let state = trial.state.as_str().replace('_', " ");
-        return Err(Error::conflict(format!("Trial {number} is {state}. Only a converged gait has sensitivities.")));
+        let state = has_state(trial.state);
+        return Err(Error::conflict(format!("Trial {number} {state}. Only a converged gait has sensitivities.")));
     }
     if !gaits::exists(db, trial.id).await? {
         return Err(Error::conflict(format!(

@@ -157,7 +157,7 @@ pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Exte
     changed(writer, actor, "study.extend", &study, state, &detail).await
 }
 
-/// Sets the number of trials of a study, and the state in which it goes on. The caller writes event and audit trail.
+/// Sets the number of trials of a study, and the state in which it continues. The caller writes event and audit trail.
 ///
 /// # Errors
 /// [`Error::Invalid`] for too many trials, [`Error::Conflict`] if the study has changed; errors of the database.
@@ -175,7 +175,7 @@ pub(super) async fn raise_budget(
         trial_budget,
     };
     studies::set_limits(writer, study.id, &limits).await?;
-    if state != study.state && !studies::set_state(writer, study, state, "extended").await? {
+    if state != study.state && !studies::set_state(writer, study, state, "The study was extended.").await? {
         return Err(has_changed());
     }
     Ok(())

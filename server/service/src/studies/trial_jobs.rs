@@ -156,7 +156,7 @@ impl<J: TrialJob> TrialJobs<J> {
             return Ok(true);
         };
         if error.is_of_machine() {
-            tracing::error!(job = J::NAME, %trial, %error, "a job failed; it is tried again in a minute");
+            tracing::error!(job = J::NAME, %trial, %error, "a job failed; retrying in a minute");
             self.queue().postpone(trial, request);
         } else {
             tracing::warn!(job = J::NAME, %trial, %error, "a job failed");

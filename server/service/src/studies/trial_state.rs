@@ -29,12 +29,17 @@ pub enum TrialEvent {
 
 /// The event is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("The trial is {}, so it cannot be {}.", state.as_str().replace('_', " "), participle(*event))]
+#[error("The trial {}, so it cannot be {}.", has_state(*state), participle(*event))]
 pub struct Impossible {
     /// The state of the trial.
     pub state: TrialState,
     /// The event.
     pub event: TrialEvent,
+}
+
+/// The predicate of a sentence about a trial: `has the state “not converged”`.
+pub(super) fn has_state(state: TrialState) -> String {
+    format!("has the state \u{201c}{}\u{201d}", state.as_str().replace('_', " "))
 }
 
 /// What happens to the trial, as a participle.

@@ -5,6 +5,7 @@
 
 use super::safety_reports::SafetyReports;
 use super::same_motion::is_same_gait;
+use super::trial_state::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::export::ControllerFile;
@@ -82,23 +83,23 @@ fn pretty(file: &ControllerFile) -> Result<String, Error> {
     serde_json::to_string_pretty(file).map_err(|e| Error::Internal(e.to_string()))
 }
 
-/// Why a gait must not be walked.
+/// Why a gait must not be used for walking or compared.
 #[derive(Debug, Clone, PartialEq, Eq, ThisError)]
 pub enum NotWalkable {
     /// The subject withdrew consent.
     #[error("The subject withdrew consent.")]
     Withdrawn,
     /// The trial has no converged gait.
-    #[error("Trial {number} is {}. Only a converged gait can be walked or compared.", state.replace('_', " "))]
+    #[error("Trial {number} {}. Only a converged gait can be used for walking or compared.", has_state(*state))]
     NotConverged {
         /// Number of the trial.
         number: u32,
         /// Its state.
-        state: &'static str,
+        state: TrialState,
     },
     /// The gait has a safety report in force.
     #[error(
-        "The gait of trial {number} was reported as unsafe by {by}. It must not be walked until staff have cleared it."
+        "The gait of trial {number} was reported as unsafe by {by}. Nobody may walk with it until staff have cleared it."
     )]
     ReportedUnsafe {
         /// Number of the trial.
@@ -108,8 +109,8 @@ pub enum NotWalkable {
     },
     /// Another trial of the subject has the same gait, which has a safety report in force.
     #[error(
-        "Trial {number} has the same gait as {other}, which was reported as unsafe by {by}. It must not be walked until staff \
-         have cleared it there."
+        "Trial {number} has the same gait as {other}, which was reported as unsafe by {by}. Nobody may walk with it until \
+         staff have cleared it there."
     )]
     SameGaitReportedUnsafe {
         /// Number of the trial.
@@ -132,8 +133,8 @@ pub enum NotWalkable {
     },
     /// The study came from an archive without a trusted signature, and no certificate passed here.
     #[error(
-        "Trial {number} belongs to a study from an archive without a trusted signature. Such a gait must not be walked \
-         or compared unless a certificate made here has passed."
+        "Trial {number} belongs to a study from an archive without a trusted signature. Such a gait must not be used \
+         for walking or compared unless it has passed certification on this service."
     )]
     Unconfirmed {
         /// Number of the trial.
@@ -212,7 +213,7 @@ impl Grounds {
             return Err(NotWalkable::Withdrawn);
         }
         if trial.state != TrialState::Converged {
-            return Err(NotWalkable::NotConverged { number, state: trial.state.as_str() });
+            return Err(NotWalkable::NotConverged { number, state: trial.state });
         }
         if let Some(report) = self.safety_reports.about_motion_of(trial) {
             return Err(match report.other_trial(trial) {

@@ -291,7 +291,7 @@ class LabMethods(Transport):
     ) -> LabSessionProgress:
         """Record a walk.
 
-        Walks are recorded in order. A recorded walk cannot be undone.
+        Walks are recorded in order. Recording a walk cannot be undone.
 
         Fields: walk; optionally note.
         """

@@ -207,7 +207,7 @@ class TrialsMethods(Transport):
         return self.request_text("GET", "/api/v1/trials/{id}/gait.csv", {"id": trial_id})
 
     def get_gait_motion_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> str:
-        """Download the gait as an OpenSim motion.
+        """Download the gait as an OpenSim motion file.
 
         rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
         """

@@ -218,12 +218,12 @@ fn space_of(plan: &StudyPlan) -> BTreeMap<String, String> {
 
 /// The learners to choose from: value, label, and when to choose it. The benchmarks of the learner support this advice.
 pub(super) const LEARNERS: [(&str, &str, &str); 3] = [
-    ("linecospar", "LineCoSpar", "the method of the paper; for answers by people, some of which may be wrong"),
-    ("eubo", "EUBO", "for answers by Gait RMSE; after 10 comparisons, closer to the best gait than LineCoSpar"),
+    ("linecospar", "LineCoSpar", "the method of the paper; for answers from people, which may sometimes be wrong"),
+    ("eubo", "EUBO", "for answers from Gait RMSE; after 10 comparisons, closer to the best gait than LineCoSpar"),
     (
         "eubo_uncertain",
         "EUBO for uncertain answers",
-        "for answers by people who are often unsure, with 50 answers or more",
+        "for studies with 50 answers or more from people who are often unsure",
     ),
 ];
 

@@ -25,7 +25,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
             return String::new();
         }
         let solves = if missing == 1 { "1 more solve".to_owned() } else { format!("{missing} more solves") };
-        return format!("No estimate of the time left yet: it needs {solves}.");
+        return format!("The time left can be estimated after {solves}.");
     };
     let parallel = (study.plan.parallel_trials as usize).min(workers).max(1);
     let mut seconds = median * f64::from(left) / parallel as f64;

@@ -43,8 +43,7 @@ pub(in crate::pages) async fn post(
         .ok_or_else(|| Error::invalid("transition", form.transition, "start, pause, resume, stop or extend"))?;
     let mut writer = app.write().await?;
     let cancelled = if transition == StudyTransition::Extend {
-        let refused =
-            || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number, the total number of trials");
+        let refused = || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number");
         let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
         study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
         Vec::new()

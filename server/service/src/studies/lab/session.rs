@@ -130,7 +130,8 @@ async fn both_walkable(db: &mut Connection, session: &LabSession) -> Result<(Wal
     one.and_then(|one| Ok((one, two?))).map_err(|reason| match reason {
         NotWalkable::Withdrawn => reason.into(),
         _ => Error::conflict(
-            "One of the two gaits of this session must no longer be walked. Close the session and plan another one.",
+            "One of the two gaits of this session must no longer be used for walking. Close the session and \
+             plan another one.",
         ),
     })
 }
