@@ -370,6 +370,7 @@ const COMMANDS: [(&str, &str); 24] = [
     ("simulate", "simulates walks with a gait file"),
     ("solve", "solves for a gait file"),
     ("sweep", "solves for gait files"),
+    ("atlas", "solves for a table"),
     ("tune", "runs an automatic study"),
     ("users", "makes sign-in links"),
     ("worker", "solves jobs"),

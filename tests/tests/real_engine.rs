@@ -416,6 +416,42 @@ fn killed_sweep_keeps_its_rows() {
     assert!(!folder.join("out.csv").exists());
 }
 
+/// Runs an atlas until its progress file has this many lines, kills it, and returns the whole lines.
+fn solves_of_killed_atlas(folder: &Path, workers: &str, lines: usize) -> Vec<String> {
+    let atlas = ["atlas", "--out", "atlas.csv", "--workers", workers];
+    let arguments = [&atlas[..], &COARSE].concat();
+    let mut child = cli::command(BINARY, folder, &arguments).stderr(Stdio::null()).spawn().unwrap();
+    let text = || std::fs::read_to_string(folder.join("atlas.csv.progress")).unwrap_or_default();
+    while text().matches('\n').count() < lines {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    text().split_inclusive('\n').filter(|line| line.ends_with('\n')).map(str::to_owned).collect()
+}
+
+#[test]
+fn killed_atlas_continues_and_does_not_depend_on_the_number_of_workers() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = solves_of_killed_atlas(folder.path(), "1", 17);
+    // As if it had been killed while it wrote a line.
+    let progress = folder.path().join("atlas.csv.progress");
+    std::fs::write(&progress, format!("{}{{\"action\":", first.concat())).unwrap();
+    let longer = solves_of_killed_atlas(folder.path(), "2", first.len() + 16);
+    assert_eq!(longer[..first.len()], first);
+
+    let other = tempfile::tempdir().unwrap();
+    let at_once = solves_of_killed_atlas(other.path(), "2", longer.len().min(33));
+    let same = at_once.len().min(longer.len());
+    assert_eq!(at_once[..same], longer[..same]);
+
+    let refused = cli::run(BINARY, folder.path(), &["atlas", "--out", "atlas.csv", "--muscles", "off", "--mesh", "2,2,3,4"]);
+    let text = String::from_utf8_lossy(&refused.stderr);
+    assert!(text.contains("atlas of another problem or version"), "{text}");
+    assert_eq!(refused.status.code(), Some(2));
+}
+
 /// A real result with muscles, with many more iterations than solves take, beside the 1 MiB that a NATS broker takes in
 /// one message unless told otherwise.
 #[test]

@@ -2,6 +2,8 @@
 //! stderr.
 
 mod archive_commands;
+mod atlas;
+mod atlas_table;
 mod audit;
 mod backup;
 mod certify;
@@ -84,6 +86,10 @@ enum Command {
     Solve(solve::Solve),
     /// Optimise a gait for each row of a table of actions.
     Sweep(sweep::Sweep),
+    /// Find the gait of every action of Table I, starting every solve from one root gait.
+    ///
+    /// Actions share a gait if the bounds that differ are inactive in it, so that a fraction of the solves is enough.
+    Atlas(atlas::Atlas),
     /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
     Certify(certify::Certify),
     /// Simulate walks with a gait on level and uneven ground, under laboratory controllers.
@@ -172,6 +178,7 @@ pub fn run() -> ExitCode {
         Command::Reproduce(reproduce) => runtime.block_on(reproduce.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
+        Command::Atlas(atlas) => runtime.block_on(atlas.run()),
         Command::Certify(certify) => runtime.block_on(certify.run()).map(|()| CommandEnd::Done),
         Command::Simulate(simulate) => runtime.block_on(simulate.run()).map(|()| CommandEnd::Done),
         Command::Reference(reference) => reference.run().map(|()| CommandEnd::Done),

@@ -45,7 +45,7 @@ fn converged(snapshot: &StudySnapshot) -> impl Iterator<Item = &Trial> {
 }
 
 /// The levels around `own` with which the gait stays a solution.
-fn levels_of(bound: &UnchangedBound, dimension: &Dimension, own: usize) -> Range<usize> {
+pub fn levels_of(bound: &UnchangedBound, dimension: &Dimension, own: usize) -> Range<usize> {
     let stays = |value: &&f64| bound.contains(**value);
     let (below, above) = dimension.values.split_at(own);
     let fewer = below.iter().rev().take_while(stays).count();

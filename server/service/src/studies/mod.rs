@@ -7,6 +7,7 @@
 pub mod answer;
 pub mod archive;
 pub mod assessment;
+pub mod atlas;
 pub mod belief;
 pub mod blind;
 pub mod built_in_entries;

@@ -1,0 +1,157 @@
+//! An atlas: the gait of every action of Table I, from one root gait. It does not depend on the number of workers, and a killed
+//! process can continue it.
+
+mod assignment;
+mod progress_file;
+mod solved_action;
+
+pub use assignment::{Assignment, AtlasRow};
+pub use solved_action::{GaitFigures, SolvedAction};
+
+use super::search_space;
+use super::solve_input::SolveInput;
+use crate::error::Error;
+use gait_learner::ActionIndex;
+use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, SolveStatus, TunedBounds, WarmStart, solve};
+use gaitwright_compute::OnPool;
+use progress_file::ProgressFile;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// Number of solves between two looks at which actions have a known gait. A constant, so that the atlas does not depend
+/// on the number of workers.
+const BATCH: usize = 16;
+
+/// What the solves have in common.
+struct Family {
+    problem: GaitProblem,
+    options: SolveOptions,
+    root: WarmStart,
+}
+
+/// Makes or continues an atlas. `start` is the warm start of the root, which otherwise is a cold start; `progress` keeps the
+/// solves until [`Finished::forget_progress`]. Calls `observer` before each batch. `None` if cancelled.
+///
+/// # Errors
+/// If the default bounds have no gait, or the progress file belongs to another problem or cannot be written.
+pub fn make(
+    _: &OnPool,
+    (problem, options, start): (GaitProblem, SolveOptions, Option<WarmStart>),
+    progress: &Path,
+    workers: usize,
+    observer: &mut dyn FnMut(&Assignment),
+    cancel: &CancelToken,
+) -> Result<Option<Finished>, Error> {
+    let Some(root) = root(&problem, &options, start.as_ref(), cancel)? else { return Ok(None) };
+    let family = Family { problem, options, root: root.point };
+    let input =
+        SolveInput { problem: family.problem.clone(), options: family.options, warm_start: Some(family.root.clone()) };
+    let mut progress = ProgressFile::open(progress, &input)?;
+    let space = search_space::table_i().map_err(Error::Learner)?;
+    let action = search_space::nearest_action(&space, family.problem.bounds).map_err(Error::Learner)?;
+    let mut assignment = Assignment::new(space, SolvedAction { action, ..root.solved });
+    let is_complete = solve_all(&family, &mut assignment, &mut progress, workers, observer, cancel)?;
+    Ok(is_complete.then_some(Finished { assignment, progress }))
+}
+
+/// A complete atlas.
+pub struct Finished {
+    /// The gait of each action.
+    pub assignment: Assignment,
+    progress: ProgressFile,
+}
+
+impl Finished {
+    /// Deletes the progress file, once the atlas was written elsewhere.
+    ///
+    /// # Errors
+    /// If it cannot be deleted.
+    pub fn forget_progress(self) -> std::io::Result<()> {
+        self.progress.remove()
+    }
+}
+
+/// The root gait.
+struct Root {
+    point: WarmStart,
+    solved: SolvedAction,
+}
+
+/// Solves for the gait of the default bounds. `None` if cancelled.
+fn root(
+    problem: &GaitProblem,
+    options: &SolveOptions,
+    start: Option<&WarmStart>,
+    cancel: &CancelToken,
+) -> Result<Option<Root>, Error> {
+    let outcome = solve(problem, start, options, &mut |_| {}, cancel)?;
+    if cancel.is_cancelled() {
+        return Ok(None);
+    }
+    if outcome.report.status != SolveStatus::Converged {
+        let why = "The default bounds have no gait with these settings, so there is no root gait.";
+        return Err(Error::Malformed(why.to_owned()));
+    }
+    let solved = SolvedAction::of(ActionIndex(0), &outcome, &problem.reference)?;
+    Ok(Some(Root { point: outcome.warm_start, solved }))
+}
+
+/// Solves in batches until every action has a gait or a failed solve. Returns whether it got there.
+fn solve_all(
+    family: &Family,
+    assignment: &mut Assignment,
+    progress: &mut ProgressFile,
+    workers: usize,
+    observer: &mut dyn FnMut(&Assignment),
+    cancel: &CancelToken,
+) -> Result<bool, Error> {
+    loop {
+        observer(assignment);
+        let batch = assignment.next_batch(BATCH);
+        if batch.is_empty() {
+            return Ok(true);
+        }
+        let known = progress.take(&batch);
+        let missing: Vec<ActionIndex> = batch[known.len()..].to_vec();
+        let solved = solve_batch(family, assignment, &missing, workers, cancel)?;
+        if cancel.is_cancelled() {
+            return Ok(false);
+        }
+        progress.append(&solved)?;
+        for solved in known.into_iter().chain(solved) {
+            assignment.add(solved);
+        }
+    }
+}
+
+/// The solves of a batch, in its order.
+fn solve_batch(
+    family: &Family,
+    assignment: &Assignment,
+    batch: &[ActionIndex],
+    workers: usize,
+    cancel: &CancelToken,
+) -> Result<Vec<SolvedAction>, Error> {
+    let bounds = batch.iter().map(|action| assignment.bounds_of(family.problem.bounds, *action));
+    let bounds: Vec<TunedBounds> = bounds.collect::<Result<_, _>>()?;
+    let next = AtomicUsize::new(0);
+    let solved: Vec<Mutex<Option<Result<SolvedAction, Error>>>> = batch.iter().map(|_| Mutex::new(None)).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..workers.min(batch.len()) {
+            scope.spawn(|| {
+                loop {
+                    let place = next.fetch_add(1, Ordering::Relaxed);
+                    let (Some(action), Some(bounds)) = (batch.get(place), bounds.get(place)) else { return };
+                    let problem = GaitProblem { bounds: *bounds, ..family.problem.clone() };
+                    let outcome = solve(&problem, Some(&family.root), &family.options, &mut |_| {}, cancel);
+                    let found = outcome
+                        .map_err(Error::from)
+                        .and_then(|outcome| SolvedAction::of(*action, &outcome, &problem.reference));
+                    *solved[place].lock().unwrap_or_else(PoisonError::into_inner) = Some(found);
+                }
+            });
+        }
+    });
+    solved.into_iter().filter_map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner)).collect()
+}
