@@ -446,7 +446,8 @@ fn killed_atlas_continues_and_does_not_depend_on_the_number_of_workers() {
     let same = at_once.len().min(longer.len());
     assert_eq!(at_once[..same], longer[..same]);
 
-    let refused = cli::run(BINARY, folder.path(), &["atlas", "--out", "atlas.csv", "--muscles", "off", "--mesh", "2,2,3,4"]);
+    let refused =
+        cli::run(BINARY, folder.path(), &["atlas", "--out", "atlas.csv", "--muscles", "off", "--mesh", "2,2,3,4"]);
     let text = String::from_utf8_lossy(&refused.stderr);
     assert!(text.contains("atlas of another problem or version"), "{text}");
     assert_eq!(refused.status.code(), Some(2));

@@ -3,12 +3,16 @@
 //! ```text
 //! cargo run --release -p gait-learner --example regret -- --problem table1|hart3|hart6 --seeds A..B --method NAME
 //!     --comparisons N [--noise S] [--lengthscale L] [--batch N] [--set '{"setting": value}'] --out FILE.csv
+//! cargo run --release -p gait-learner --example regret -- --problem ATLAS.csv --columns NAME,... --seeds A..B --method NAME ...
 //! cargo run --release -p gait-learner --example regret -- --summarise FILE.csv...
 //! ```
 //!
 //! NAME is `random` (random actions, the winner is recommended), a method (`linecospar`, `eubo`, `thompson`,
 //! `information_gain`) with recommended settings, a method with the suffix `_published`, or `eubo_uncertain` (EUBO for
 //! noisy feedback).
+//!
+//! `--problem ATLAS.csv` reads a table of `gaitwright atlas`. Each seed is a person whose utility is a random mixture of the
+//! columns, of which low values are better.
 //!
 //! Writes rows `method,seed,k,regret`: regret after `k` comparisons, that is `k + 1` visited actions. Prints quartiles.
 //! Regret is 1 minus the utility of the recommended action. `--noise S` adds logistic noise of scale `S` to the
@@ -22,6 +26,7 @@
 mod problems;
 mod simulation;
 mod summary;
+mod table;
 
 use std::error::Error;
 use std::io::Write;
@@ -31,6 +36,7 @@ use gait_learner::LearnerSettings;
 use problems::Problem;
 use simulation::{Person, champion, run};
 use summary::{Curves, quantile, report};
+use table::Table;
 
 struct Options {
     problem: String,
@@ -39,6 +45,7 @@ struct Options {
     comparisons: usize,
     noise: f64,
     lengthscale: Option<f64>,
+    columns: String,
     batch: usize,
     set: serde_json::Map<String, serde_json::Value>,
     out: Option<String>,
@@ -60,6 +67,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
         comparisons: 50,
         noise: 0.0,
         lengthscale: None,
+        columns: "gait_rmse_rad".into(),
         batch: 1,
         set: serde_json::Map::new(),
         out: None,
@@ -80,6 +88,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
             "--comparisons" => options.comparisons = value.parse()?,
             "--noise" => options.noise = number(&name, &value, 0.0)?,
             "--lengthscale" => options.lengthscale = Some(number(&name, &value, 1e-6)?),
+            "--columns" => options.columns = value,
             "--batch" => options.batch = value.parse::<usize>()?.max(1),
             "--set" => options.set = serde_json::from_str(&value)?,
             "--out" => options.out = Some(value),
@@ -128,10 +137,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(out) = &mut out {
         writeln!(out, "method,seed,k,regret")?;
     }
+    let path = std::path::Path::new(&options.problem);
+    let is_table = path.extension().is_some_and(|extension| extension == "csv");
+    let table = is_table.then(|| Table::read(path, &options.columns)).transpose()?;
     let start = Instant::now();
     let mut curves = Vec::new();
     for seed in options.seeds.clone() {
-        let problem = Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?;
+        let problem = match &table {
+            Some(table) => table.person(seed),
+            None => Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?,
+        };
         let person = Person::new(&problem, options.noise, seed);
         let regrets = match &settings {
             Some(settings) => run(person, settings, options.comparisons, options.batch)?,
