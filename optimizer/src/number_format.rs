@@ -1,4 +1,15 @@
-//! Numbers formatted for messages.
+//! Numbers and their units in messages, on pages and in charts.
+
+use std::fmt::Display;
+
+/// A number with its unit: `0.5 m/s`, `15°`. Only the degree, minute and second of plane angle follow without a space (SI
+/// Brochure, 5.4.3).
+pub fn with_unit(number: impl Display, unit: &str) -> String {
+    match unit {
+        "" | "°" | "′" | "″" => format!("{number}{unit}"),
+        _ => format!("{number} {unit}"),
+    }
+}
 
 /// Three significant digits, with an exponent if there would be many zeros.
 pub(crate) fn figure(value: f64) -> String {
@@ -18,4 +29,16 @@ pub(crate) fn shortest(value: f64) -> String {
 /// The number without the last digits of double precision, which are noise in a sum of decimal fractions.
 pub(crate) fn without_noise(value: f64) -> String {
     shortest(format!("{value:.11e}").parse().unwrap_or(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn space_separates_every_unit_except_those_of_plane_angle() {
+        let texts =
+            [with_unit(0.5, "m/s"), with_unit(15, "°"), with_unit(20, "°/s"), with_unit(7, "%"), with_unit(3, "")];
+        assert_eq!(texts, ["0.5 m/s", "15°", "20 °/s", "7 %", "3"].map(str::to_owned));
+    }
 }

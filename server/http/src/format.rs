@@ -183,13 +183,7 @@ pub(crate) fn utility(utility: &Prediction) -> String {
 
 /// What a bound limits, with its unit; empty for any other name.
 pub(crate) fn meaning(name: &str) -> &'static str {
-    TunedBounds::NAMES.iter().position(|known| *known == name).map_or("", |place| TunedBounds::MEANINGS[place])
-}
-
-/// The same without its unit.
-pub(crate) fn limited(name: &str) -> &'static str {
-    let meaning = meaning(name);
-    meaning.rsplit_once(", ").map_or(meaning, |(limited, _)| limited)
+    TunedBounds::place_of(name).map_or("", |place| TunedBounds::MEANINGS[place])
 }
 
 /// One bound: name, value, what it limits.

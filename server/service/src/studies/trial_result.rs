@@ -209,7 +209,7 @@ fn message_of(outcome: &SolveOutcome) -> String {
         SolveStatus::Cancelled => "The solve was cancelled.",
     };
     match worst {
-        Some(row) => format!("{cause} Largest violation: {}, by {:.3e} {}.", row.row, row.amount, row.unit),
+        Some(row) => format!("{cause} Largest violation: {}, by {}.", row.row, row.amount_in_words()),
         None => cause.to_owned(),
     }
 }
