@@ -12,7 +12,7 @@ pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
     match status {
         SolveStatus::Converged => None,
         SolveStatus::Infeasible => Some(
-            "No motion near the last iterate satisfies every constraint: tuned bounds conflict with each other or with another constraint.",
+            "No motion near the last one tried satisfies every constraint: bounds conflict with each other or with another constraint.",
         ),
         SolveStatus::Cancelled => Some("The solve was cancelled."),
         SolveStatus::Stalled | SolveStatus::IterationLimit | SolveStatus::TimeLimit => Some(
@@ -36,7 +36,7 @@ fn list(items: &[String]) -> String {
 }
 
 impl Violation {
-    /// The constraint without place and component, such as `C3 forward hip velocity`.
+    /// The constraint without place and component, such as `forward hip velocity`.
     pub fn constraint(&self) -> &str {
         self.row.split(", ").nth(1).unwrap_or(&self.row)
     }
@@ -95,25 +95,25 @@ impl Conflict {
                 };
                 (
                     format!(
-                        "The conflict does not depend on tuned bounds: fixed constraints conflict with each other{naturalness_terms}"
+                        "The conflict does not depend on the bounds: fixed constraints conflict with each other{naturalness_terms}"
                     ),
-                    ". With every tuned bound at its loosest value".to_owned(),
+                    ". With every bound at its loosest value".to_owned(),
                     "",
                 )
             }
             [one] => (
                 format!("With {one}"),
-                " and the other tuned bounds at their loosest values".to_owned(),
+                " and the other bounds at their loosest values".to_owned(),
                 " With it at its loosest value as well, there is a gait.",
             ),
             [_, _] => (
                 format!("{} conflict with each other", list(&quantities)),
-                ": with both, and the other tuned bounds at their loosest values".to_owned(),
+                ": with both, and the other bounds at their loosest values".to_owned(),
                 " With either of them at its loosest value as well, there is a gait.",
             ),
             _ => (
                 format!("{} conflict with each other", list(&quantities)),
-                ": with all of them, and the other tuned bounds at their loosest values".to_owned(),
+                ": with all of them, and the other bounds at their loosest values".to_owned(),
                 " With any one of them at its loosest value as well, there is a gait.",
             ),
         };
@@ -200,7 +200,7 @@ impl Explanation {
         let conflict = self.conflicts.first()?;
         let limits: Vec<String> = conflict.bounds.iter().map(BoundValue::limit_in_words).collect();
         Some(match limits.as_slice() {
-            [] => "No value of the tuned bounds gives a gait: fixed constraints conflict.".to_owned(),
+            [] => "No values of the bounds give a gait: fixed constraints conflict.".to_owned(),
             [one] if conflict.undecided => format!("With {one}, there is probably no gait, whatever the other bounds."),
             [one] => format!("With {one}, there is no gait, whatever the other bounds."),
             _ if conflict.undecided => format!("These bounds probably conflict: {}.", list(&limits)),

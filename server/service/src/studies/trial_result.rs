@@ -202,7 +202,7 @@ fn message_of(outcome: &SolveOutcome) -> String {
     let worst = outcome.violations.first();
     let cause = match outcome.report.status {
         SolveStatus::Converged => return String::new(),
-        SolveStatus::Infeasible => "No gait near the last iterate satisfies all constraints.",
+        SolveStatus::Infeasible => "No gait near the last motion tried satisfies all constraints.",
         SolveStatus::Stalled => "The solver stalled.",
         SolveStatus::IterationLimit => "The solver reached the iteration limit.",
         SolveStatus::TimeLimit => "The solver reached the time limit.",
