@@ -11,6 +11,26 @@ pub fn with_unit(number: impl Display, unit: &str) -> String {
     }
 }
 
+/// A decimal number with narrow no-break spaces between groups of three digits, if its whole part has five or more digits:
+/// `9999`, `11 664`, `-12 345.5` (SI Brochure, 5.4.4).
+pub fn grouped(number: &str) -> String {
+    let start = number.find(|c: char| c.is_ascii_digit()).unwrap_or(number.len());
+    let (sign, digits) = number.split_at(start);
+    let whole = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
+    let (whole, rest) = digits.split_at(whole);
+    if whole.len() < 5 {
+        return number.to_owned();
+    }
+    let mut text = sign.to_owned();
+    for (place, digit) in whole.chars().enumerate() {
+        if place > 0 && (whole.len() - place).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text + rest
+}
+
 /// Three significant digits, with an exponent if there would be many zeros.
 pub(crate) fn figure(value: f64) -> String {
     let magnitude = value.abs();
@@ -34,6 +54,13 @@ pub(crate) fn without_noise(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn five_or_more_digits_are_grouped() {
+        let texts = ["7", "9999", "11664", "1000000", "-12345.25", "1e12345", "–"].map(grouped);
+        let expected = ["7", "9999", "11\u{202f}664", "1\u{202f}000\u{202f}000", "-12\u{202f}345.25", "1e12345", "–"];
+        assert_eq!(texts, expected.map(str::to_owned));
+    }
 
     #[test]
     fn space_separates_every_unit_except_those_of_plane_angle() {

@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::format::{duration, words};
+use crate::format::{count, duration, words};
 use crate::page_error::{PageResult, page};
 use crate::readiness;
 use crate::workers::Workers;
@@ -77,7 +77,7 @@ impl SystemPage {
         if counts.is_empty() {
             return "none".to_owned();
         }
-        counts.iter().map(|(state, count)| format!("{count} {}", words(state))).collect::<Vec<_>>().join(", ")
+        counts.iter().map(|(state, rows)| format!("{} {}", count(rows), words(state))).collect::<Vec<_>>().join(", ")
     }
 }
 
