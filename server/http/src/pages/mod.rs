@@ -30,6 +30,7 @@ mod rate;
 mod reached_bounds;
 mod reference_gaits;
 mod safety_review;
+mod saved;
 mod sensitivities;
 mod side_by_side;
 mod sign_in;
