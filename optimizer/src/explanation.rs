@@ -25,7 +25,7 @@ use relaxation::of_one_bound;
 pub use relaxation::{JointRelaxation, Relaxation, RelaxedBound};
 use search::Search;
 use solves::{FailedSearch, SearchEnd, Solves};
-pub use words::{quantity, status_in_words, unit_after_number};
+pub use words::{quantity, status_in_words};
 
 /// Largest number of bounds in a joint relaxation.
 const MOST_TOGETHER: usize = 3;

@@ -31,7 +31,7 @@ pub mod rows;
 pub mod sparse_entries;
 pub mod stride;
 pub mod transitions;
-mod unchanged_bounds;
+pub(crate) mod unchanged_bounds;
 pub mod variable_bounds;
 pub mod virtual_constraint_rows;
 pub mod zero_dynamics;

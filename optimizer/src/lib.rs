@@ -20,7 +20,7 @@ pub mod gait_rmse;
 pub mod initial_guess;
 mod model_error;
 pub mod muscle;
-mod number_format;
+pub mod number_format;
 mod opensim;
 pub mod phase_portrait;
 mod quadrature;

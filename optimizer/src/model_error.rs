@@ -1,6 +1,6 @@
 //! Why an input was rejected.
 
-use crate::number_format::{shortest, without_noise};
+use crate::number_format::{shortest, with_unit, without_noise};
 use thiserror::Error;
 
 /// A range in words, with its unit and its relation to another field.
@@ -9,9 +9,7 @@ fn range(minimum: f64, maximum: f64, unit: &str, relation: &str) -> String {
     if minimum < maximum {
         words = format!("{words} to {}", without_noise(maximum));
     }
-    if !unit.is_empty() {
-        words = format!("{words} {unit}");
-    }
+    words = with_unit(words, unit);
     if relation.is_empty() { words } else { format!("{words}, {relation}") }
 }
 

@@ -1,14 +1,16 @@
 //! The tuned constraint bounds (Table I of the paper).
 
 use crate::model_error::ModelError;
+use crate::number_format::with_unit;
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
 
 const LOWER: bool = true;
 const UPPER: bool = false;
 
 /// Defines [`TunedBounds`] from one list, in the order of an action.
 macro_rules! tuned_bounds {
-    ($($(#[$says:meta])* $name:ident: $is_lower:ident, $default:literal, $range:expr, $meaning:literal;)+) => {
+    ($($(#[$says:meta])* $name:ident: $is_lower:ident, $default:literal, $range:expr, $quantity:literal, $unit:literal;)+) => {
         /// The tuned bounds. Defaults are the loosest values of Table I.
         #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields, default)]
@@ -32,7 +34,11 @@ macro_rules! tuned_bounds {
             /// Allowed range of each bound, in the order of an action.
             pub const RANGES: [(f64, f64); Self::COUNT] = [$($range),+];
             /// Quantity that each bound limits, with its unit, in the order of an action.
-            pub const MEANINGS: [&'static str; Self::COUNT] = [$($meaning),+];
+            pub const MEANINGS: [&'static str; Self::COUNT] = [$(concat!($quantity, ", ", $unit)),+];
+            /// Quantity that each bound limits, in the order of an action.
+            pub const QUANTITIES: [&'static str; Self::COUNT] = [$($quantity),+];
+            /// Unit of each bound, in the order of an action.
+            pub const UNITS: [&'static str; Self::COUNT] = [$($unit),+];
 
             /// Values, in the order of an action.
             pub fn to_array(self) -> [f64; Self::COUNT] {
@@ -63,28 +69,42 @@ macro_rules! tuned_bounds {
 
 tuned_bounds! {
     /// Upper bound of the magnitude of every coordinate velocity, rad/s (m/s for the hip point).
-    a1: UPPER, 20.0, (1.0, 100.0), "coordinate velocity, rad/s";
+    a1: UPPER, 20.0, (1.0, 100.0), "coordinate velocity", "rad/s";
     /// Upper bound of the magnitude of every coordinate acceleration, rad/s² (m/s² for the hip point).
-    a2: UPPER, 90.0, (5.0, 1000.0), "coordinate acceleration, rad/s²";
+    a2: UPPER, 90.0, (5.0, 1000.0), "coordinate acceleration", "rad/s²";
     /// Lower bound of the hip velocity v_hip, m/s.
-    a3: LOWER, 0.3, (0.05, 3.0), "hip velocity lower bound, m/s";
+    a3: LOWER, 0.3, (0.05, 3.0), "hip velocity lower bound", "m/s";
     /// Upper bound of the hip velocity v_hip, m/s.
-    a4: UPPER, 1.4, (0.05, 3.0), "hip velocity upper bound, m/s";
+    a4: UPPER, 1.4, (0.05, 3.0), "hip velocity upper bound", "m/s";
     /// Lower bound of the swing-foot clearance at mid-swing, m.
-    a5: LOWER, 0.0, (0.0, 0.3), "swing-foot clearance, m";
+    a5: LOWER, 0.0, (0.0, 0.3), "swing-foot clearance", "m";
     /// Upper bound of the magnitude of the torso lean, rad.
-    a6: UPPER, 0.5, (0.0, 1.0), "torso lean, rad";
+    a6: UPPER, 0.5, (0.0, 1.0), "torso lean", "rad";
     /// Upper bound of the magnitude of both hip angles, degrees.
-    a7: UPPER, 50.0, (5.0, 68.0), "hip angle, °";
+    a7: UPPER, 50.0, (5.0, 68.0), "hip angle", "°";
     /// Upper bound of the magnitude of both ankle angles, degrees.
-    a8: UPPER, 40.0, (5.0, 60.0), "ankle angle, °";
+    a8: UPPER, 40.0, (5.0, 60.0), "ankle angle", "°";
 }
 
 impl TunedBounds {
     /// Unit of the bound with this name; empty for any other name.
     pub fn unit_of(name: &str) -> &'static str {
-        let place = Self::NAMES.iter().position(|known| *known == name);
-        place.and_then(|place| Self::MEANINGS[place].rsplit_once(", ")).map_or("", |(_, unit)| unit)
+        Self::place_of(name).map_or("", |place| Self::UNITS[place])
+    }
+
+    /// Quantity that the bound with this name limits; empty for any other name.
+    pub fn quantity_of(name: &str) -> &'static str {
+        Self::place_of(name).map_or("", |place| Self::QUANTITIES[place])
+    }
+
+    /// The value with the unit of the bound with this name: `0.5 m/s`, `15°`.
+    pub fn in_unit(name: &str, value: impl Display) -> String {
+        with_unit(value, Self::unit_of(name))
+    }
+
+    /// Place of the bound with this name in an action.
+    pub fn place_of(name: &str) -> Option<usize> {
+        Self::NAMES.iter().position(|known| *known == name)
     }
 
     /// Sets one bound by name. [`Self::validate`] checks the bounds against each other.
@@ -92,7 +112,7 @@ impl TunedBounds {
     /// # Errors
     /// [`ModelError::Unknown`] for any other name, [`ModelError::OutOfRange`] for a value outside its range.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), ModelError> {
-        let Some(index) = Self::NAMES.iter().position(|n| *n == name) else {
+        let Some(index) = Self::place_of(name) else {
             return Err(ModelError::Unknown {
                 field: "bounds".to_owned(),
                 value: name.to_owned(),

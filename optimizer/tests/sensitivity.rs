@@ -4,7 +4,8 @@
 
 use gait_optimizer::sensitivity::{BoundSensitivity, sensitivities};
 use gait_optimizer::{
-    CancelToken, GaitProblem, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, solve,
+    CancelToken, GaitProblem, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, UnchangedBound,
+    solve,
 };
 
 fn problem() -> GaitProblem {
@@ -34,6 +35,18 @@ fn step(bound: &BoundSensitivity) -> f64 {
     let room = [low.map(|low| bound.value - low), high.map(|high| high - bound.value)];
     let room = room.into_iter().flatten().fold(f64::INFINITY, f64::min);
     (0.2 * room).min(1e-3 * bound.value.abs())
+}
+
+#[test]
+fn active_bounds_are_those_whose_change_changes_the_gait() {
+    let solved = solve(&problem(), None, &options(), &mut |_| {}, &CancelToken::new()).unwrap();
+    let found = sensitivities(&problem(), &solved.warm_start, &options()).unwrap();
+    let is_active = |(bound, interval): (&BoundSensitivity, &UnchangedBound)| {
+        assert_eq!(!bound.active.is_empty(), interval.is_active(bound.value), "{bound:?} {interval:?}");
+        !bound.active.is_empty()
+    };
+    let active = found.bounds.iter().zip(&solved.report.unchanged_bounds).map(is_active);
+    assert!(active.filter(|active| *active).count() >= 2);
 }
 
 #[test]

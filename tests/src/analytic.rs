@@ -112,7 +112,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
     let violations = if status == SolveStatus::Converged {
         Vec::new()
     } else {
-        vec![Violation { row: "SS2_R node 3, C3 swing foot clearance".to_owned(), amount: 0.004, unit: "m".to_owned() }]
+        vec![Violation { row: "SS2_R node 3, swing foot clearance".to_owned(), amount: 0.004, unit: "m".to_owned() }]
     };
     SolveOutcome {
         other_local_optima: Vec::new(),

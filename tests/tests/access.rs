@@ -74,7 +74,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
 }
 
 /// The pages, as in the router. A page that is not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 78] = [
+const PAGES: [(&str, Option<Right>); 79] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -114,6 +114,7 @@ const PAGES: [(&str, Option<Right>); 78] = [
     ("get /reference-gaits", Some(Right::Read)),
     ("post /reference-gaits", Some(Right::Run)),
     ("get /reference-gaits/{id}", Some(Right::Read)),
+    ("post /jobs/{id}/cancel", Some(Right::Run)),
     ("post /units", Some(Right::Read)),
     ("get /rate", Some(Right::Rate)),
     ("post /rate/{id}", Some(Right::Rate)),

@@ -79,7 +79,7 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     let found = explained(&service, last.id).await;
     let expected: Vec<String> = trials.iter().map(|trial| format!("trial {}", trial.id)).collect();
     assert_eq!(explained_in_order(&service).await, expected);
-    assert_eq!(found["violations"][0]["row"], "SS2_R node 3, C3 swing foot clearance");
+    assert_eq!(found["violations"][0]["row"], "SS2_R node 3, swing foot clearance");
     let conflict = &found["conflicts"][0];
     assert_eq!((&conflict["bounds"][0]["bound"], &conflict["starts"]), (&json!("a5"), &json!(5)));
     assert_eq!((&found["gait_found"], &found["together"]), (&json!(false), &json!([])));

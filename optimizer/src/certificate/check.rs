@@ -1,7 +1,7 @@
 //! A check of a certificate: the worst value of a quantity, its place, and its limit.
 
 use crate::gait::DomainTrajectory;
-use crate::number_format::figure;
+use crate::number_format::{figure, with_unit};
 use serde::{Deserialize, Serialize};
 
 /// The worst value of a quantity, with its limit.
@@ -37,7 +37,7 @@ impl Check {
 
     /// A figure with the unit, if there is one.
     fn in_unit(&self, value: f64) -> String {
-        format!("{} {}", figure(value), self.unit).trim_end().to_owned()
+        with_unit(figure(value), &self.unit)
     }
 }
 

@@ -72,10 +72,14 @@ impl CertifiedGait {
     }
 }
 
+/// Name of the measured muscle values, which override the published table.
+const MUSCLES: &str = "settings.muscles";
+
 impl Difference {
     /// The difference as text.
     pub fn in_words(&self) -> String {
-        let words = |value: &Value| if value.is_null() { "not set".to_owned() } else { value.to_string() };
+        let missing = if self.name.starts_with(MUSCLES) { "the published table" } else { "none" };
+        let words = |value: &Value| if value.is_null() { missing.to_owned() } else { value.to_string() };
         format!("{} is {} (built-in: {})", self.name, words(&self.value), words(&self.built_in))
     }
 }
@@ -98,7 +102,7 @@ fn values(device: &Device, settings: &GaitSettings) -> Result<Vec<(String, Value
         ("settings.limits", serde_json::to_value(limits)),
         ("settings.regularisation", serde_json::to_value(regularisation)),
         ("settings.naturalness", serde_json::to_value(naturalness)),
-        ("settings.muscles", serde_json::to_value(muscles)),
+        (MUSCLES, serde_json::to_value(muscles)),
     ];
     let mut named: Vec<(String, Value)> = Device::FIELDS
         .iter()

@@ -2,7 +2,7 @@
 
 use super::given_bound::BoundValue;
 use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
-use crate::number_format::figure;
+use crate::number_format::{figure, with_unit};
 use crate::solve::{SolveStatus, Violation};
 use crate::tuned_bounds::TunedBounds;
 use crate::walking::CYCLE;
@@ -12,7 +12,7 @@ pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
     match status {
         SolveStatus::Converged => None,
         SolveStatus::Infeasible => Some(
-            "No motion near the last iterate satisfies every constraint: tuned bounds conflict with each other or with another constraint.",
+            "No motion near the last one tried satisfies every constraint: bounds conflict with each other or with another constraint.",
         ),
         SolveStatus::Cancelled => Some("The solve was cancelled."),
         SolveStatus::Stalled | SolveStatus::IterationLimit | SolveStatus::TimeLimit => Some(
@@ -21,24 +21,9 @@ pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
     }
 }
 
-/// A bound with its value: `a7 = 5° (hip angle)` for the meaning `hip angle, °`.
-pub fn quantity(bound: &str, meaning: &str, value: f64) -> String {
-    let (limited, unit) = parts(meaning);
-    format!("{bound} = {value}{unit} ({limited})")
-}
-
-/// The unit of a bound as it follows a number: ` m/s` or `°`, for the meaning `hip velocity, m/s` or `hip angle, °`.
-pub fn unit_after_number(meaning: &str) -> String {
-    parts(meaning).1
-}
-
-/// The quantity of a bound, and its unit as it follows a number.
-fn parts(meaning: &str) -> (&str, String) {
-    match meaning.rsplit_once(", ") {
-        None => (meaning, String::new()),
-        Some((limited, "°")) => (limited, "°".to_owned()),
-        Some((limited, unit)) => (limited, format!(" {unit}")),
-    }
+/// A bound with its value: `a7 = 5° (hip angle)`.
+pub fn quantity(bound: &str, value: f64) -> String {
+    format!("{bound} = {} ({})", TunedBounds::in_unit(bound, value), TunedBounds::quantity_of(bound))
 }
 
 /// A list: `a, b and c`.
@@ -51,16 +36,21 @@ fn list(items: &[String]) -> String {
 }
 
 impl Violation {
-    /// The constraint without place and component, such as `C3 forward hip velocity`.
+    /// The constraint without place and component, such as `forward hip velocity`.
     pub fn constraint(&self) -> &str {
         self.row.split(", ").nth(1).unwrap_or(&self.row)
+    }
+
+    /// The amount with its unit: `0.107 m/s`.
+    pub fn amount_in_words(&self) -> String {
+        with_unit(figure(self.amount), &self.unit)
     }
 }
 
 impl BoundAtLimit {
     /// The domains in which the bound is reached, as a sentence.
     pub fn in_words(&self) -> String {
-        let quantity = quantity(&self.bound, &self.meaning, self.value);
+        let quantity = quantity(&self.bound, self.value);
         if self.domains.len() == CYCLE.len() {
             return format!("{quantity} is reached in every domain.");
         }
@@ -105,30 +95,30 @@ impl Conflict {
                 };
                 (
                     format!(
-                        "The conflict does not depend on tuned bounds: fixed constraints conflict with each other{naturalness_terms}"
+                        "The conflict does not depend on the bounds: fixed constraints conflict with each other{naturalness_terms}"
                     ),
-                    ". With every tuned bound at its loosest value".to_owned(),
+                    ". With every bound at its loosest value".to_owned(),
                     "",
                 )
             }
             [one] => (
                 format!("With {one}"),
-                " and the other tuned bounds at their loosest values".to_owned(),
+                " and the other bounds at their loosest values".to_owned(),
                 " With it at its loosest value as well, there is a gait.",
             ),
             [_, _] => (
                 format!("{} conflict with each other", list(&quantities)),
-                ": with both, and the other tuned bounds at their loosest values".to_owned(),
+                ": with both, and the other bounds at their loosest values".to_owned(),
                 " With either of them at its loosest value as well, there is a gait.",
             ),
             _ => (
                 format!("{} conflict with each other", list(&quantities)),
-                ": with all of them, and the other tuned bounds at their loosest values".to_owned(),
+                ": with all of them, and the other bounds at their loosest values".to_owned(),
                 " With any one of them at its loosest value as well, there is a gait.",
             ),
         };
         let missed = self.violations.first().map_or(String::new(), |worst| {
-            format!("; the nearest motion violates {} by {} {}", worst.row, figure(worst.amount), worst.unit)
+            format!("; the nearest motion violates {} by {}", worst.row, worst.amount_in_words())
         });
         let (from, caveat) = (from_starts(self.starts), caveat(self.undecided));
         format!("{without}{claim}{tried}, no gait was found{from}{caveat}{missed}.{relief}")
@@ -138,25 +128,28 @@ impl Conflict {
 impl BoundValue {
     /// `a7 = 5° (hip angle)`.
     fn in_words(&self) -> String {
-        quantity(&self.bound, &self.meaning, self.value)
+        quantity(&self.bound, self.value)
     }
 }
 
 impl Relaxation {
     /// The effect of the relaxation, as a sentence.
     pub fn in_words(&self) -> String {
-        let Self { bound, meaning, from, to, not_with, .. } = self;
-        let (limited, unit) = parts(meaning);
+        let Self { bound, from, to, not_with, .. } = self;
+        let limited = TunedBounds::quantity_of(bound);
+        let in_unit = |value: f64| TunedBounds::in_unit(bound, value);
+        let (loosest, tried) = (in_unit(*not_with), in_unit(*from));
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
         if let Some(to) = to {
             return format!(
-                "Relaxing {bound} ({limited}) alone, to {to}{unit} instead of {from}{unit}, gives a gait; with {not_with}{unit}, \
-                 no gait was found{starts}{caveat}."
+                "Relaxing {bound} ({limited}) alone, to {} instead of {tried}, gives a gait; with {loosest}, no gait was \
+                 found{starts}{caveat}.",
+                in_unit(*to)
             );
         }
         let direction = if not_with < from { "down" } else { "up" };
         format!(
-            "Relaxing {bound} ({limited}) alone, {direction} to its loosest value, {not_with}{unit}, is not sufficient: no gait \
+            "Relaxing {bound} ({limited}) alone, {direction} to its loosest value, {loosest}, is not sufficient: no gait \
              was found{starts}{caveat}."
         )
     }
@@ -168,8 +161,7 @@ impl JointRelaxation {
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
         let named =
             |value: &dyn Fn(&super::RelaxedBound) -> String| list(&self.bounds.iter().map(value).collect::<Vec<_>>());
-        let in_unit = |meaning: &str, value: f64| format!("{value}{}", parts(meaning).1);
-        let not_with = named(&|one| format!("{} = {}", one.bound, in_unit(&one.meaning, one.not_with)));
+        let not_with = named(&|one| format!("{} = {}", one.bound, TunedBounds::in_unit(&one.bound, one.not_with)));
         if self.bounds.iter().any(|one| one.to.is_none()) {
             return format!(
                 "Relaxing these bounds together is not sufficient: even at their loosest values, {not_with}, no gait was \
@@ -178,8 +170,8 @@ impl JointRelaxation {
         }
         let with = named(&|one| {
             let to = one.to.unwrap_or(one.not_with);
-            let from = in_unit(&one.meaning, one.from);
-            format!("{} instead of {from}", quantity(&one.bound, &one.meaning, to))
+            let from = TunedBounds::in_unit(&one.bound, one.from);
+            format!("{} instead of {from}", quantity(&one.bound, to))
         });
         format!(
             "Relaxing these bounds together, to {with}, gives a gait; with {not_with}, no gait was found{starts}{caveat}."
@@ -190,12 +182,12 @@ impl JointRelaxation {
 impl BoundValue {
     /// The limit in words: `a hip angle of at most 15°`.
     fn limit_in_words(&self) -> String {
-        let (limited, unit) = parts(&self.meaning);
-        let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound);
-        let is_lower = place.is_some_and(|place| TunedBounds::IS_LOWER[place]);
+        let limited = TunedBounds::quantity_of(&self.bound);
+        let value = TunedBounds::in_unit(&self.bound, self.value);
+        let is_lower = TunedBounds::place_of(&self.bound).is_some_and(|place| TunedBounds::IS_LOWER[place]);
         let quantity = limited.strip_suffix(" lower bound").or_else(|| limited.strip_suffix(" upper bound"));
         let quantity = quantity.unwrap_or(limited);
-        format!("a {quantity} of at {} {}{unit}", if is_lower { "least" } else { "most" }, self.value)
+        format!("a {quantity} of at {} {value}", if is_lower { "least" } else { "most" })
     }
 }
 
@@ -208,7 +200,7 @@ impl Explanation {
         let conflict = self.conflicts.first()?;
         let limits: Vec<String> = conflict.bounds.iter().map(BoundValue::limit_in_words).collect();
         Some(match limits.as_slice() {
-            [] => "No value of the tuned bounds gives a gait: fixed constraints conflict.".to_owned(),
+            [] => "No values of the bounds give a gait: fixed constraints conflict.".to_owned(),
             [one] if conflict.undecided => format!("With {one}, there is probably no gait, whatever the other bounds."),
             [one] => format!("With {one}, there is no gait, whatever the other bounds."),
             _ if conflict.undecided => format!("These bounds probably conflict: {}.", list(&limits)),
@@ -232,7 +224,7 @@ impl Explanation {
     /// The largest violation, as a sentence; `None` if there is none.
     fn missed_most(&self) -> Option<String> {
         let worst = self.violations.first()?;
-        Some(format!("Largest violation: {}, by {} {}.", worst.row, figure(worst.amount), worst.unit))
+        Some(format!("Largest violation: {}, by {}.", worst.row, worst.amount_in_words()))
     }
 
     /// The smallest relaxation of one bound that gives a gait.

@@ -4,6 +4,7 @@
 //! domain the duration T, the phase limits, the Bezier coefficients (column-major) and the impulse. Variables are
 //! stored divided by their scale.
 
+use super::row_names::COORDINATE_NAMES;
 use crate::body::{COORDINATES, JOINTS};
 use crate::muscle::MUSCLE_COUNT;
 use crate::quadrature::simpson;
@@ -223,7 +224,7 @@ impl Layout {
         Self { muscles, domains, hip_velocities, right_step_length, stride_length, variables: next, scale }
     }
 
-    /// Name and unit of a variable: `SS1_R node 3, velocity of knee_R`.
+    /// Name and unit of a variable: `SS1_R node 3, velocity of the right knee`.
     pub fn variable_label(&self, index: usize) -> (String, &'static str) {
         for layout in &self.domains {
             let name = layout.domain.name();
@@ -247,7 +248,8 @@ impl Layout {
             }
         }
         if index >= self.hip_velocities && index < self.hip_velocities + 4 {
-            return (format!("hip velocity v_hip[{}]", index - self.hip_velocities), "m/s");
+            let name = ["DS2_R", "DS3_R and SS2_R", "DS2_L", "DS3_L and SS2_L"][index - self.hip_velocities];
+            return (format!("{name}, hip velocity"), "m/s");
         }
         let name = if index == self.right_step_length { "right step length" } else { "stride length" };
         (name.to_owned(), "m")
@@ -321,16 +323,15 @@ impl Layout {
 }
 
 fn point_variable_label(layout: &DomainLayout, offset: usize) -> (String, &'static str) {
-    const COORDINATE: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
     let angle = |i: usize, linear: &'static str, angular: &'static str| if i < 2 { linear } else { angular };
     if offset < QD {
-        (COORDINATE[offset].to_owned(), angle(offset, "m", "rad"))
+        (COORDINATE_NAMES[offset].to_owned(), angle(offset, "m", "rad"))
     } else if offset < QDD {
-        (format!("velocity of {}", COORDINATE[offset - QD]), angle(offset - QD, "m/s", "rad/s"))
+        (format!("velocity of the {}", COORDINATE_NAMES[offset - QD]), angle(offset - QD, "m/s", "rad/s"))
     } else if offset < U {
-        (format!("acceleration of {}", COORDINATE[offset - QDD]), angle(offset - QDD, "m/s²", "rad/s²"))
+        (format!("acceleration of the {}", COORDINATE_NAMES[offset - QDD]), angle(offset - QDD, "m/s²", "rad/s²"))
     } else if offset < FORCE {
-        (format!("torque of {}", COORDINATE[offset - U + 3]), "N m")
+        (format!("torque of the {}", COORDINATE_NAMES[offset - U + 3]), "N m")
     } else if offset < layout.fibre_length() {
         (format!("contact force {}", offset - FORCE), "N")
     } else {

@@ -42,41 +42,6 @@ pub enum RowKind {
 }
 
 impl RowKind {
-    /// Number of the constraint in the paper.
-    pub fn constraint(self, component: usize) -> &'static str {
-        match self {
-            Self::Dynamics
-            | Self::ContactAcceleration
-            | Self::ContactPosition
-            | Self::ContactVelocity
-            | Self::MidpointPhase
-            | Self::EndpointPhase
-            | Self::MidpointPhaseRate
-            | Self::EndpointPhaseRate
-            | Self::PhaseEnd => "C1",
-            Self::OutputPosition
-            | Self::OutputVelocity
-            | Self::OutputAcceleration
-            | Self::HipPhase
-            | Self::HipVelocity
-            | Self::HipAcceleration
-            | Self::PositionReset
-            | Self::VelocityReset
-            | Self::Impact
-            | Self::FibreReset => "C2",
-            Self::Friction
-            | Self::Height
-            | Self::Clearance
-            | Self::TouchdownSpeed
-            | Self::ImpactFriction
-            | Self::PhaseRate => "C3",
-            Self::StepLength | Self::Speed => "C4",
-            Self::MuscleForce => "C5-C7",
-            Self::MidpointFibre | Self::EndpointFibre => "C8",
-            Self::MuscleTorque => ["C9", "C10", "C11", "C12"].get(component).copied().unwrap_or("C9-C12"),
-        }
-    }
-
     /// Description, unit of the physical residual, and physical residual per unit of the scaled row.
     pub fn description(self) -> (&'static str, &'static str, f64) {
         match self {
@@ -142,7 +107,18 @@ pub struct RowName {
     pub component: usize,
 }
 
-const COORDINATE_NAMES: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+/// Names of the coordinates, as they follow `velocity of the`.
+pub(super) const COORDINATE_NAMES: [&str; 9] = [
+    "horizontal hip position",
+    "hip height",
+    "torso",
+    "left hip",
+    "left knee",
+    "left ankle",
+    "right hip",
+    "right knee",
+    "right ankle",
+];
 
 fn contact_name(row: ContactRow) -> String {
     let point = match row.point {
@@ -150,14 +126,14 @@ fn contact_name(row: ContactRow) -> String {
         FootPoint::Toe => "toe",
     };
     let side = match row.side {
-        Side::Left => "L",
-        Side::Right => "R",
+        Side::Left => "left",
+        Side::Right => "right",
     };
     let axis = match row.axis {
-        Axis::X => "x",
-        Axis::Z => "z",
+        Axis::X => "horizontal",
+        Axis::Z => "vertical",
     };
-    format!("{point}_{side} {axis}")
+    format!("{side} {point}, {axis}")
 }
 
 /// Name of a domain; a number that no domain has is named as such.
@@ -194,12 +170,12 @@ impl RowName {
             ]),
             RowKind::ImpactFriction => of(&["landing heel, forward edge", "landing heel, backward edge"]),
             RowKind::Height | RowKind::Clearance | RowKind::TouchdownSpeed => {
-                of(&["heel_L", "toe_L", "heel_R", "toe_R"])
+                of(&["left heel", "left toe", "right heel", "right toe"])
             }
             RowKind::FibreReset | RowKind::MuscleForce | RowKind::MidpointFibre | RowKind::EndpointFibre => {
                 MUSCLES.get(component).map(|muscle| muscle.name.to_owned())
             }
-            RowKind::MuscleTorque => of(&["hip_L", "knee_L", "ankle_L", "hip_R"]),
+            RowKind::MuscleTorque => of(&["left hip", "left knee", "left ankle", "right hip"]),
             RowKind::StepLength => of(&["right step", "left step"]),
             RowKind::HipPhase
             | RowKind::HipVelocity
@@ -215,7 +191,7 @@ impl RowName {
         name.unwrap_or_else(|| format!("component {component}"))
     }
 
-    /// `SS1_R node 3, C3 swing-foot clearance, heel_L`.
+    /// `SS1_R node 3, swing-foot clearance, left heel`.
     pub fn label(&self) -> String {
         let place = match self.place {
             RowPlace::Point { domain, point } => format!("{} node {point}", domain_name(domain)),
@@ -227,7 +203,7 @@ impl RowName {
         };
         let component = self.component_name();
         let separator = if component.is_empty() { "" } else { ", " };
-        format!("{place}, {} {}{separator}{component}", self.kind.constraint(self.component), self.kind.description().0)
+        format!("{place}, {}{separator}{component}", self.kind.description().0)
     }
 }
 
@@ -241,7 +217,7 @@ mod tests {
         let node = RowPlace::Point { domain: 3, point: 70_000 };
         assert_eq!(
             label(node, RowKind::Dynamics, 8),
-            format!("{} node 70000, C1 equation of motion, ankle_R", CYCLE[3].name())
+            format!("{} node 70000, equation of motion, right ankle", CYCLE[3].name())
         );
         for kind in [
             RowKind::Dynamics,
@@ -257,7 +233,6 @@ mod tests {
         ] {
             assert!(label(node, kind, 300).ends_with(", component 300"), "{}", label(node, kind, 300));
         }
-        assert!(label(node, RowKind::MuscleTorque, 4).contains("C9-C12"));
         assert!(label(RowPlace::Point { domain: 9, point: 0 }, RowKind::Speed, 0).starts_with("domain 9 node 0"));
         let last = label(RowPlace::Transition { domain: 7 }, RowKind::Impact, 0);
         assert!(last.starts_with(&format!("{} to {}", CYCLE[7].name(), CYCLE[0].name())), "{last}");

@@ -1,6 +1,7 @@
 //! Active constraints of a solution, and how far a parameter can move until they change.
 
 use crate::gait_problem::GaitProgram;
+use crate::gait_problem::unchanged_bounds::is_active;
 use interior_point::{NonlinearProgram, ParameterDerivative, WarmPoint};
 use serde::Serialize;
 
@@ -10,7 +11,7 @@ const WEAK_RATIO: f64 = 100.0;
 /// A constraint that is active at a node or over the stride.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActiveConstraint {
-    /// Domain, node and quantity, as in `SS1_R node 3, velocity of knee_R`.
+    /// Domain, node and quantity, as in `SS1_R node 3, velocity of the right knee`.
     pub place: String,
     /// Multiplier of the scaled constraint: decrease of the objective per unit by which the constraint is relaxed.
     pub multiplier: f64,
@@ -26,8 +27,8 @@ struct ConstraintSide {
 
 /// Distances and multipliers of every finite bound at a solution.
 pub(super) struct ActiveSet {
-    /// Side, distance from the bound, multiplier.
-    sides: Vec<(ConstraintSide, f64, f64)>,
+    /// Side, distance from the limit, multiplier, limit.
+    sides: Vec<(ConstraintSide, f64, f64, f64)>,
 }
 
 impl ActiveSet {
@@ -38,27 +39,26 @@ impl ActiveSet {
         let (mut row_lower, mut row_upper) = (vec![0.0; m], vec![0.0; m]);
         program.row_bounds(&mut row_lower, &mut row_upper);
         let mut sides = Vec::new();
-        let mut note = |side: ConstraintSide, distance: f64, multiplier: f64| {
+        let mut note = |side: ConstraintSide, value: f64, limit: f64, multiplier: f64| {
+            let distance = if side.is_upper { limit - value } else { value - limit };
             if distance.is_finite() {
-                sides.push((side, distance.max(0.0), multiplier));
+                sides.push((side, distance.max(0.0), multiplier, limit));
             }
         };
         for index in (0..n).filter(|&j| lower[j] < upper[j]) {
             let side = ConstraintSide { of_row: false, index, is_upper: false };
-            note(side, point.x[index] - lower[index], point.lower_multipliers[index]);
-            note(
-                ConstraintSide { is_upper: true, ..side },
-                upper[index] - point.x[index],
-                point.upper_multipliers[index],
-            );
+            let value = point.x[index];
+            note(side, value, lower[index], point.lower_multipliers[index]);
+            note(ConstraintSide { is_upper: true, ..side }, value, upper[index], point.upper_multipliers[index]);
         }
         for index in (0..m).filter(|&i| row_lower[i] < row_upper[i]) {
             let side = ConstraintSide { of_row: true, index, is_upper: false };
             let slack = point.slacks[index];
-            note(side, slack - row_lower[index], point.slack_lower_multipliers[index]);
+            note(side, slack, row_lower[index], point.slack_lower_multipliers[index]);
             note(
                 ConstraintSide { is_upper: true, ..side },
-                row_upper[index] - slack,
+                slack,
+                row_upper[index],
                 point.slack_upper_multipliers[index],
             );
         }
@@ -69,7 +69,7 @@ impl ActiveSet {
     /// inactive, to first order.
     pub(super) fn steps(&self, parameter: &ParameterDerivative, along: &WarmPoint) -> (Option<f64>, Option<f64>) {
         let (mut back, mut forth): (Option<f64>, Option<f64>) = (None, None);
-        for &(side, distance, multiplier) in &self.sides {
+        for &(side, distance, multiplier, _) in &self.sides {
             let (value, rate) = if distance > multiplier {
                 (distance, distance_rate(side, parameter, along))
             } else {
@@ -89,7 +89,7 @@ impl ActiveSet {
     pub(super) fn is_weak(&self, parameter: &ParameterDerivative) -> bool {
         let weak =
             |distance: f64, multiplier: f64| distance < WEAK_RATIO * multiplier && multiplier < WEAK_RATIO * distance;
-        self.sides.iter().any(|&(side, distance, multiplier)| depends(side, parameter) && weak(distance, multiplier))
+        self.sides.iter().any(|&(side, distance, multiplier, _)| depends(side, parameter) && weak(distance, multiplier))
     }
 }
 
@@ -131,10 +131,10 @@ pub(super) fn of_parameter(
     set: &ActiveSet,
     parameter: &ParameterDerivative,
 ) -> Vec<ActiveConstraint> {
-    let active = set.sides.iter().filter(|(_, distance, multiplier)| multiplier > distance);
+    let active = set.sides.iter().filter(|&&(_, distance, multiplier, limit)| is_active(distance, multiplier, limit));
     let mut found: Vec<ActiveConstraint> = active
         .filter(|(side, ..)| depends(*side, parameter))
-        .map(|&(side, _, multiplier)| ActiveConstraint {
+        .map(|&(side, _, multiplier, _)| ActiveConstraint {
             place: if side.of_row {
                 program.rows.names[side.index].label()
             } else {

@@ -57,7 +57,7 @@ impl BoundSensitivity {
         // A lower bound is stricter the larger it is.
         let (stricter, by) = if TunedBounds::IS_LOWER[place] { ("more", by) } else { ("less", -by) };
         let derivatives = &self.derivatives;
-        let quantity = TunedBounds::MEANINGS[place].split(',').next().unwrap_or_default();
+        let quantity = TunedBounds::QUANTITIES[place];
         let mut places: Vec<&str> = self.active.iter().map(|active| active.place.as_str()).take(PLACES).collect();
         let more = self.active.len().saturating_sub(places.len());
         let rest = format!("{more} more");

@@ -4,6 +4,7 @@ use crate::gait_problem::program_data::{EVEN_TIMING, StrideTiming};
 use crate::gait_problem::{GaitProblem, GaitProgram};
 use crate::initial_guess::{self, GuessSettings};
 use crate::model_error::ModelError;
+use crate::number_format::with_unit;
 use interior_point::{BarrierStrategy, NlpSettings};
 use serde::{Deserialize, Serialize};
 
@@ -276,15 +277,15 @@ impl InitialGuess {
         let normal = if early_rise { Self::EARLY_RISE } else { Self::NATURAL };
         for (name, value, usual, unit) in [
             ("knee flexion × ", self.knee_flexion, normal.knee_flexion, ""),
-            ("stride time ", self.stride_time_s, normal.stride_time_s, " s"),
-            ("stride length ", self.stride_length_m, normal.stride_length_m, " m"),
+            ("stride time ", self.stride_time_s, normal.stride_time_s, "s"),
+            ("stride length ", self.stride_length_m, normal.stride_length_m, "m"),
             ("barrier ", self.barrier, normal.barrier, ""),
             ("constraint curvature below a violation of ", self.curvature_from, normal.curvature_from, ""),
         ] {
             if value == WHOLE_HESSIAN {
                 label.push_str(", exact Hessian from the start");
             } else if value != usual {
-                for part in [", ", name, &value.to_string(), unit] {
+                for part in [", ", name, &with_unit(value, unit)] {
                     label.push_str(part);
                 }
             }

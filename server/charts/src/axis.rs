@@ -1,5 +1,6 @@
 //! Axes of charts: a range with round ticks.
 
+use gait_optimizer::number_format::grouped;
 use std::fmt::Display;
 
 /// A range of values with round ticks.
@@ -74,7 +75,7 @@ impl ChartAxis {
 
     /// The text of a tick. All ticks have the same number of decimals.
     pub(super) fn text(&self, tick: f64) -> String {
-        format!("{tick:.*}", self.decimals).replace('-', "\u{2212}")
+        grouped(&format!("{tick:.*}", self.decimals)).replace('-', "\u{2212}")
     }
 }
 

@@ -188,7 +188,7 @@ fn tree_csv(tree: &Tree) -> CsvTable {
     table
 }
 
-/// `angles`, `Right hip (prosthetic side)` as `angles-right-hip-prosthetic-side`.
+/// `angles`, `Right hip` as `angles-right-hip`.
 fn file_name(group: &str, title: &str) -> String {
     let words = format!("{group} {title}");
     let words = words.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());

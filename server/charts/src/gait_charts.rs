@@ -24,13 +24,8 @@ pub const PHASES: [(&str, &str); 4] = [
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
 /// Title and index into q and into the reference of the five human coordinates.
-const ANGLES: [(&str, usize, usize); 5] = [
-    ("Torso lean", 2, 0),
-    ("Left hip", 3, 1),
-    ("Left knee", 4, 2),
-    ("Left ankle", 5, 3),
-    ("Right hip (prosthetic side)", 6, 4),
-];
+const ANGLES: [(&str, usize, usize); 5] =
+    [("Torso lean", 2, 0), ("Left hip", 3, 1), ("Left knee", 4, 2), ("Left ankle", 5, 3), ("Right hip", 6, 4)];
 /// Names of q, apart from the place of the hip.
 const COORDINATES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];

@@ -26,14 +26,6 @@ pub(crate) fn mass_kg(field: &str, text: &str) -> Result<f64, Error> {
         .ok_or_else(|| Error::invalid(field, text, "a number in kilograms, such as 65.7, or in pounds, such as 145 lb"))
 }
 
-/// Height, m, and body mass, kg, as typed in the fields of a form.
-///
-/// # Errors
-/// [`Error::Invalid`] naming the field.
-pub(crate) fn height_and_mass(height: &str, mass: &str) -> Result<(f64, f64), Error> {
-    Ok((height_m("height_m", height)?, mass_kg("body_mass_kg", mass)?))
-}
-
 /// `5 ft 8 in`, to the inch.
 pub(crate) fn feet_and_inches(height_m: f64) -> String {
     let inches = (height_m / METRES_PER_INCH).round();

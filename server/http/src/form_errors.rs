@@ -2,6 +2,7 @@
 
 use crate::body_measures::{likely, likely_height_m, likely_mass_kg};
 use gait_optimizer::TunedBounds;
+use gait_optimizer::number_format::with_unit;
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::TrialId;
 use serde_json::Value;
@@ -83,17 +84,17 @@ fn near_miss(fault: &FieldError) -> Option<String> {
         return likely_mass_kg(number).map(|mass| format!("{mass} kg"));
     }
     let bound = field.rsplit('_').next().unwrap_or_default();
-    let place = TunedBounds::NAMES.iter().position(|name| *name == bound)?;
+    let place = TunedBounds::place_of(bound)?;
     let unit = TunedBounds::unit_of(bound);
     let (low, high) = TunedBounds::RANGES[place];
     let radian = 1_f64.to_degrees();
     let meant = match unit {
         "m" => likely(number, (low, high), [1.0, 0.01, 0.001]),
         "rad" => likely(number, (low, high), [1.0, 1.0 / radian]),
-        "\u{b0}" => likely(number, (low, high), [1.0, radian]),
+        "°" => likely(number, (low, high), [1.0, radian]),
         _ => None,
     }?;
-    Some(format!("{meant} {unit}"))
+    Some(with_unit(meant, unit))
 }
 
 /// The sentence of an error, with the label of the refused field: from `labels`, or else the common one.
@@ -135,7 +136,7 @@ mod tests {
             (FieldError::new("values_a5", 50.0, "0 to 0.3"), Some("0.05 m")),
             (FieldError::new("values_a5", 20.0, "0 to 0.3"), None),
             (FieldError::new("fixed_a6", 20.0, "0 to 1"), Some("0.349 rad")),
-            (FieldError::new("fixed_a7", 0.35, "5 to 68"), Some("20.1 \u{b0}")),
+            (FieldError::new("fixed_a7", 0.35, "5 to 68"), Some("20.1°")),
             (FieldError::new("height_m", 0.1, "1.4 to 2.2"), None),
             (FieldError::new("height_m", "tall", "a number"), None),
             (FieldError::new("seed", 1.5, "0 to 9"), None),

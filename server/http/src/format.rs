@@ -2,12 +2,14 @@
 
 use gait_learner::Prediction;
 use gait_optimizer::TunedBounds;
+use gait_optimizer::number_format::grouped;
 use gaitwright_charts::power_of_ten;
 use gaitwright_service::access::Role;
 use gaitwright_store::blind_pairs::Judgement;
 use gaitwright_store::feedback::{FeedbackRow, Source};
 use gaitwright_store::measurement_files::MeasurementKind;
 use gaitwright_store::studies::FeedbackMode;
+use std::fmt::Display;
 
 /// A figure with four decimals, or a dash.
 pub(crate) fn figure(value: Option<f64>) -> String {
@@ -37,7 +39,7 @@ pub(crate) fn duration(seconds: f64) -> String {
 pub(crate) fn number(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 || (1e-3..1e5).contains(&magnitude) {
-        return minus(&significant(value));
+        return minus(&grouped(&significant(value)));
     }
     let text = format!("{value:.2e}");
     match text.split_once('e') {
@@ -60,7 +62,7 @@ fn minus(text: &str) -> String {
 
 /// `−0.1 to 0.2`.
 pub(crate) fn range(minimum: f64, maximum: f64) -> String {
-    minus(&format!("{minimum} to {maximum}"))
+    minus(&format!("{} to {}", grouped(&minimum.to_string()), grouped(&maximum.to_string())))
 }
 
 /// The same, or a dash.
@@ -69,17 +71,8 @@ pub(crate) fn optional_number(value: Option<f64>) -> String {
 }
 
 /// A count with separated thousands: `11 664`.
-pub(crate) fn count(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            // A narrow space that lines do not break at.
-            text.push('\u{202f}');
-        }
-        text.push(digit);
-    }
-    text
+pub(crate) fn count(value: impl Display) -> String {
+    grouped(&value.to_string())
 }
 
 /// `not_converged` as `not converged`.
@@ -183,13 +176,7 @@ pub(crate) fn utility(utility: &Prediction) -> String {
 
 /// What a bound limits, with its unit; empty for any other name.
 pub(crate) fn meaning(name: &str) -> &'static str {
-    TunedBounds::NAMES.iter().position(|known| *known == name).map_or("", |place| TunedBounds::MEANINGS[place])
-}
-
-/// The same without its unit.
-pub(crate) fn limited(name: &str) -> &'static str {
-    let meaning = meaning(name);
-    meaning.rsplit_once(", ").map_or(meaning, |(limited, _)| limited)
+    TunedBounds::place_of(name).map_or("", |place| TunedBounds::MEANINGS[place])
 }
 
 /// One bound: name, value, what it limits.
@@ -215,15 +202,11 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits_without_trailing_zeros() {
-        let numbers = [0.0, 1.0, 0.012_345, -79.998, 1234.5, 2.46e-7, -3e-10, 1.5e8].map(number);
+        let numbers = [0.0, 1.0, 0.012_345, -79.998, 1234.5, 12345.6, 2.46e-7, -3e-10, 1.5e8].map(number);
         assert_eq!(
             numbers,
-            ["0", "1", "0.0123", "−80", "1235", "2.46 × 10⁻⁷", "−3.00 × 10⁻¹⁰", "1.50 × 10⁸"].map(str::to_owned)
+            ["0", "1", "0.0123", "−80", "1235", "12\u{202f}346", "2.46 × 10⁻⁷", "−3.00 × 10⁻¹⁰", "1.50 × 10⁸"]
+                .map(str::to_owned)
         );
-    }
-
-    #[test]
-    fn counts_have_separated_thousands() {
-        assert_eq!([7, 999, 11_664, 1_000_000].map(count), ["7", "999", "11\u{202f}664", "1\u{202f}000\u{202f}000"]);
     }
 }

@@ -248,7 +248,7 @@ fn for_people(
     lines.extend(lineage_in_words(r, lineage, start));
     lines.extend(local_optima_in_words(r));
     for violation in outcome.violations.iter().take(10) {
-        lines.push(format!("  violated: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
+        lines.push(format!("  violated: {} by {}", violation.row, violation.amount_in_words()));
     }
     if let Some(explanation) = explanation {
         lines.extend(explanation.sentences().iter().map(|sentence| format!("  {sentence}")));

@@ -48,6 +48,8 @@ macro_rules! select {
 pub struct Correction {
     /// Sequence number.
     pub seq: i64,
+    /// Height and mass before the correction.
+    pub former: Body,
     /// Corrected body height, m.
     pub height_m: f64,
     /// Corrected body mass, kg.
@@ -152,6 +154,7 @@ pub async fn correct(
     reason: &str,
 ) -> StoreResult<Correction> {
     let at = now();
+    let former = get(db, id).await?.body();
     let row = sqlx::query(
         "insert into subject_corrections (subject_id, height_m, body_mass_kg, reason, actor, created_at) \
          values (?, ?, ?, ?, ?, ?) returning seq",
@@ -166,6 +169,7 @@ pub async fn correct(
     .await?;
     Ok(Correction {
         seq: row.try_get("seq")?,
+        former,
         height_m: body.height_m,
         body_mass_kg: body.body_mass_kg,
         reason: reason.to_owned(),
@@ -179,10 +183,19 @@ pub async fn correct(
 /// # Errors
 /// Errors of the database.
 pub async fn corrections(db: &mut Connection, id: SubjectId) -> StoreResult<Vec<Correction>> {
-    let rows = sqlx::query("select * from subject_corrections where subject_id = ? order by seq").bind(id);
+    let rows = sqlx::query(
+        "select c.*, coalesce(lag(c.height_m) over (order by c.seq), s.height_m) as former_height_m, \
+         coalesce(lag(c.body_mass_kg) over (order by c.seq), s.body_mass_kg) as former_body_mass_kg \
+         from subject_corrections c join subjects s on s.id = c.subject_id where c.subject_id = ? order by c.seq",
+    )
+    .bind(id);
     let correction = |row: &SqliteRow| {
         Ok(Correction {
             seq: row.try_get("seq")?,
+            former: Body {
+                height_m: row.try_get("former_height_m")?,
+                body_mass_kg: row.try_get("former_body_mass_kg")?,
+            },
             height_m: row.try_get("height_m")?,
             body_mass_kg: row.try_get("body_mass_kg")?,
             reason: row.try_get("reason")?,

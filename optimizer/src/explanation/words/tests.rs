@@ -30,7 +30,7 @@ fn conflict(bounds: &[(usize, f64)]) -> Conflict {
         bounds: bounds.iter().map(given).collect(),
         without: Vec::new(),
         naturalness_terms: Vec::new(),
-        violations: missed("SS1_R node 12, C3 forward hip velocity"),
+        violations: missed("SS1_R node 12, forward hip velocity"),
         starts: 5,
         undecided: false,
     }
@@ -53,7 +53,7 @@ fn together(to: Option<[f64; 2]>) -> JointRelaxation {
 fn explanation() -> Explanation {
     Explanation {
         status: SolveStatus::Infeasible,
-        violations: missed("stride, C4 walking speed"),
+        violations: missed("stride, walking speed"),
         conflicts: vec![conflict(&[(3, 0.5), (6, 5.0)])],
         gait_found: false,
         at_limit: vec![at_limit(1, 20.0, &["DS2_L", "SS1_L"]), at_limit(3, 0.5, &["stride"])],
@@ -86,19 +86,19 @@ fn headline_names_limits_with_their_direction() {
         of(&[(2, 1.5)]),
         "With a hip velocity of at least 1.5 m/s, there is no gait, whatever the other bounds."
     );
-    assert_eq!(of(&[]), "No value of the tuned bounds gives a gait: fixed constraints conflict.");
+    assert_eq!(of(&[]), "No values of the bounds give a gait: fixed constraints conflict.");
 }
 
 #[test]
 fn sentences_of_an_explanation_come_in_order() {
     let sentences = explanation().sentences();
-    assert!(sentences[0].starts_with("No motion near the last iterate"));
+    assert!(sentences[0].starts_with("No motion near the last one tried"));
     assert_eq!(
         sentences[1..],
         [
             "a4 = 0.5 m/s (hip velocity upper bound) and a7 = 5° (hip angle) conflict with each other: with both, and \
-             the other tuned bounds at their loosest values, no gait was found from 5 starts; the nearest motion violates \
-             SS1_R node 12, C3 forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
+             the other bounds at their loosest values, no gait was found from 5 starts; the nearest motion violates \
+             SS1_R node 12, forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
              there is a gait.",
             "Relaxing a7 (hip angle) alone, to 15° instead of 5°, gives a gait; with 14.6°, no gait was found from 3 \
              starts.",
@@ -116,7 +116,7 @@ fn conflicts_of_any_number_of_bounds_have_sentences() {
     // Only the solves that were done, no proof.
     assert!(
         alone.starts_with(
-            "With a2 = 10 rad/s² (coordinate acceleration) and the other tuned bounds at their loosest values, no gait was \
+            "With a2 = 10 rad/s² (coordinate acceleration) and the other bounds at their loosest values, no gait was \
              found from 5 starts; the nearest motion violates"
         ),
         "{alone}"
@@ -128,9 +128,9 @@ fn conflicts_of_any_number_of_bounds_have_sentences() {
     let fixed = Conflict { naturalness_terms: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
     assert_eq!(
         fixed,
-        "The conflict does not depend on tuned bounds: fixed constraints conflict with each other (among them a slow start). \
-         With every tuned bound at its loosest value, no gait was found from 5 starts; the nearest motion violates SS1_R \
-         node 12, C3 forward hip velocity by 0.107 m/s."
+        "The conflict does not depend on the bounds: fixed constraints conflict with each other (among them a slow start). \
+         With every bound at its loosest value, no gait was found from 5 starts; the nearest motion violates SS1_R \
+         node 12, forward hip velocity by 0.107 m/s."
     );
     let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words();
     assert!(further.starts_with("With a4 at its loosest value, another conflict remains. With a8 = 5°"), "{further}");
@@ -163,7 +163,7 @@ fn missed_gait_is_not_a_conflict() {
 #[test]
 fn explanation_without_conflicts_names_the_largest_violation() {
     let earlier = Explanation { conflicts: Vec::new(), ..explanation() };
-    assert_eq!(earlier.conflicts_in_words(), ["Largest violation: stride, C4 walking speed, by 0.107 m/s."]);
+    assert_eq!(earlier.conflicts_in_words(), ["Largest violation: stride, walking speed, by 0.107 m/s."]);
     let nothing = Explanation { violations: Vec::new(), ..earlier };
     assert!(nothing.conflicts_in_words().is_empty());
     let unknown = Relaxation { starts: 0, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words();
@@ -198,7 +198,7 @@ fn undecided_solves_get_a_caveat() {
 #[test]
 fn violation_gives_the_name_of_its_constraint() {
     let constraint = |row: &str| missed(row)[0].constraint().to_owned();
-    assert_eq!(constraint("SS2_R to SS1_R, C2 continuity of velocity, hip_R"), "C2 continuity of velocity");
+    assert_eq!(constraint("SS2_R to SS1_R, continuity of velocity, right hip"), "continuity of velocity");
     assert_eq!(constraint("stride length"), "stride length");
 }
 

@@ -125,10 +125,9 @@ pub(super) async fn of_study_csv(
 }
 
 fn written(bounds: &TunedBounds, certificate: CertificateState) -> CsvTable {
-    let bounds = TunedBounds::NAMES.iter().zip(bounds.to_array()).zip(TunedBounds::MEANINGS);
+    let bounds = TunedBounds::NAMES.iter().zip(bounds.to_array()).zip(TunedBounds::UNITS).zip(TunedBounds::QUANTITIES);
     let mut table = CsvTable::new(["bound", "value", "unit", "limits", "certificate_of_the_gait"]);
-    for ((name, value), meaning) in bounds {
-        let (limited, unit) = meaning.rsplit_once(", ").unwrap_or((meaning, ""));
+    for (((name, value), unit), limited) in bounds {
         table.row(cells![*name, value, unit, limited, certificate.as_str()]);
     }
     table

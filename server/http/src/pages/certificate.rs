@@ -8,6 +8,7 @@ use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, Difference, RECOVERY_STRIDES};
+use gait_optimizer::number_format::with_unit;
 use gaitwright_service::access::Run;
 use gaitwright_service::studies::certification;
 use gaitwright_store::{TrialId, commit};
@@ -79,7 +80,7 @@ pub(super) struct FormattedCheck {
 impl FormattedCheck {
     fn new(check: Check) -> Self {
         let in_unit = |value: Option<f64>, otherwise: &str| {
-            value.map_or_else(|| otherwise.to_owned(), |value| format!("{} {}", format::number(value), check.unit))
+            value.map_or_else(|| otherwise.to_owned(), |value| with_unit(format::number(value), &check.unit))
         };
         Self {
             value: in_unit(check.value, "not determined"),

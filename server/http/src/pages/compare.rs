@@ -42,6 +42,8 @@ pub(super) struct GaitsQuery {
     a: Option<TrialId>,
     b: Option<TrialId>,
     saved: Option<Recorded>,
+    /// The answer to change; the page shows its comparison.
+    change: Option<Recorded>,
 }
 
 #[derive(Template)]
@@ -59,6 +61,8 @@ struct ComparePage {
     walking: Vec<WalkingGait>,
     key: FeedbackId,
     saved: Option<SavedAnswer>,
+    /// Whether the form changes the saved answer.
+    changes: bool,
     /// Whether the study waits for an answer.
     waits: bool,
     /// How many gaits can be compared once they are certified.
@@ -121,7 +125,11 @@ struct OfferedGait {
 struct SavedAnswer {
     id: Recorded,
     text: String,
+    /// The answer as the form sends it.
+    given: &'static str,
     author: String,
+    source: Source,
+    note: String,
     at: Instant,
     retracted: bool,
     is_safety_report: bool,
@@ -132,6 +140,11 @@ struct SavedAnswer {
 }
 
 impl SavedAnswer {
+    /// Whether another answer can replace it.
+    fn may_be_changed(&self) -> bool {
+        !self.retracted && !self.is_safety_report && self.pair.is_some()
+    }
+
     /// Seconds for which the page offers *Undo*, if the answer is new.
     fn undo(&self) -> Option<f64> {
         undo_seconds(self.at).filter(|_| !self.retracted && !self.is_safety_report)
@@ -188,10 +201,19 @@ async fn show(
     } else {
         StudySnapshot::read(&mut reader, study).await?
     };
-    let saved = match choice.saved {
+    let saved = match choice.change.or(choice.saved) {
         Some(saved) => read_back(&mut reader, &snapshot, saved).await?,
         None => None,
     };
+    let (changes, choice, typed) =
+        match saved.as_ref().filter(|saved| choice.change.is_some() && saved.may_be_changed()) {
+            Some(saved) => {
+                let (a, b) = saved.pair.unzip();
+                let typed = if refused.is_none() { AnswerForm::of(saved) } else { typed };
+                (true, GaitsQuery { a, b, ..choice }, typed)
+            }
+            None => (false, choice, typed),
+        };
     drop(reader);
     let ask = move |pool: &OnPool| {
         let question = if large { Ok(Question::None) } else { open_question(pool, &snapshot) };
@@ -257,6 +279,7 @@ async fn show(
         walking,
         key: FeedbackId::fresh(),
         saved,
+        changes,
         waits,
         being_certified,
         is_going_on,
@@ -284,7 +307,10 @@ async fn read_back(
             answer_in_words(&row, snapshot).map(|text| SavedAnswer {
                 id: saved,
                 text,
+                given: given(&row.content),
                 author: row.author.clone(),
+                source: row.source,
+                note: row.note.clone(),
                 at: row.created_at,
                 retracted: row.retraction.is_some(),
                 is_safety_report: false,
@@ -300,7 +326,10 @@ async fn read_back(
             assessment_in_words(&assessment, snapshot).map(|text| SavedAnswer {
                 id: saved,
                 text,
+                given: "cannot_tell",
                 author: assessment.author.clone(),
+                source: assessment.source,
+                note: assessment.note.clone(),
                 at: assessment.created_at,
                 retracted: assessment.retraction.is_some(),
                 is_safety_report: assessment.answer.is_about_safety(),
@@ -338,9 +367,33 @@ pub(super) async fn post(
         }
         Err(other) => return Err(other.into()),
     };
-    let choice = GaitsQuery { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
+    let change = form.changed().ok().flatten();
+    let choice = GaitsQuery { a: form.a.parse().ok(), b: form.b.parse().ok(), saved, change };
     let typed = (user_of(&authorized.caller), form);
     Ok((status, Box::pin(show(&mut app, id, choice, typed, Some(why))).await?).into_response())
+}
+
+impl AnswerForm {
+    /// The form with an answer that was given.
+    fn of(saved: &SavedAnswer) -> Self {
+        Self {
+            answer: saved.given.to_owned(),
+            source: saved.source.as_str().to_owned(),
+            author: saved.author.clone(),
+            note: saved.note.clone(),
+            ..Self::default()
+        }
+    }
+}
+
+/// A preference as the form sends it, for the pair of [`compared`].
+fn given(content: &FeedbackContent) -> &'static str {
+    match content {
+        FeedbackContent::Preference { winner, loser } if winner < loser => "a",
+        FeedbackContent::Preference { .. } => "b",
+        FeedbackContent::Tie { .. } => "no_difference",
+        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => "",
+    }
 }
 
 /// The two trials of an answer, the earlier one first, so that the order does not repeat the answer.

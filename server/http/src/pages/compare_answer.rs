@@ -18,7 +18,7 @@ use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::blind_pairs::Judgement;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};
-use gaitwright_store::{AssessmentId, Connection, FeedbackId, StudyId, commit};
+use gaitwright_store::{AssessmentId, Connection, FeedbackId, StudyId, Writer, commit};
 use serde::Deserialize;
 use std::fmt;
 use std::str::FromStr;
@@ -65,7 +65,10 @@ pub(super) struct AnswerForm {
     pub(super) author: String,
     #[serde(default)]
     pub(super) note: String,
-    key: String,
+    /// The answer that this one replaces; empty for a new answer.
+    #[serde(default)]
+    pub(super) changes: String,
+    pub(super) key: String,
 }
 
 /// An answer as given in the form.
@@ -92,6 +95,11 @@ impl GivenAnswer {
 }
 
 impl AnswerForm {
+    /// The answer that this one replaces.
+    pub(super) fn changed(&self) -> Result<Option<Recorded>, Error> {
+        if self.changes.is_empty() { Ok(None) } else { Recorded::try_from(self.changes.clone()).map(Some) }
+    }
+
     fn read(&self) -> Result<(GivenAnswer, FeedbackId), Error> {
         let source = Source::from_str(&self.source)
             .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician or script"))?;
@@ -122,8 +130,9 @@ impl AnswerForm {
 
     /// A digest that distinguishes this answer from another one with the same key.
     fn fingerprint(&self, study: StudyId) -> String {
-        let Self { a, b, answer, source, author, note, key } = self;
-        let sent = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
+        let Self { a, b, answer, source, author, note, changes, key } = self;
+        let sent =
+            [a, b, answer, source, author, note, changes, key].map(|part| format!("{}:{part}", part.len())).join(" ");
         fingerprint("form", &format!("/studies/{study}/compare"), sent.as_bytes())
     }
 }
@@ -173,6 +182,9 @@ pub(super) async fn give(
         let recorded = Recorded::try_from(before.body)?;
         return Ok(if same { AnswerOutcome::Saved(recorded) } else { AnswerOutcome::SameForm(recorded) });
     }
+    if let Some(changed) = form.changed()? {
+        retract_recorded(&mut writer, caller, id, changed, (&form.author, CHANGED)).await?;
+    }
     // A second answer is refused, and the page shows the first one. A safety report is always accepted.
     if !judgement.is_about_safety()
         && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
@@ -204,6 +216,27 @@ async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerFo
     }))
 }
 
+/// The reason in the record of an answer that another one replaced.
+const CHANGED: &str = "changed to another answer";
+
+async fn retract_recorded(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: StudyId,
+    recorded: Recorded,
+    (author, reason): (&str, &str),
+) -> Result<(), Error> {
+    match recorded {
+        Recorded::Preference(given) => {
+            answer::retract(writer, caller, Some(study), given, Some(author), reason).await?;
+        }
+        Recorded::Assessment(made) => {
+            assessment::retract(writer, caller, Some(study), made, (Some(author), reason)).await?;
+        }
+    }
+    Ok(())
+}
+
 /// The form to retract an answer.
 #[derive(Debug, Deserialize)]
 pub(super) struct RetractForm {
@@ -220,15 +253,7 @@ pub(super) async fn retract(
     Form(form): Form<RetractForm>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    let author = Some(form.author.as_str());
-    match form.saved {
-        Recorded::Preference(given) => {
-            answer::retract(&mut writer, &authorized.caller, Some(id), given, author, &form.reason).await?;
-        }
-        Recorded::Assessment(made) => {
-            assessment::retract(&mut writer, &authorized.caller, Some(id), made, (author, &form.reason)).await?;
-        }
-    }
+    retract_recorded(&mut writer, &authorized.caller, id, form.saved, (&form.author, &form.reason)).await?;
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)))

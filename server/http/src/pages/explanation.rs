@@ -9,8 +9,8 @@ use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
-use gait_optimizer::Violation;
-use gait_optimizer::explanation::{Explanation, quantity, status_in_words, unit_after_number};
+use gait_optimizer::explanation::{Explanation, quantity, status_in_words};
+use gait_optimizer::{TunedBounds, Violation};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, Elapsed, ExplanationEffort, ExplanationState};
@@ -110,7 +110,7 @@ impl FeasibleRelaxation {
     }
 
     fn of(relaxation: &Relaxation, possible: Result<RelaxedTrial, NoRelaxedTrial>) -> Self {
-        let label = |(bound, value): &(String, f64)| quantity(bound, format::meaning(bound), *value);
+        let label = |(bound, value): &(String, f64)| quantity(bound, *value);
         let relax = |(bound, value): &(String, f64)| format!("{bound}={value}");
         let offer = |trial: RelaxedTrial| RelaxedTrialOffer {
             bounds: trial
@@ -132,7 +132,7 @@ impl FeasibleRelaxation {
 
 /// `a7 = 35°`.
 fn with_unit(bound: &str, value: f64) -> String {
-    format!("{bound} = {value}{}", unit_after_number(format::meaning(bound)))
+    format!("{bound} = {}", TunedBounds::in_unit(bound, value))
 }
 
 /// Which relaxation of the explanation to try, counted from 0.

@@ -16,6 +16,7 @@ mod gait;
 mod gait_summary;
 mod help;
 mod home;
+mod jobs;
 mod joint_peaks;
 mod lab;
 mod lab_walk;
@@ -30,6 +31,7 @@ mod rate;
 mod reached_bounds;
 mod reference_gaits;
 mod safety_review;
+mod saved;
 mod sensitivities;
 mod sign_in;
 mod simulated_walks;
@@ -100,6 +102,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/lab/{id}/answer", post(lab_walk::answer))
         .route("/lab/{id}/retract", post(lab_walk::retract))
+        .route("/jobs/{id}/cancel", post(jobs::cancel))
         .route("/units", post(units::post))
         .route("/users", get(users::get).post(users::post))
         .route("/audit", get(audit::get))

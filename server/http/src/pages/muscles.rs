@@ -1,9 +1,10 @@
 //! The form for measured muscle parameters of a subject, which override the default ones.
 
+use super::saved::{Saved, confirmed};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extractors::{Form, FormFields};
+use crate::extractors::{Form, FormFields, Params};
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
@@ -39,6 +40,7 @@ struct MusclesPage {
     rows: Vec<MuscleRow>,
     scaled_to_body: bool,
     may_run: bool,
+    saved: bool,
     refused: Option<FieldError>,
 }
 
@@ -89,7 +91,7 @@ fn shown(
     let cell = rows.iter().flat_map(|row| &row.cells).find(|cell| cell.refused);
     let message = refused.as_ref().zip(cell).map(|(refused, cell)| form_errors::of_field(&cell.label, refused));
     let refused = refused.map(|refused| FieldError { message: message.unwrap_or(refused.message), ..refused });
-    MusclesPage { subject, columns: MuscleOverride::FIELDS, rows, scaled_to_body, may_run, refused }
+    MusclesPage { subject, columns: MuscleOverride::FIELDS, rows, scaled_to_body, may_run, saved: false, refused }
 }
 
 /// `muscles.sol.max_force_n` is the field `sol_max_force_n`.
@@ -102,12 +104,13 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<SubjectId, Read>,
+    Params(Saved { saved }): Params<Saved>,
 ) -> PageResult {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let muscles = subjects::muscles(&mut reader, id).await?;
     drop(reader);
-    page(&shown(subject, &muscles, authorized.caller.may(Run::NEEDED), None))
+    page(&MusclesPage { saved, ..shown(subject, &muscles, authorized.caller.may(Run::NEEDED), None) })
 }
 
 /// `POST /subjects/{id}/muscles`.
@@ -127,7 +130,7 @@ pub(super) async fn post(
     match set {
         Ok(()) => {
             commit(writer).await?;
-            Ok(Redirect::to(&format!("/subjects/{id}/muscles")).into_response())
+            Ok(Redirect::to(&confirmed(&format!("/subjects/{id}/muscles"))).into_response())
         }
         Err(Error::Invalid(refused)) => {
             let status = Problem::from(&Error::Invalid(refused.clone())).status();

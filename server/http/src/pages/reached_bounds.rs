@@ -5,14 +5,12 @@ use gait_optimizer::gait::kept_clearance_m;
 use gait_optimizer::{Gait, TunedBounds, UnchangedBound};
 use gaitwright_service::error::Error;
 
-/// A bound is active if the gait reaches this share of it.
-const ACTIVE: f64 = 0.99;
-
 /// A bound, and the extreme value that the gait reaches.
 pub(super) struct BoundUse {
     pub(super) bound: format::Bound,
     /// The extreme value of the gait; `None` if it is not computed.
     pub(super) reached: Option<String>,
+    /// Whether any change of the bound changes the gait.
     pub(super) active: bool,
     /// Values of the bound with which the gait stays a solution; `None` if unknown.
     pub(super) unchanged_for: Option<String>,
@@ -30,17 +28,13 @@ pub(super) fn of(
     let extremes = gait.map(extremes).transpose()?.unwrap_or_default();
     let values = action.to_array();
     let with_use = |(place, bound): (usize, format::Bound)| {
-        let reached = extremes[place];
-        // A violated bound counts as active: the solve did not converge, and this bound is a reason.
         let value = values[place];
-        let is_lower = TunedBounds::IS_LOWER[place];
-        let is_active = |reached: f64| if is_lower { ACTIVE * reached <= value } else { reached >= ACTIVE * value };
         let interval = unchanged.iter().find(|interval| interval.bound == bound.name);
         BoundUse {
             unchanged_for: interval.map(|interval| in_words(interval, value)),
             bound,
-            reached: reached.map(format::number),
-            active: reached.is_some_and(is_active),
+            reached: extremes[place].map(format::number),
+            active: interval.is_some_and(|interval| interval.is_active(value)),
         }
     };
     Ok(format::bounds(action).into_iter().enumerate().map(with_use).collect())

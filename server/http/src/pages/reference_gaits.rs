@@ -40,6 +40,8 @@ pub(super) struct ReferenceGaitFields {
     heel_strikes_s: String,
     height_m: String,
     body_mass_kg: String,
+    /// The units in which the form was shown.
+    units: Units,
     /// `preview`, or else an import.
     button: String,
 }
@@ -47,7 +49,6 @@ pub(super) struct ReferenceGaitFields {
 impl ReferenceGaitFields {
     fn read(&self) -> Result<NewReferenceGait, Error> {
         let given = |text: &str| Some(text.trim().to_owned()).filter(|text| !text.is_empty());
-        let size = |field, text: &str| given(text).map(|text| number(field, &text)).transpose();
         Ok(NewReferenceGait {
             name: self.name.clone(),
             format: self.format,
@@ -65,8 +66,10 @@ impl ReferenceGaitFields {
                 None => Vec::new(),
                 Some(text) => text.split(',').map(|part| number("heel_strikes_s", part)).collect::<Result<_, _>>()?,
             },
-            height_m: size("height_m", &self.height_m)?,
-            body_mass_kg: size("body_mass_kg", &self.body_mass_kg)?,
+            height_m: given(&self.height_m).map(|text| self.units.read_height("height_m", &text)).transpose()?,
+            body_mass_kg: given(&self.body_mass_kg)
+                .map(|text| self.units.read_mass("body_mass_kg", &text))
+                .transpose()?,
         })
     }
 }

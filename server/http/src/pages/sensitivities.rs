@@ -1,7 +1,7 @@
 //! Sensitivities on the page of a gait.
 
 use crate::format;
-use gait_optimizer::explanation::unit_after_number;
+use gait_optimizer::TunedBounds;
 use gait_optimizer::sensitivity::BoundSensitivity;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
@@ -46,10 +46,12 @@ impl SensitivityRow {
     fn new(bound: &BoundSensitivity, step: &BoundStep, cost_of_transport: f64) -> Self {
         let is_active = !bound.active.is_empty();
         let changes = |text: String| if is_active { text } else { "no change".to_owned() };
-        let unit = unit_after_number(format::meaning(bound.bound));
         Self {
             bound: bound.bound,
-            step: format!("{} to {}{unit}", format::number(bound.value), format::number(step.to)),
+            step: TunedBounds::in_unit(
+                bound.bound,
+                format_args!("{} to {}", format::number(bound.value), format::number(step.to)),
+            ),
             cost: changes(change(100.0 * step.cost_of_transport / cost_of_transport)),
             rmse: changes(change(step.gait_rmse_rad)),
             beyond: !step.keeps_active,

@@ -1,9 +1,10 @@
 //! The page for the name, tags and notes of a study, which also archives and clones it.
 
+use super::saved::{Saved, confirmed};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extractors::Form;
+use crate::extractors::{Form, Params};
 use crate::form_errors;
 use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
@@ -28,6 +29,7 @@ struct DetailsPage {
     study: Study,
     fields: StudyDetailsFields,
     may_run: bool,
+    saved: bool,
     refused: Option<String>,
 }
 
@@ -84,20 +86,22 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
+    Params(Saved { saved }): Params<Saved>,
 ) -> PageResult {
-    show(&app, &authorized.caller, id, None, None).await
+    show(&app, &authorized.caller, id, saved, None).await
 }
 
 async fn show(
     app: &AppState,
     caller: &Caller,
     id: StudyId,
-    typed: Option<StudyDetailsFields>,
-    refused: Option<String>,
+    saved: bool,
+    refusal: Option<(Option<StudyDetailsFields>, String)>,
 ) -> PageResult {
+    let (typed, refused) = refusal.map_or((None, None), |(typed, refused)| (typed, Some(refused)));
     let study = studies::get(&mut *app.read().await?, id).await?;
     let fields = typed.unwrap_or_else(|| StudyDetailsFields::of(&study));
-    page(&DetailsPage { study, fields, may_run: caller.may(Run::NEEDED), refused })
+    page(&DetailsPage { study, fields, may_run: caller.may(Run::NEEDED), saved, refused })
 }
 
 /// `POST /studies/{id}/details`.
@@ -112,15 +116,16 @@ pub(super) async fn post(
         Ok(()) => {
             commit(writer).await?;
             app.scheduler.changed();
-            let to = if fields.button == "archive" { "/".to_owned() } else { format!("/studies/{id}") };
+            let to =
+                if fields.button == "archive" { "/".to_owned() } else { confirmed(&format!("/studies/{id}/details")) };
             Ok(Redirect::to(&to).into_response())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
             drop(writer);
             let status = Problem::from(&error).status();
-            let refused = Some(form_errors::of_form(&error, LABELS));
+            let refused = form_errors::of_form(&error, LABELS);
             let typed = Some(fields).filter(|fields| fields.button == "save");
-            Ok((status, show(&app, &authorized.caller, id, typed, refused).await?).into_response())
+            Ok((status, show(&app, &authorized.caller, id, false, Some((typed, refused))).await?).into_response())
         }
         Err(error) => Err(error.into()),
     }

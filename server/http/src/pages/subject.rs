@@ -1,10 +1,10 @@
 //! The page of a subject, with the forms for consent, withdrawal and corrections.
 
+use super::saved::{Saved, confirmed};
 use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
-use crate::body_measures;
-use crate::extractors::Form;
+use crate::extractors::{Form, Params};
 use crate::form_errors;
 use crate::format::{variant, words};
 use crate::page_error::{PageError, PageResult, page};
@@ -47,6 +47,7 @@ struct SubjectPage {
     /// The newest correction that the form knows, so that a repeated form is recorded once.
     corrected: i64,
     may_administer: bool,
+    saved: bool,
     refused: Option<String>,
     /// The correction as typed, or the present values.
     correction: Correcting,
@@ -76,17 +77,19 @@ struct Correcting {
 }
 
 impl Correcting {
-    fn of(subject: &Subject) -> Self {
-        let (height_m, body_mass_kg) = (subject.height_m.to_string(), subject.body_mass_kg.to_string());
+    fn of(subject: &Subject, units: Units) -> Self {
+        let (height_m, body_mass_kg) = (units.height_entry(subject.height_m), units.mass_entry(subject.body_mass_kg));
         Self { height_m, body_mass_kg, reason: String::new(), refused: false }
     }
 }
 
-/// The entries of a refused form of the page.
+/// What became of a form of the page; the entries of a refused one.
 #[derive(Default)]
-enum RefusedForm {
+enum SentForm {
     #[default]
     Nothing,
+    /// The form was saved.
+    Saved,
     Correction(Correcting),
     Withdrawal(String),
 }
@@ -112,8 +115,10 @@ pub(super) async fn get(
     State(app): State<AppState>,
     units: Units,
     Id(id, _): Id<SubjectId, Read>,
+    Params(Saved { saved }): Params<Saved>,
 ) -> PageResult {
-    show(&app, units, id, &authorized.caller, None, RefusedForm::Nothing).await
+    let form = if saved { SentForm::Saved } else { SentForm::Nothing };
+    show(&app, units, id, &authorized.caller, None, form).await
 }
 
 async fn show(
@@ -122,7 +127,7 @@ async fn show(
     id: SubjectId,
     caller: &Caller,
     refused: Option<String>,
-    typed: RefusedForm,
+    typed: SentForm,
 ) -> PageResult {
     let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
     let mut reader = app.read().await?;
@@ -139,11 +144,12 @@ async fn show(
     drop(reader);
     let after = last.map_or(0, |last| last.seq);
     let corrected = corrections.last().map_or(0, |last| last.seq);
-    let (mut correction, mut withdrawal_reason) = (Correcting::of(&subject), String::new());
+    let (mut correction, mut withdrawal_reason) = (Correcting::of(&subject, units), String::new());
+    let saved = matches!(typed, SentForm::Saved);
     match typed {
-        RefusedForm::Nothing => {}
-        RefusedForm::Correction(typed) => correction = typed,
-        RefusedForm::Withdrawal(reason) => withdrawal_reason = reason,
+        SentForm::Nothing | SentForm::Saved => {}
+        SentForm::Correction(typed) => correction = typed,
+        SentForm::Withdrawal(reason) => withdrawal_reason = reason,
     }
     page(&SubjectPage {
         units,
@@ -157,6 +163,7 @@ async fn show(
         corrections,
         corrected,
         may_administer,
+        saved,
         refused,
         correction,
         withdrawal_reason,
@@ -204,7 +211,7 @@ pub(super) async fn consent(
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let done = give(&app, &authorized, id, form).await;
-    answer(&app, units, id, &authorized.caller, done, RefusedForm::Nothing).await
+    answer(&app, units, id, &authorized.caller, done, SentForm::Nothing).await
 }
 
 async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
@@ -233,7 +240,7 @@ pub(super) async fn withdraw(
             "Nothing was changed. First tick the box to confirm that all studies of this subject stop.",
         ))
     };
-    answer(&app, units, id, &authorized.caller, done, RefusedForm::Withdrawal(why.reason)).await
+    answer(&app, units, id, &authorized.caller, done, SentForm::Withdrawal(why.reason)).await
 }
 
 /// The form of a withdrawal.
@@ -261,6 +268,9 @@ async fn end(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, why: &
 pub(super) struct CorrectionForm {
     height_m: String,
     body_mass_kg: String,
+    /// The units in which the form was shown.
+    #[serde(default)]
+    units: Units,
     reason: String,
     before: i64,
 }
@@ -280,7 +290,7 @@ pub(super) async fn correct(
         refused: true,
     };
     let done = set_right(&app, &authorized, id, form).await;
-    answer(&app, units, id, &authorized.caller, done, RefusedForm::Correction(typed)).await
+    answer(&app, units, id, &authorized.caller, done, SentForm::Correction(typed)).await
 }
 
 async fn set_right(
@@ -289,7 +299,7 @@ async fn set_right(
     id: SubjectId,
     form: CorrectionForm,
 ) -> Result<(), Error> {
-    let (height_m, body_mass_kg) = body_measures::height_and_mass(&form.height_m, &form.body_mass_kg)?;
+    let (height_m, body_mass_kg) = form.units.read_height_and_mass(&form.height_m, &form.body_mass_kg)?;
     let new = NewCorrection { height_m, body_mass_kg, reason: form.reason };
     let mut writer = app.write().await?;
     let newest = subjects::corrections(&mut writer, id).await?.last().map_or(0, |last| last.seq);
@@ -307,10 +317,10 @@ async fn answer(
     id: SubjectId,
     caller: &Caller,
     done: Result<(), Error>,
-    typed: RefusedForm,
+    typed: SentForm,
 ) -> Result<Response, PageError> {
     match done {
-        Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
+        Ok(()) => Ok(Redirect::to(&confirmed(&format!("/subjects/{id}"))).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
             let shown = show(app, units, id, caller, Some(form_errors::in_words(&error)), typed).await?;
             Ok((Problem::from(&error).status(), shown).into_response())

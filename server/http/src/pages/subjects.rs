@@ -2,7 +2,6 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::body_measures;
 use crate::extractors::{Form, Params};
 use crate::form_errors;
 use crate::page_error::{PageError, PageResult, page};
@@ -53,12 +52,14 @@ pub(super) struct SubjectFields {
     pseudonym: String,
     height_m: String,
     body_mass_kg: String,
+    /// The units in which the form was shown.
+    units: Units,
     notes: String,
 }
 
 impl SubjectFields {
     fn read(&self) -> Result<NewSubject, Error> {
-        let (height_m, body_mass_kg) = body_measures::height_and_mass(&self.height_m, &self.body_mass_kg)?;
+        let (height_m, body_mass_kg) = self.units.read_height_and_mass(&self.height_m, &self.body_mass_kg)?;
         Ok(NewSubject { pseudonym: self.pseudonym.clone(), height_m, body_mass_kg, notes: self.notes.clone() })
     }
 }
@@ -74,8 +75,8 @@ fn faults(fields: &SubjectFields) -> Vec<FieldError> {
         }
         match fault.field.as_str() {
             "pseudonym" => "S01".clone_into(&mut repaired.pseudonym),
-            "height_m" => "1.75".clone_into(&mut repaired.height_m),
-            "body_mass_kg" => "70".clone_into(&mut repaired.body_mass_kg),
+            "height_m" => "1.75 m".clone_into(&mut repaired.height_m),
+            "body_mass_kg" => "70 kg".clone_into(&mut repaired.body_mass_kg),
             _ => repaired.notes.clear(),
         }
         found.push(form_errors::with_label(*fault));

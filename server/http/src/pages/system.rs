@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use crate::authorization::Authorized;
-use crate::format::{duration, words};
+use crate::format::{count, duration, words};
 use crate::page_error::{PageResult, page};
 use crate::readiness;
 use crate::workers::Workers;
@@ -94,7 +94,7 @@ impl SystemPage {
         if counts.is_empty() {
             return "none".to_owned();
         }
-        counts.iter().map(|(state, count)| format!("{count} {}", shown(state))).collect::<Vec<_>>().join(", ")
+        counts.iter().map(|(state, rows)| format!("{} {}", count(rows), shown(state))).collect::<Vec<_>>().join(", ")
     }
 }
 

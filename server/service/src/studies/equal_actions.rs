@@ -3,7 +3,7 @@
 
 use super::snapshot::StudySnapshot;
 use gait_learner::{Dimension, ExcludedActions, LearnerError};
-use gait_optimizer::UnchangedBound;
+use gait_optimizer::{TunedBounds, UnchangedBound};
 use gaitwright_store::trials::{Trial, TrialState};
 use std::ops::Range;
 
@@ -30,8 +30,9 @@ pub(super) fn equal_actions(snapshot: &StudySnapshot) -> Result<ExcludedActions,
 pub fn never_active(snapshot: &StudySnapshot) -> Vec<String> {
     let gaits: Vec<&Trial> = converged(snapshot).collect();
     let is_inactive = |trial: &Trial, name: &str| {
-        let bounds = trial.report.iter().flat_map(|report| &report.unchanged_bounds);
-        bounds.filter(|bound| bound.bound == name).any(|bound| bound.least != bound.most || bound.least.is_none())
+        let mut bounds = trial.report.iter().flat_map(|report| &report.unchanged_bounds);
+        let value = TunedBounds::place_of(name).map(|place| trial.action.to_array()[place]);
+        bounds.any(|bound| bound.bound == name && value.is_some_and(|value| !bound.is_active(value)))
     };
     let tuned = snapshot.study.plan.search_space.dimensions().iter().filter(|dimension| dimension.values.len() > 1);
     tuned

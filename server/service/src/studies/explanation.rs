@@ -172,7 +172,7 @@ async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, 
         )));
     };
     if !gaits::exists(db, trial.id).await? {
-        return Err(Error::conflict(format!("The last iterate of trial {number} was not kept.")));
+        return Err(Error::conflict(format!("The last motion tried in trial {number} was not kept.")));
     }
     Ok(status)
 }

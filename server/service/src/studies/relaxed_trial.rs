@@ -44,8 +44,8 @@ pub enum NoRelaxedTrial {
     NotTuned(String),
     /// The search space has no value that is loose enough.
     #[error(
-        "The loosest value of {bound} in this study is {loosest} {}, which is not loose enough.",
-        TunedBounds::unit_of(bound)
+        "The loosest value of {bound} in this study is {}, which is not loose enough.",
+        TunedBounds::in_unit(bound, loosest)
     )]
     OutsideSearchSpace {
         /// The bound.
@@ -276,6 +276,6 @@ mod tests {
         assert_eq!(found(&[("a6", 0.2)]), Err(NoRelaxedTrial::NotTuned("a6".to_owned())));
         let refused = found(&[("a7", 51.0)]).unwrap_err();
         assert_eq!(refused, NoRelaxedTrial::OutsideSearchSpace { bound: "a7".to_owned(), loosest: 50.0 });
-        assert_eq!(refused.to_string(), "The loosest value of a7 in this study is 50 °, which is not loose enough.");
+        assert_eq!(refused.to_string(), "The loosest value of a7 in this study is 50°, which is not loose enough.");
     }
 }

@@ -121,6 +121,11 @@ impl StudySnapshot {
         self.study.plan.feedback_mode == FeedbackMode::Human && !self.feedback.iter().any(is_answer_of_a_person)
     }
 
+    /// Whether results and answers name a best action: a trial converged, and people, if they answer, have done so.
+    pub fn has_best_action(&self) -> bool {
+        !self.waits_for_first_answer() && self.trials.iter().any(|trial| trial.state == TrialState::Converged)
+    }
+
     /// Number of queued or running trials.
     pub fn open(&self) -> usize {
         self.trials.iter().filter(|trial| trial.state.is_open()).count()

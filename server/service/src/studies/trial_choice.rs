@@ -55,7 +55,7 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> R
         number,
         action_index: proposal.action,
         action: search_space::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
-        reason: reason_in_words(proposal.reason),
+        reason: reason_in_words(proposal.reason, snapshot.has_best_action()),
         best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
         warm_started_from: warm_start_of_next(snapshot, belief)?,
     })
@@ -136,8 +136,11 @@ pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
     (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.forbids(best)).then_some(best.id)
 }
 
-fn reason_in_words(reason: ProposalReason) -> String {
+/// Without a best action, the learner works from one of the actions tried.
+fn reason_in_words(reason: ProposalReason, has_best_action: bool) -> String {
     match reason {
+        ProposalReason::ThompsonOnLine if !has_best_action => "on a line through an action tried before",
+        ProposalReason::ExpectedBestUtility if !has_best_action => "most useful comparison with an action tried before",
         ProposalReason::FirstAction => "first trial, drawn at random",
         ProposalReason::RandomAction => "drawn at random",
         ProposalReason::ThompsonOnLine => "on a line through the best action",

@@ -202,14 +202,14 @@ fn message_of(outcome: &SolveOutcome) -> String {
     let worst = outcome.violations.first();
     let cause = match outcome.report.status {
         SolveStatus::Converged => return String::new(),
-        SolveStatus::Infeasible => "No gait near the last iterate satisfies all constraints.",
+        SolveStatus::Infeasible => "No gait near the last motion tried satisfies all constraints.",
         SolveStatus::Stalled => "The solver stalled.",
         SolveStatus::IterationLimit => "The solver reached the iteration limit.",
         SolveStatus::TimeLimit => "The solver reached the time limit.",
         SolveStatus::Cancelled => "The solve was cancelled.",
     };
     match worst {
-        Some(row) => format!("{cause} Largest violation: {}, by {:.3e} {}.", row.row, row.amount, row.unit),
+        Some(row) => format!("{cause} Largest violation: {}, by {}.", row.row, row.amount_in_words()),
         None => cause.to_owned(),
     }
 }

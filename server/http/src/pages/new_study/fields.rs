@@ -1,6 +1,7 @@
 //! The fields of the form for a new study: their defaults, those of a clone, and their labels.
 
 use crate::form_errors;
+use crate::units::Units;
 use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::{LocalOptimumChoice, TunedBounds};
 use gaitwright_service::error::{Error, FieldError};
@@ -27,6 +28,9 @@ pub(crate) struct NewStudyFields {
     pub(super) height_m: String,
     #[serde(default)]
     pub(super) body_mass_kg: String,
+    /// The units in which the form was shown.
+    #[serde(default)]
+    pub(super) units: Units,
     #[serde(default)]
     pub(super) device: String,
     #[serde(default)]
@@ -71,6 +75,7 @@ impl Default for NewStudyFields {
             pseudonym: String::new(),
             height_m: String::new(),
             body_mass_kg: String::new(),
+            units: Units::default(),
             device: String::new(),
             reference_gait: String::new(),
             muscles: text("on"),

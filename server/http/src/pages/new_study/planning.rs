@@ -3,7 +3,6 @@
 use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal, learner, place_in_form};
 use super::space_editor::SpaceEditor;
 use crate::accessible::Named;
-use crate::body_measures;
 use gait_optimizer::{LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::{Error, FieldError};
@@ -116,8 +115,8 @@ fn subject_of(fields: &NewStudyFields) -> Result<StudySubject, Error> {
     }
     Ok(StudySubject::New(NewSubject {
         pseudonym: fields.pseudonym.clone(),
-        height_m: body_measures::height_m("height_m", &fields.height_m)?,
-        body_mass_kg: body_measures::mass_kg("body_mass_kg", &fields.body_mass_kg)?,
+        height_m: fields.units.read_height("height_m", &fields.height_m)?,
+        body_mass_kg: fields.units.read_mass("body_mass_kg", &fields.body_mass_kg)?,
         notes: String::new(),
     }))
 }

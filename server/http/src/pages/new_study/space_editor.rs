@@ -47,7 +47,7 @@ impl SpaceEditor {
             BoundEntries {
                 name,
                 meaning: TunedBounds::MEANINGS[bound],
-                allowed: format!("{low} to {high} {}", TunedBounds::unit_of(name)),
+                allowed: TunedBounds::in_unit(name, format_args!("{low} to {high}")),
                 tuned: fields.is_empty() || fields.contains_key(&format!("tuned_{name}")),
                 values: text("values", preset.join(", ")),
                 lengthscale: text("lengthscale", lengthscale.to_string()),

@@ -16,7 +16,7 @@ pub(super) struct AnswerRow {
     pub(super) note: String,
     /// Why it no longer counts.
     pub(super) undone: Option<String>,
-    /// `saved` of the comparison page that can retract it.
+    /// `change` of the comparison page that can change it.
     pub(super) saved: Option<String>,
     pub(super) at: Instant,
 }

@@ -40,6 +40,7 @@ pub(super) struct Live {
     state: String,
     transitions: Vec<TransitionButton>,
     /// Whether it can be stopped.
+    may_run: bool,
     may_stop: bool,
     /// Whether it has ended and can get more trials.
     may_extend: bool,
@@ -328,6 +329,7 @@ fn view(
     let transitions = if may_run { transitions_for_people(snapshot.study.state) } else { Vec::new() };
     Live {
         state: lifecycle::in_words(snapshot.study.state).to_owned(),
+        may_run,
         may_stop: transitions.contains(&StudyTransition::Stop),
         may_extend: transitions.contains(&StudyTransition::Extend),
         transitions: transitions.into_iter().filter_map(button).collect(),
@@ -335,7 +337,7 @@ fn view(
         queued: String::new(),
         without_gait,
         never_active: String::new(),
-        progress: [counts.results(), snapshot.study.plan.trial_budget].map(|trials| format::count(trials.into())),
+        progress: [counts.results(), snapshot.study.plan.trial_budget].map(format::count),
         counts,
         running,
         best,
@@ -349,7 +351,7 @@ fn view(
         tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| PageChart::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
-        question: outcome.question && snapshot.study.state != StudyState::Stopped,
+        question: outcome.question,
         question_after: outcome
             .question_after
             .filter(|_| !snapshot.study.state.has_ended())

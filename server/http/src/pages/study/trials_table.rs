@@ -154,7 +154,7 @@ fn states(chosen: Option<TrialState>) -> Vec<StateChoice> {
 }
 
 fn extent(shown: u32, offset: u32, matching: u32, total: u32) -> String {
-    let count = |value: u32| format::count(value.into());
+    let count = |value: u32| format::count(value);
     if shown == 0 {
         return format!("No matching trials; {} in total.", count(total));
     }

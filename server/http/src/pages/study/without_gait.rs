@@ -1,6 +1,6 @@
 //! One sentence about why trials of a study have no gait.
 
-use crate::format;
+use gait_optimizer::TunedBounds;
 use gaitwright_store::TrialId;
 use gaitwright_store::explanations::{Common, Relief};
 use gaitwright_store::trials::{Trial, TrialState};
@@ -20,7 +20,7 @@ impl TrialsWithoutGait {
     pub(super) fn of(trials: &[Trial], common: &Common) -> Option<Self> {
         let explained = common.explained;
         if let Some(Relief { bound, trials, instance }) = &common.relief {
-            let limited = format::limited(bound);
+            let limited = TunedBounds::quantity_of(bound);
             let reason = format!(
                 "In {trials} of {explained} explained trials, relaxing {bound} ({limited}) alone gives a gait."
             );
