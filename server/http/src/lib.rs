@@ -6,6 +6,7 @@
 pub mod access_log;
 mod accessible;
 pub mod api;
+mod attachment;
 mod authentication;
 mod authorization;
 mod blind_motion;
