@@ -77,12 +77,6 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 # files` describes it.
 JointAngleFormat = Literal["opensim", "camargo", "csv"]
 
-# Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. `retracted` is
-# reserved for the service.
-Judgement = Literal[
-    "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
-]
-
 # Identifier of a lab session.
 LabSessionId = str
 
@@ -105,6 +99,12 @@ MemberId = str
 
 # Kind of member.
 MemberKind = Literal["user", "token"]
+
+# Answer about two gaits in the order in which they were shown or walked: which one is better, no difference, cannot
+# tell, or which one is unsafe. `retracted` is reserved for the service.
+OrderedAnswer = Literal[
+    "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
+]
 
 # Outcome of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too.
 Outcome = Literal["converged", "not_converged"]
@@ -608,14 +608,14 @@ class CreatedInvitation(TypedDict):
     path: str
 
 
-class _FeedbackRowRequired(TypedDict):
+class _PreferenceRequired(TypedDict):
     # Name or pseudonym of the person who answered.
     author: str
     # Whether it comes from a rater's blind comparison.
     by_rater: bool
-    # Content of the entry.
-    content: FeedbackContent
-    # Whether the rater could have known the allocation. If so, the entry does not count as blind.
+    # What was preferred, in terms of trials.
+    content: PreferenceContent
+    # Whether the rater could have known the allocation. If so, it does not count as blind.
     could_have_known: bool
     # Time of recording.
     created_at: Instant
@@ -631,14 +631,14 @@ class _FeedbackRowRequired(TypedDict):
     study_id: StudyId
 
 
-class FeedbackRow(_FeedbackRowRequired, total=False):
-    """An entry of the feedback of a study."""
+class Preference(_PreferenceRequired, total=False):
+    """A preference, a tie or a suggestion of a study."""
 
-    # Retraction. Null if the entry was not retracted.
+    # Retraction. Null if it was not retracted.
     retraction: Optional[Retraction]
 
 
-class CreatedPreference(FeedbackRow):
+class CreatedPreference(Preference):
     """Recorded preference."""
 
     # Identifiers of other people's preferences about the same two gaits, at most the twenty newest.
@@ -866,50 +866,6 @@ class Extend(TypedDict):
 
     # Total number of trials. Must exceed the current budget.
     trial_budget: int
-
-
-class FeedbackContentLabel(TypedDict):
-    """Label of a trial."""
-
-    # Category: 0 for not converged, 1 for converged.
-    category: int
-    # Kind of entry.
-    kind: Literal["label"]
-    # Identifier of the trial.
-    trial: TrialId
-
-
-class FeedbackContentPreference(TypedDict):
-    """One trial is better than another."""
-
-    # Kind of entry.
-    kind: Literal["preference"]
-    # Worse trial.
-    loser: TrialId
-    # Better trial.
-    winner: TrialId
-
-
-class FeedbackContentTie(TypedDict):
-    """Two trials are equally good."""
-
-    # One trial.
-    a: TrialId
-    # The other trial.
-    b: TrialId
-    # Kind of entry.
-    kind: Literal["tie"]
-
-
-class FeedbackContentSuggestion(TypedDict):
-    """An action would have been better than a trial."""
-
-    # Kind of entry.
-    kind: Literal["suggestion"]
-    # Trial that it would have been better than.
-    over: TrialId
-    # Index of the suggested action.
-    suggested: int
 
 
 class Fork(TypedDict, total=False):
@@ -1218,7 +1174,7 @@ class LabAnswer(TypedDict):
     # Who recorded it.
     actor: str
     # The answer. First is walk 2, second is walk 3.
-    answer: Judgement
+    answer: OrderedAnswer
     # Whether the person who recorded the answer could have known the allocation: it was recorded after unblinding, or
     # by a user who had fetched a controller file.
     could_have_known: bool
@@ -1325,8 +1281,9 @@ class LearnerSettings(TypedDict, total=False):
     labels: Literal["in_utility", "separate"]
     # Factor on the lengthscale of every dimension.
     lengthscale_factor: float
-    # Number of trials after which `eubo` searches the whole search space instead of lines.
-    line_trials: int
+    # Number of trials after which `eubo` searches the whole search space instead of lines. Null: it always searches
+    # lines.
+    line_trials: Optional[int]
     # Number of random lines through the best action that `eubo` searches. With 0, it searches the whole search space.
     lines: int
     # Distribution of the noise: `logistic`, or `probit` for the normal distribution.
@@ -2018,6 +1975,50 @@ class PhasePortrait(TypedDict):
     joint: str
     # Velocity, rad/s.
     velocity_rad_s: list[float]
+
+
+class PreferenceContentLabel(TypedDict):
+    """Label of a trial."""
+
+    # Category: 0 for not converged, 1 for converged.
+    category: int
+    # Kind of preference.
+    kind: Literal["label"]
+    # Identifier of the trial.
+    trial: TrialId
+
+
+class PreferenceContentPreference(TypedDict):
+    """One trial is better than another."""
+
+    # Kind of preference.
+    kind: Literal["preference"]
+    # Worse trial.
+    loser: TrialId
+    # Better trial.
+    winner: TrialId
+
+
+class PreferenceContentTie(TypedDict):
+    """Two trials are equally good."""
+
+    # One trial.
+    a: TrialId
+    # The other trial.
+    b: TrialId
+    # Kind of preference.
+    kind: Literal["tie"]
+
+
+class PreferenceContentSuggestion(TypedDict):
+    """An action would have been better than a trial."""
+
+    # Kind of preference.
+    kind: Literal["suggestion"]
+    # Trial that it would have been better than.
+    over: TrialId
+    # Index of the suggested action.
+    suggested: int
 
 
 class _ProblemRequired(TypedDict):
@@ -2913,7 +2914,7 @@ class UnblindedPair(_UnblindedPairRequired, total=False):
     """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
 
     # Answer in terms of what was shown. Null if there is none yet.
-    answer: Optional[Judgement]
+    answer: Optional[OrderedAnswer]
     # Time of the answer. Null if there is none yet.
     answered_at: Optional[Instant]
     # Earlier pair that it repeats. Null if it is not a repeat.
@@ -3063,5 +3064,7 @@ class Workers(TypedDict):
     places: int
 
 
-# Content of an entry, in terms of trials.
-FeedbackContent = Union[FeedbackContentLabel, FeedbackContentPreference, FeedbackContentTie, FeedbackContentSuggestion]
+# Content of a preference, in terms of trials.
+PreferenceContent = Union[
+    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentTie, PreferenceContentSuggestion,
+]
