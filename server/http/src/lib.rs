@@ -33,6 +33,7 @@ mod openapi_descriptions;
 mod openapi_rules;
 mod openapi_schemas;
 mod openapi_settings;
+mod openapi_solver_settings;
 pub mod page_error;
 pub mod pages;
 mod paging;
