@@ -77,4 +77,4 @@ pub use posterior::marginals::{MainEffect, Marginal, Slice};
 pub use posterior::{Posterior, Prediction};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch, propose_outside};
 pub use search_space::{Dimension, SearchSpace};
-pub use settings::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Method, Partner, Start};
+pub use settings::{Inference, Labels, LearnerSettings, Method, Partner, Start};

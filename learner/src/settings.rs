@@ -7,10 +7,6 @@ use crate::likelihood::{Interval, Link};
 
 mod deserialize;
 
-/// Value of [`LearnerSettings::line_trials`] that keeps EUBO on lines in every trial. Every JSON reader represents it
-/// exactly.
-pub const EVERY_TRIAL: usize = u32::MAX as usize;
-
 /// How the next action is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -125,8 +121,8 @@ pub struct LearnerSettings {
     pub repeats: bool,
     /// Number of random lines through the best action that EUBO searches. 0 means the whole grid.
     pub lines: usize,
-    /// Number of trials after which EUBO searches the whole grid instead of lines.
-    pub line_trials: usize,
+    /// Number of trials after which EUBO searches the whole grid instead of lines. `None`: it always searches lines.
+    pub line_trials: Option<usize>,
     /// Which earlier actions a new one is compared with.
     pub partner: Partner,
     /// Number `b` of actions before a batch with which each action of the batch is compared, at most 10,000. Only the
@@ -147,7 +143,7 @@ impl LearnerSettings {
             Method::Eubo => Self {
                 labels: Labels::Separate,
                 lines: 20,
-                line_trials: 10,
+                line_trials: Some(10),
                 start: Start::Centre,
                 ..Self::published(method)
             },
@@ -158,7 +154,7 @@ impl LearnerSettings {
     /// EUBO for noisy feedback. Large noise and long lengthscales average over many comparisons, and the search stays
     /// on lines through the best action.
     pub fn for_uncertain_answers() -> Self {
-        Self { preference_noise: 0.8, lengthscale_factor: 2.0, line_trials: EVERY_TRIAL, ..Self::of(Method::Eubo) }
+        Self { preference_noise: 0.8, lengthscale_factor: 2.0, line_trials: None, ..Self::of(Method::Eubo) }
     }
 
     /// The published settings of a method. LineCoSpar may repeat actions and compares each with the previous ones. EUBO
@@ -183,7 +179,7 @@ impl LearnerSettings {
             samples_per_iteration: 1,
             repeats: true,
             lines: 0,
-            line_trials: EVERY_TRIAL,
+            line_trials: None,
             partner: Partner::Previous,
             buffer: 1,
         };

@@ -34,8 +34,6 @@ from gaitwright_client.models import (
     DimensionName,
     Evaluation,
     FeedbackMode,
-    FeedbackRow,
-    FeedbackRowPage,
     Job,
     JobState,
     MilestonePage,
@@ -46,6 +44,8 @@ from gaitwright_client.models import (
     NewTokenScopesItem,
     Outcome,
     PairAnswer,
+    Preference,
+    PreferencePage,
     Problem,
     Recommendation,
     SearchSpace,
@@ -162,9 +162,9 @@ def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
             body = NewPreference(trial_a=trial.id, trial_b=newest.id, answer=answer)
             reply = create_preference.sync_detailed(study, client=client, body=body)
             said = created(CreatedPreference, "preferences", reply)
-            assert given(FeedbackRow, get_preference.sync(said.id, client=client)).seq == said.seq
+            assert given(Preference, get_preference.sync(said.id, client=client)).seq == said.seq
         compared = len(trials)
-    assert len(given(FeedbackRowPage, list_preferences.sync(study, client=client)).items) == 6
+    assert len(given(PreferencePage, list_preferences.sync(study, client=client)).items) == 6
     best = given(Recommendation, get_recommendation.sync(study, client=client))
     picture = get_study_figure.sync_detailed(study, f"{FIGURE}.png", client=client)
     assert picture.headers["Content-Type"] == "image/png", picture.headers

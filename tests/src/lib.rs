@@ -13,6 +13,7 @@ pub mod cli;
 pub mod client;
 pub mod compatibility;
 pub mod consistent_gaits;
+pub mod described;
 pub mod engine_without_workers;
 pub mod every_table;
 pub mod explained;

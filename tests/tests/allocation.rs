@@ -695,7 +695,7 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_d
         let walked = lab::RecordedWalk { walk, note: String::new() };
         lab::record_walk(&mut writer, &reading_caller.actor, row, &walked).await.unwrap();
     }
-    let answer = lab::NewAnswer { number: 1, answer: blind_pairs::Judgement::First, note: String::new() };
+    let answer = lab::NewAnswer { number: 1, answer: blind_pairs::OrderedAnswer::First, note: String::new() };
     let seen = lab::answer(&mut writer, &reading_caller, row, &answer).await.unwrap();
     assert!(seen.answer.unwrap().could_have_known);
     commit(writer).await.unwrap();
@@ -733,7 +733,7 @@ async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
             let walked = lab::RecordedWalk { walk, note: String::new() };
             lab::record_walk(&mut writer, &person.actor, id, &walked).await.unwrap();
         }
-        let answer = lab::NewAnswer { number: 1, answer: blind_pairs::Judgement::First, note: String::new() };
+        let answer = lab::NewAnswer { number: 1, answer: blind_pairs::OrderedAnswer::First, note: String::new() };
         let seen = lab::answer(&mut writer, &person, id, &answer).await.unwrap();
         assert_eq!(seen.answer.unwrap().could_have_known, could_have_known, "{}", fetched_by.name);
         commit(writer).await.unwrap();

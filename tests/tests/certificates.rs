@@ -11,6 +11,7 @@ use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, events};
 use gaitwright_tests::cli;
+use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -257,6 +258,8 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     let events = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     let events: Vec<_> = events.iter().filter(|event| event.kind == "gait_simulated").collect();
     assert_eq!((events.len(), &events[0].payload["report"]), (2, report));
+    let details = audit_trail(&service).await;
+    assert!(["passed", "failures", "walks"].iter().all(|name| details.contains(*name)), "{details:?}");
     service.stop().await;
 }
 

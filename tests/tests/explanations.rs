@@ -12,6 +12,7 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId, events, explanations};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
+use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::explained::{Clearance, with_few_gaits, without_gaits};
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::skipped::skipped;
@@ -133,6 +134,8 @@ async fn repeated_requests_give_one_explanation() {
     let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     let told: Vec<_> = told.iter().filter(|event| event.kind == "trial_explained").collect();
     assert_eq!((told.len(), &told[0].payload["relaxed_bound"]), (1, &json!("a5")));
+    let details = audit_trail(&service).await;
+    assert!(["relaxed_bound"].iter().all(|name| details.contains(*name)), "{details:?}");
     service.stop().await;
 }
 
@@ -284,6 +287,8 @@ async fn relaxation_within_the_search_space_is_tried_in_the_same_study() {
 
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     assert!(page.contains(">trial 3</a> already has these bounds") && !page.contains("/relaxed-trial"), "{page}");
+    let details = audit_trail(&service).await;
+    assert!(["trial_budget", "without_gait"].iter().all(|name| details.contains(*name)), "{details:?}");
     service.stop().await;
 }
 

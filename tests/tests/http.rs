@@ -354,7 +354,9 @@ async fn trial_is_cancelled_and_retried() {
     let more = service.post(&format!("/api/v1/studies/{study}/extend"), &json!({"trial_budget": 2})).await;
     assert_eq!(more.status, StatusCode::OK, "{}", more.text);
     let retried = service.post(&format!("/api/v1/trials/{trial}/retry"), &json!({})).await;
-    assert_eq!(retried.status, StatusCode::OK, "{}", retried.text);
+    assert_eq!(retried.status, StatusCode::ACCEPTED, "{}", retried.text);
+    let job = service.fetch(retried.headers["location"].to_str().unwrap()).await.json();
+    assert_eq!((&job["id"], &job["kind"]), (&json!(format!("solve-{trial}")), &json!("solve")));
     service.wait_for(study, &[StudyState::Finished]).await;
     let states: Vec<_> = service.trials(study).await.iter().map(|trial| (trial.id, trial.state.is_result())).collect();
     assert!(states.contains(&(trial, true)), "it was not run again: {states:?}");

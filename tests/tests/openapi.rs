@@ -11,6 +11,7 @@ use gaitwright_http::openapi;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::compatibility::{Difference, compare};
+use gaitwright_tests::described::Description;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -145,18 +146,25 @@ async fn settings_at_the_ends_of_their_described_ranges_are_accepted() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let subject = service.subject().await;
     let mut tried = 0;
-    for (group, component) in
-        [("gait_settings", "GaitSettings"), ("solve_options", "SolveOptions"), ("learner", "LearnerSettings")]
-    {
-        let schema = &document["components"]["schemas"][component];
+    for (group, place) in [
+        ("gait_settings", "GaitSettings"),
+        ("solve_options", "SolveOptions"),
+        ("solve_options/solver", "SolveOptions/properties/solver"),
+        ("learner", "LearnerSettings"),
+    ] {
+        let schema = document.pointer(&format!("/components/schemas/{place}")).unwrap();
         assert_eq!(schema["additionalProperties"], false, "{group}");
         for (name, field) in schema["properties"].as_object().unwrap() {
-            assert_ne!(field["type"], "string", "{group}.{name}: its words are not named");
+            assert!(field["type"] != "string" || field["enum"].is_array(), "{group}.{name}: its words are not named");
             let ends = [&field["minimum"], &field["maximum"]].into_iter().filter(|end| end.is_number());
             for end in ends.cloned().chain(field["enum"].as_array().cloned().into_iter().flatten()) {
                 let integer = field["type"] == "integer";
                 let end = if integer { end.as_f64().unwrap().to_string().parse().unwrap() } else { end };
-                let body = json!({"subject_id": subject, "start": false, group: {name: end}});
+                let mut body = json!({name: end});
+                for part in group.split('/').rev() {
+                    body = json!({part: body});
+                }
+                (body["subject_id"], body["start"]) = (json!(subject), json!(false));
                 let answer = service.post("/api/v1/studies", &body).await;
                 // Where settings depend on each other, the refusal names another one.
                 let alone = answer.status.is_success() || !answer.text.contains(&format!("{name} is {end}"));
@@ -197,111 +205,6 @@ async fn description_is_served_and_its_page_has_no_external_resources() {
     }
     assert!(refusing >= 2, "{sentence}");
     service.stop().await;
-}
-
-/// The description, and the schemas that were checked against a real value.
-struct Description {
-    document: Value,
-    seen: BTreeSet<String>,
-}
-
-impl Description {
-    fn read() -> Self {
-        Self { document: serde_json::from_str(&openapi::text().unwrap()).unwrap(), seen: BTreeSet::new() }
-    }
-
-    /// Checks a response to a `GET` against its schema.
-    fn hold(&mut self, path: &str, answer: &Value) {
-        let pointer = format!("/paths/{}/get/responses/200/content/application~1json/schema", path.replace('/', "~1"));
-        let schema = self.document.pointer(&pointer).unwrap_or_else(|| panic!("{path} is not described")).clone();
-        self.fits(&schema, answer, path);
-    }
-
-    /// Checks a value against a named schema.
-    fn hold_named(&mut self, name: &str, value: &Value) {
-        self.fits(&json!({ "$ref": format!("#/components/schemas/{name}") }), value, name);
-    }
-
-    /// Names and presence of every property, types of every value.
-    fn fits(&mut self, schema: &Value, value: &Value, place: &str) {
-        if let Some(reference) = schema["$ref"].as_str() {
-            let name = reference.trim_start_matches("#/components/schemas/");
-            self.seen.insert(name.to_owned());
-            let named = self.document["components"]["schemas"][name].clone();
-            assert!(named.is_object(), "{place}: {name} is not described");
-            return self.fits(&named, value, &format!("{place}: {name}"));
-        }
-        if let Some(parts) = schema["oneOf"].as_array() {
-            let null = |part: &&Value| part["type"] == "null";
-            if value.is_null() {
-                assert!(parts.iter().any(|part| null(&part)), "{place} is null");
-                return;
-            }
-            // Of several shapes, a property with one possible value tells which one is meant.
-            let meant = |part: &&Value| {
-                let properties = part["properties"].as_object().into_iter().flatten();
-                let mut tags =
-                    properties.filter(|(_, field)| field["enum"].as_array().is_some_and(|all| all.len() == 1));
-                let is_kind = part["type"].is_null() || (part["type"] == "object") == value.is_object();
-                is_kind && tags.all(|(name, field)| field["enum"][0] == value[name])
-            };
-            let rest: Vec<&Value> = parts.iter().filter(|part| !null(part)).filter(meant).collect();
-            let [one] = rest[..] else { panic!("{place} can have several shapes: {rest:?}") };
-            return self.fits(one, value, place);
-        }
-        let kinds: Vec<&str> = match &schema["type"] {
-            Value::String(kind) => vec![kind],
-            Value::Array(kinds) => kinds.iter().map(|kind| kind.as_str().unwrap()).collect(),
-            _ => Vec::new(),
-        };
-        let kind = match value {
-            Value::Null => "null",
-            Value::Bool(_) => "boolean",
-            Value::Number(number) if number.is_f64() => "number",
-            Value::Number(_) => "integer",
-            Value::String(_) => "string",
-            Value::Array(_) => "array",
-            Value::Object(_) => "object",
-        };
-        let fits = |expected: &&str| *expected == kind || (*expected == "number" && kind == "integer");
-        assert!(kinds.is_empty() || kinds.iter().any(fits), "{place}: {value} is not {kinds:?}");
-        for (index, item) in value.as_array().into_iter().flatten().enumerate() {
-            self.fits(&schema["items"], item, &format!("{place}[{index}]"));
-        }
-        let (properties, required) = self.shape(schema);
-        let Some(object) = value.as_object().filter(|_| !properties.is_empty()) else { return };
-        for (name, value) in object {
-            let property = properties.get(name).unwrap_or_else(|| panic!("{place} has {name}, which is not described"));
-            self.fits(property, value, &format!("{place}.{name}"));
-        }
-        for name in required {
-            assert!(object.contains_key(&name), "{place} has no {name}");
-        }
-    }
-
-    /// Every property of an object with its schema, and those that must be there, parts included.
-    fn shape(&mut self, schema: &Value) -> (BTreeMap<String, Value>, Vec<String>) {
-        if let Some(reference) = schema["$ref"].as_str() {
-            let name = reference.trim_start_matches("#/components/schemas/");
-            self.seen.insert(name.to_owned());
-            let named = self.document["components"]["schemas"][name].clone();
-            return self.shape(&named);
-        }
-        let own = schema["properties"].as_object().into_iter().flatten();
-        let mut properties: BTreeMap<_, _> = own.map(|(name, schema)| (name.clone(), schema.clone())).collect();
-        let names = schema["required"].as_array().into_iter().flatten();
-        let mut required: Vec<String> = names.map(|name| name.as_str().unwrap().to_owned()).collect();
-        for part in schema["allOf"].as_array().into_iter().flatten() {
-            let (more, needed) = self.shape(part);
-            properties.extend(more);
-            required.extend(needed);
-        }
-        // One of several schemas, chosen by the value. The description has the names of all of them.
-        for alternative in schema["oneOf"].as_array().into_iter().flatten() {
-            properties.extend(self.shape(alternative).0);
-        }
-        (properties, required)
-    }
 }
 
 #[tokio::test]

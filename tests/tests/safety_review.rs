@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright_store::blind_pairs::{self, Judgement};
+use gaitwright_store::blind_pairs::{self, OrderedAnswer};
 use gaitwright_store::safety_reviews::{self, SafetyDecision};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
@@ -81,7 +81,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     // On which side it was shown is drawn anew each time; the record has it as said of the pair.
     let shown = blind_pairs::of_study(&mut reader, study).await.unwrap().remove(0);
     let called_unsafe =
-        shown.answer.filter(|said| *said != Judgement::UnsafeBoth).map(|said| said.unsafe_of(shown.trials()));
+        shown.answer.filter(|said| *said != OrderedAnswer::UnsafeBoth).map(|said| said.unsafe_of(shown.trials()));
     assert_eq!(called_unsafe, Some(vec![gait.parse().unwrap()]));
     let trail = audit::page(&mut reader, "", None, 100).await.unwrap();
     drop(reader);

@@ -9,6 +9,7 @@ use gaitwright_store::StudyId;
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::skipped::skipped;
 use serde_json::{Value, json};
@@ -124,6 +125,8 @@ async fn proposal_stays_with_its_worker() {
 
     let own = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
     assert_eq!(service.post(&format!("/api/v1/studies/{own}/ask"), &json!({})).await.status, StatusCode::CONFLICT);
+    let details = audit_trail(&service).await;
+    assert!(["again"].iter().all(|name| details.contains(*name)), "{details:?}");
     service.stop().await;
 }
 

@@ -390,7 +390,7 @@ async fn trial_of_vanished_workers_is_lost_and_can_be_retried() {
     let path = format!("/api/v1/studies/{study}/extend");
     assert_eq!(service.post(&path, &json!({"trial_budget": 2})).await.status, StatusCode::OK);
     let path = format!("/api/v1/trials/{}/retry", trial.id);
-    assert_eq!(service.post(&path, &json!({})).await.status, StatusCode::OK);
+    assert_eq!(service.post(&path, &json!({})).await.status, StatusCode::ACCEPTED);
     service.wait_for(study, &[StudyState::Finished]).await;
     assert!(service.trials(study).await.iter().all(|trial| trial.state.is_result()));
     service.stop().await;

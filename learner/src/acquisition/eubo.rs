@@ -138,7 +138,7 @@ pub(crate) fn proposal(
     random: &mut Random,
 ) -> Option<ActionIndex> {
     let lines = posterior.settings().lines;
-    if lines > 0 && posterior.visited().len() < posterior.settings().line_trials {
+    if lines > 0 && posterior.settings().line_trials.is_none_or(|most| posterior.visited().len() < most) {
         let candidates: Vec<ActionIndex> =
             (0..lines).flat_map(|_| line::through(posterior.space(), best, random)).collect();
         if let Some(action) = against(posterior, best, forbidden, pending, Some(&candidates)) {

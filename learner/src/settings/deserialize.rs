@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer};
 
-use super::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Method, Partner, Start};
+use super::{Inference, Labels, LearnerSettings, Method, Partner, Start};
 use crate::likelihood::Link;
 
 /// Wraps the value of a present field, so that `null` stays distinct from a missing field.
@@ -25,9 +25,7 @@ macro_rules! settings {
         impl From<PartialSettings> for LearnerSettings {
             fn from(given: PartialSettings) -> Self {
                 let rest = given.method.map_or_else(Self::default, Self::of);
-                let settings = Self { method: rest.method, $($field: given.$field.unwrap_or(rest.$field),)* };
-                // A record may hold 2^64 - 1, which many JSON readers cannot represent.
-                Self { line_trials: settings.line_trials.min(EVERY_TRIAL), ..settings }
+                Self { method: rest.method, $($field: given.$field.unwrap_or(rest.$field),)* }
             }
         }
     };
@@ -51,7 +49,7 @@ settings! {
     samples_per_iteration: usize,
     repeats: bool,
     lines: usize,
-    line_trials: usize,
+    line_trials: Option<usize>,
     partner: Partner,
     buffer: usize,
 }
@@ -119,7 +117,7 @@ mod tests {
             "lengthscale_factor":1.0,"labels":"in_utility",
             "start":"random","preference_noise":0.02,"ordinal_noise":0.1,"ordinal_thresholds":[0.0],
             "coactive_noise":0.02,"tie_noise":0.02,"tie_width":0.02,"avoidance":null,
-            "samples_per_iteration":1,"repeats":false,"lines":0,"line_trials":18446744073709551615,
+            "samples_per_iteration":1,"repeats":false,"lines":0,"line_trials":null,
             "partner":"incumbent","buffer":1}"#;
         assert_eq!(read(stored), LearnerSettings { method: Method::Eubo, ..LearnerSettings::of(Method::LineCoSpar) });
     }

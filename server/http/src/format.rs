@@ -5,7 +5,7 @@ use gait_optimizer::TunedBounds;
 use gait_optimizer::number_format::grouped;
 use gaitwright_charts::power_of_ten;
 use gaitwright_service::access::Role;
-use gaitwright_store::blind_pairs::Judgement;
+use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{FeedbackRow, Source};
 use gaitwright_store::measurement_files::MeasurementKind;
 use gaitwright_store::studies::FeedbackMode;
@@ -105,16 +105,16 @@ pub(crate) fn also_waits_for(mode: FeedbackMode) -> &'static str {
 }
 
 /// The answer of the subject in a lab session; first is walk 2.
-pub(crate) fn walks_in_words(judgement: Judgement) -> &'static str {
-    match judgement {
-        Judgement::First => "walk 2, the first with the device, was better",
-        Judgement::Second => "walk 3, the second with the device, was better",
-        Judgement::NoDifference => "no difference between walk 2 and walk 3",
-        Judgement::CannotTell => "cannot tell which walk was better",
-        Judgement::UnsafeFirst => "walk 2 was unsafe",
-        Judgement::UnsafeSecond => "walk 3 was unsafe",
-        Judgement::UnsafeBoth => "walk 2 and walk 3 were unsafe",
-        Judgement::Retracted => "retracted",
+pub(crate) fn walks_in_words(answer: OrderedAnswer) -> &'static str {
+    match answer {
+        OrderedAnswer::First => "walk 2, the first with the device, was better",
+        OrderedAnswer::Second => "walk 3, the second with the device, was better",
+        OrderedAnswer::NoDifference => "no difference between walk 2 and walk 3",
+        OrderedAnswer::CannotTell => "cannot tell which walk was better",
+        OrderedAnswer::UnsafeFirst => "walk 2 was unsafe",
+        OrderedAnswer::UnsafeSecond => "walk 3 was unsafe",
+        OrderedAnswer::UnsafeBoth => "walk 2 and walk 3 were unsafe",
+        OrderedAnswer::Retracted => "retracted",
     }
 }
 

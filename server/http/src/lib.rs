@@ -6,6 +6,7 @@
 pub mod access_log;
 mod accessible;
 pub mod api;
+mod attachment;
 mod authentication;
 mod authorization;
 mod blind_motion;
@@ -32,6 +33,7 @@ mod openapi_descriptions;
 mod openapi_rules;
 mod openapi_schemas;
 mod openapi_settings;
+mod openapi_solver_settings;
 pub mod page_error;
 pub mod pages;
 mod paging;

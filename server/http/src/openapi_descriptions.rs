@@ -66,7 +66,7 @@ const LEARNER: [Described; 21] = [
     (
         "LearnerSettings",
         "line_trials",
-        "Number of trials after which `eubo` searches the whole search space instead of lines.",
+        "Number of trials after which `eubo` searches the whole search space instead of lines. Null: it always searches lines.",
     ),
     (
         "LearnerSettings",
@@ -243,10 +243,10 @@ pub(super) fn state(schemas: &mut Schemas<'_>) {
         schemas.add(component, field, &json!({ "description": text }));
     }
     // Its schema describes the kind of entry as the tag of an enumeration, which has no comment.
-    let entries = schemas.component("FeedbackContent").and_then(|content| content.get_mut("oneOf")?.as_array_mut());
+    let entries = schemas.component("PreferenceContent").and_then(|content| content.get_mut("oneOf")?.as_array_mut());
     for entry in entries.into_iter().flatten() {
         if let Some(kind) = entry.pointer_mut("/properties/kind") {
-            kind["description"] = json!("Kind of entry.");
+            kind["description"] = json!("Kind of preference.");
         }
     }
 }

@@ -8,6 +8,8 @@ use super::openapi_dependent_rules;
 use super::openapi_descriptions;
 use super::openapi_schemas::{Schemas, merge};
 use super::openapi_settings::settings;
+use super::openapi_solver_settings;
+use super::resources::documents;
 use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
@@ -148,8 +150,9 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         schemas.add("Dimension", "values", &values);
         schemas.add("Dimension", "lengthscale", &json!({ "minimum": 1e-15, "maximum": 1e15 }));
         schemas.add("SearchSpace", "dimensions", &json!({ "minItems": 1, "maxItems": TunedBounds::NAMES.len() }));
-        schemas.close("Dimension");
-        schemas.close("SearchSpace");
+        for component in ["Dimension", "SearchSpace"].into_iter().chain(documents::CLOSED) {
+            schemas.close(component);
+        }
         state_bounds(schemas);
         let mut gait = settings(widest_durations(), |s: &GaitSettings| s.validate().err().map(Error::from));
         // The muscles are absent if they have their default values.
@@ -262,6 +265,7 @@ fn solve_options(missed: &mut Vec<String>) -> Value {
         Some(choice) => *choice = json!({ "oneOf": [word, object] }),
         None => missed.push("SolveOptions.local_optimum_choice".to_owned()),
     }
+    schema["properties"]["solver"] = openapi_solver_settings::schema();
     schema
 }
 

@@ -134,7 +134,9 @@ impl From<Refusal> for Error {
 impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
         let Self(error) = self;
-        if !error.is_input() {
+        if matches!(error, Error::NotReady(_)) {
+            tracing::warn!(%error, "a request was refused");
+        } else if !error.is_input() {
             tracing::error!(%error, "a request failed");
         }
         let mut response = Problem::from(&error).into_response();

@@ -41,7 +41,13 @@ fn with_problem(mut response: Response, id: &str, for_programs: bool) -> Respons
     let problem = match response.extensions_mut().remove::<Problem>() {
         Some(problem) => problem,
         None if speaks_for_itself(&response) => return response,
-        None => Problem::of_status(response.status()),
+        None => {
+            // Every other failure logs its reason.
+            if response.status().is_server_error() {
+                tracing::error!(request = id, status = response.status().as_u16(), "a request failed");
+            }
+            Problem::of_status(response.status())
+        }
     };
     let problem = Problem { request_id: Some(id.to_owned()), ..problem };
     let to = response.extensions().get::<RespondedTo>().copied();

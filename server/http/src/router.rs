@@ -55,7 +55,7 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         // The whole body is in memory before a handler reads it.
         .layer(DefaultBodyLimit::disable())
         .layer(CatchPanicLayer::custom(responses::after_panic))
-        .layer(TraceLayer::new_for_http().make_span_with(|_: &Request| tracing::Span::current()))
+        .layer(TraceLayer::new_for_http().make_span_with(|_: &Request| tracing::Span::current()).on_failure(()))
         .layer(middleware::from_fn_with_state(state.clone(), client_address::note))
         .layer(middleware::from_fn(responses::complete))
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))

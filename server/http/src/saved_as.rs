@@ -1,14 +1,14 @@
 //! `?download=NAME` of a GET request of the REST interface: a browser saves the response as a file of this name. For the
 //! access log, the response is then an export.
 
+use super::attachment::disposition;
 use super::query_string;
 use crate::problem_details::Refusal;
 use axum::extract::Request;
-use axum::http::{HeaderValue, Method, Uri, header};
+use axum::http::{Method, Uri, header};
 use axum::middleware::Next;
 use axum::response::Response;
 use gaitwright_service::error::Error;
-use std::fmt::Write as _;
 
 const PARAMETER: &str = "download";
 /// Maximum length of a name, characters.
@@ -26,7 +26,7 @@ pub(super) async fn name(mut request: Request, next: Next) -> Result<Response, R
     let mut response = next.run(request).await;
     let is_json = response.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == "application/json");
     if response.status().is_success() && is_json && !response.headers().contains_key(header::CONTENT_DISPOSITION) {
-        response.headers_mut().insert(header::CONTENT_DISPOSITION, disposition(&name)?);
+        response.headers_mut().insert(header::CONTENT_DISPOSITION, disposition(&name));
     }
     Ok(response)
 }
@@ -58,25 +58,6 @@ fn is_allowed(name: &str) -> bool {
     stem.starts_with(char::is_alphanumeric) && stem.chars().all(known) && name.chars().count() <= LONGEST
 }
 
-/// A header can hold ASCII only, so other names are percent-encoded (RFC 6266).
-fn disposition(name: &str) -> Result<HeaderValue, Error> {
-    let text = if name.is_ascii() {
-        format!("attachment; filename=\"{name}\"")
-    } else {
-        let mut encoded = String::new();
-        for byte in name.bytes() {
-            if byte.is_ascii_alphanumeric() || b"-._".contains(&byte) {
-                encoded.push(char::from(byte));
-            } else {
-                // Writing to a string cannot fail.
-                let _ = write!(encoded, "%{byte:02X}");
-            }
-        }
-        format!("attachment; filename*=UTF-8''{encoded}")
-    };
-    HeaderValue::from_str(&text).map_err(|error| Error::Internal(error.to_string()))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -100,11 +81,5 @@ mod tests {
             assert!(taken(&format!("?download{refused}")).is_err(), "{refused}");
         }
         assert!(taken(&format!("?download={}.json", "a".repeat(LONGEST))).is_err());
-    }
-
-    #[test]
-    fn header_encodes_names_that_are_not_ascii() {
-        assert_eq!(disposition("gait-trial-3.json").unwrap(), "attachment; filename=\"gait-trial-3.json\"");
-        assert_eq!(disposition("Fuß.json").unwrap(), "attachment; filename*=UTF-8''Fu%C3%9F.json");
     }
 }

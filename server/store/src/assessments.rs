@@ -1,6 +1,6 @@
 //! Assessments: what staff say of two gaits that is no preference.
 
-use super::blind_pairs::Judgement;
+use super::blind_pairs::OrderedAnswer;
 use super::feedback::{Attribution, Retraction, Source};
 use super::{AssessmentId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::{Deserialize, Serialize};
@@ -29,8 +29,8 @@ impl AssessmentAnswer {
     }
 }
 
-impl From<AssessmentAnswer> for Judgement {
-    /// The judgement if gait A is the first one.
+impl From<AssessmentAnswer> for OrderedAnswer {
+    /// The answer if gait A is the first one.
     fn from(answer: AssessmentAnswer) -> Self {
         match answer {
             AssessmentAnswer::CannotTell => Self::CannotTell,
@@ -41,18 +41,18 @@ impl From<AssessmentAnswer> for Judgement {
     }
 }
 
-impl TryFrom<Judgement> for AssessmentAnswer {
+impl TryFrom<OrderedAnswer> for AssessmentAnswer {
     type Error = StoreError;
 
     /// The answer if gait A is the first one.
-    fn try_from(judgement: Judgement) -> StoreResult<Self> {
-        match judgement {
-            Judgement::CannotTell => Ok(Self::CannotTell),
-            Judgement::UnsafeFirst => Ok(Self::UnsafeA),
-            Judgement::UnsafeSecond => Ok(Self::UnsafeB),
-            Judgement::UnsafeBoth => Ok(Self::UnsafeBoth),
-            Judgement::First | Judgement::Second | Judgement::NoDifference | Judgement::Retracted => {
-                Err(StoreError::Damaged { what: "assessment answer", reason: judgement.as_str().to_owned() })
+    fn try_from(answer: OrderedAnswer) -> StoreResult<Self> {
+        match answer {
+            OrderedAnswer::CannotTell => Ok(Self::CannotTell),
+            OrderedAnswer::UnsafeFirst => Ok(Self::UnsafeA),
+            OrderedAnswer::UnsafeSecond => Ok(Self::UnsafeB),
+            OrderedAnswer::UnsafeBoth => Ok(Self::UnsafeBoth),
+            OrderedAnswer::First | OrderedAnswer::Second | OrderedAnswer::NoDifference | OrderedAnswer::Retracted => {
+                Err(StoreError::Damaged { what: "assessment answer", reason: answer.as_str().to_owned() })
             }
         }
     }
@@ -121,7 +121,7 @@ pub async fn insert(db: &mut Connection, new: &UnsavedAssessment<'_>) -> StoreRe
     .bind(new.study)
     .bind(new.pair.0)
     .bind(new.pair.1)
-    .bind(Judgement::from(new.answer).about_gaits())
+    .bind(OrderedAnswer::from(new.answer).about_gaits())
     .bind(new.attribution.source.as_str())
     .bind(new.attribution.author)
     .bind(new.attribution.note)
@@ -181,7 +181,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Assessment> {
         study_id: row.try_get("study_id")?,
         trial_a: row.try_get("trial_a")?,
         trial_b: row.try_get("trial_b")?,
-        answer: Judgement::from_gaits(row.try_get("answer")?)?.try_into()?,
+        answer: OrderedAnswer::from_gaits(row.try_get("answer")?)?.try_into()?,
         source: row.try_get::<&str, _>("source")?.parse()?,
         author: row.try_get("author")?,
         note: row.try_get("note")?,

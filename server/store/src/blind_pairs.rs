@@ -40,11 +40,11 @@ impl FromStr for BlindPairKind {
     }
 }
 
-/// Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. `retracted` is
-/// reserved for the service.
+/// Answer about two gaits in the order in which they were shown or walked: which one is better, no difference, cannot
+/// tell, or which one is unsafe. `retracted` is reserved for the service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Judgement {
+pub enum OrderedAnswer {
     /// The gait shown first is better.
     First,
     /// The gait shown second is better.
@@ -63,8 +63,8 @@ pub enum Judgement {
     Retracted,
 }
 
-impl Judgement {
-    /// Every judgement.
+impl OrderedAnswer {
+    /// Every answer.
     pub const ALL: [Self; 8] = [
         Self::First,
         Self::Second,
@@ -90,7 +90,7 @@ impl Judgement {
         }
     }
 
-    /// The judgement with the two gaits exchanged.
+    /// The answer with the two gaits exchanged.
     #[must_use]
     pub fn swapped(self) -> Self {
         match self {
@@ -107,7 +107,7 @@ impl Judgement {
         matches!(self, Self::UnsafeFirst | Self::UnsafeSecond | Self::UnsafeBoth)
     }
 
-    /// Whether it is an assessment: a judgement by a person that states no preference.
+    /// Whether it is an assessment: an answer by a person that states no preference.
     pub fn is_assessment(self) -> bool {
         self == Self::CannotTell || self.is_about_safety()
     }
@@ -151,17 +151,17 @@ impl Judgement {
     pub(super) fn from_gaits(text: &str) -> StoreResult<Self> {
         Self::ALL
             .into_iter()
-            .find(|judgement| judgement.about_gaits() == text)
+            .find(|answer| answer.about_gaits() == text)
             .ok_or_else(|| StoreError::unknown_value("answer about two gaits", text))
     }
 }
 
-impl FromStr for Judgement {
+impl FromStr for OrderedAnswer {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
         Self::ALL
             .into_iter()
-            .find(|judgement| judgement.as_str() == text)
+            .find(|answer| answer.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("answer in a lab session", text))
     }
 }
@@ -192,7 +192,7 @@ pub struct BlindPair {
     /// Time at which the pair was drawn.
     pub created_at: Instant,
     /// The answer about the pair, where `First` is gait A; `None` if there is none yet.
-    pub answer: Option<Judgement>,
+    pub answer: Option<OrderedAnswer>,
     /// Time of the answer.
     pub answered_at: Option<Instant>,
     /// Free text of the answer; empty without one.
@@ -261,8 +261,8 @@ pub async fn insert(db: &mut Connection, new: &NewBlindPair) -> StoreResult<Blin
 /// An answer to record.
 #[derive(Debug, Clone, Copy)]
 pub struct NewPairAnswer<'a> {
-    /// The judgement of the pair.
-    pub judgement: Judgement,
+    /// The answer of the pair.
+    pub answer: OrderedAnswer,
     /// Response time by the rater's clock, ms.
     pub response_ms: Option<i64>,
     /// Free text.
@@ -283,7 +283,7 @@ pub async fn answer(db: &mut Connection, id: BlindPairId, new: NewPairAnswer<'_>
          created_at) values (?, ?, ?, ?, ?, ?, ?) on conflict (pair_id) do nothing",
     )
     .bind(id)
-    .bind(new.judgement.about_gaits())
+    .bind(new.answer.about_gaits())
     .bind(new.response_ms)
     .bind(new.note)
     .bind(new.feedback)
@@ -353,11 +353,8 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Bl
 /// # Errors
 /// Errors of the database.
 pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<BlindPair>> {
-    let assessments: Vec<&str> = Judgement::ALL
-        .iter()
-        .filter(|judgement| judgement.is_assessment())
-        .map(|judgement| judgement.about_gaits())
-        .collect();
+    let assessments: Vec<&str> =
+        OrderedAnswer::ALL.iter().filter(|answer| answer.is_assessment()).map(|answer| answer.about_gaits()).collect();
     let assessments = assessments.join("', '");
     let sql =
         format!("{SELECT} where p.study_id = ? and a.answer in ('{assessments}') and r.pair_id is null order by p.id");
@@ -408,7 +405,7 @@ impl BlindPair {
             repeats: row.try_get("repeats")?,
             could_have_known: row.try_get("could_have_known")?,
             created_at: row.try_get("created_at")?,
-            answer: row.try_get::<Option<&str>, _>("answer")?.map(Judgement::from_gaits).transpose()?,
+            answer: row.try_get::<Option<&str>, _>("answer")?.map(OrderedAnswer::from_gaits).transpose()?,
             answered_at: row.try_get("answered_at")?,
             note: row.try_get("note")?,
         })

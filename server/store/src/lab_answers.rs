@@ -1,7 +1,7 @@
 //! Stored answers of subjects in lab sessions, in terms of walks.
 
 use super::audit::Actor;
-use super::blind_pairs::Judgement;
+use super::blind_pairs::OrderedAnswer;
 use super::{Connection, Instant, LabSessionId, StoreResult, now};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -12,7 +12,7 @@ pub struct LabAnswer {
     /// Number of the answer, from 1. It increases by one with each retraction.
     pub number: u32,
     /// The answer. First is walk 2.
-    pub judgement: Judgement,
+    pub answer: OrderedAnswer,
     /// Free text.
     pub note: String,
     /// Who recorded it.
@@ -32,7 +32,7 @@ pub async fn insert(
     actor: &Actor,
     id: LabSessionId,
     number: u32,
-    (judgement, note): (Judgement, &str),
+    (answer, note): (OrderedAnswer, &str),
 ) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into lab_answers (session_id, number, answer, note, actor, created_at) values (?, ?, ?, ?, ?, ?) \
@@ -40,7 +40,7 @@ pub async fn insert(
     )
     .bind(id)
     .bind(number)
-    .bind(judgement.as_str())
+    .bind(answer.as_str())
     .bind(note)
     .bind(actor.as_str())
     .bind(now())
@@ -86,7 +86,7 @@ pub async fn of_session(db: &mut Connection, id: LabSessionId) -> StoreResult<Ve
 fn from_row(row: &SqliteRow) -> StoreResult<LabAnswer> {
     Ok(LabAnswer {
         number: row.try_get("number")?,
-        judgement: row.try_get::<&str, _>("answer")?.parse()?,
+        answer: row.try_get::<&str, _>("answer")?.parse()?,
         note: row.try_get("note")?,
         actor: row.try_get("actor")?,
         at: row.try_get("created_at")?,

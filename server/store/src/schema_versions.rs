@@ -72,7 +72,7 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
         None => Ok(found),
         Some(missing) => {
             let reason = format!("its schema has version {found}, but migration {missing} is missing from its list");
-            Err(StoreError::Damaged { what: "evidence", reason })
+            Err(StoreError::Damaged { what: "migrations", reason })
         }
     }
 }

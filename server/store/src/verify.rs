@@ -58,15 +58,19 @@ type ChainSummary = (u64, String);
 /// # Errors
 /// [`StoreError::Damaged`], or [`StoreError::Unsealed`] for a row that was added outside the program.
 pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(ChainSummary, ChainSummary)> {
-    let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
+    let damaged = |what, reason: String| StoreError::Damaged { what, reason };
     schema(db, version).await?;
     let audit = match audit::verify(db).await? {
         audit::ChainCheck::Intact { rows, last } => (rows, last),
-        audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
+        audit::ChainCheck::Broken { seq } => {
+            return Err(damaged("audit trail", format!("the audit trail is broken at row {seq}")));
+        }
     };
     let seals = match seals::verify(db).await? {
         seals::SealCheck::Intact { seals, last } => (seals, last),
-        seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
+        seals::SealCheck::Broken { seq } => {
+            return Err(damaged("seals", format!("the seals are broken at number {seq}")));
+        }
         seals::SealCheck::Unsealed { table, key } => return Err(StoreError::Unsealed { table, key }),
         seals::SealCheck::Touched { table, key } => return Err(seals::touched(&table, &key)),
     };
@@ -85,7 +89,7 @@ async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
         None => Ok(()),
         Some((kind, name, ..)) => {
             let reason = format!("{kind} {name} of the schema differs from the one that this program creates");
-            Err(StoreError::Damaged { what: "evidence", reason })
+            Err(StoreError::Damaged { what: "schema", reason })
         }
     }
 }
@@ -121,8 +125,10 @@ async fn sequences(db: &mut Connection) -> StoreResult<()> {
         let is_known = seals::TABLES.iter().any(|sealed| sealed.table == table)
             || seals::CHECKED.iter().any(|checked| checked.table == table)
             || seals::NOT_SEALED.contains(&table.as_str());
-        let damaged =
-            || StoreError::Damaged { what: "evidence", reason: format!("the number of rows of {table} is wrong") };
+        let damaged = || StoreError::Damaged {
+            what: "sequence numbers",
+            reason: format!("the number of rows of {table} is wrong"),
+        };
         if !is_known {
             return Err(damaged());
         }

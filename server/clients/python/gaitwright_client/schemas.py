@@ -16,9 +16,6 @@ AssessmentAnswer = Literal["cannot_tell", "unsafe_a", "unsafe_b", "unsafe_both"]
 # Identifier of an assessment.
 AssessmentId = str
 
-# What exactly was changed; its fields depend on the kind of change.
-AuditDetail = dict[str, Any]
-
 # Identifier of a backup.
 BackupId = str
 
@@ -42,11 +39,14 @@ Condition = Literal["normal", "gait_a", "gait_b"]
 # Kind of entry: `given`, the subject gave consent; `withdrawn`, the subject withdrew it.
 ConsentKind = Literal["given", "withdrawn"]
 
-# The file that the controller of a device reads. It describes its own fields.
-ControllerFile = dict[str, Any]
+# A contact point of the foot.
+ContactPoint = Literal["heel", "toe"]
 
 # Identifier of a device.
 DeviceId = str
+
+# Identifier of a result of EMG processing.
+EmgResultId = str
 
 # What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report outcomes.
 Evaluation = Literal["optimizer", "script"]
@@ -58,8 +58,8 @@ FeedbackId = str
 # for them; `mixed`, Gait RMSE answers, and people can add answers.
 FeedbackMode = Literal["automatic", "human", "mixed"]
 
-# A gait as the optimiser writes it. `format_version` is the version of its layout.
-GaitDocument = dict[str, Any]
+# The direction of a force: `x` forwards, `z` upwards.
+ForceAxis = Literal["x", "z"]
 
 # A time in UTC (RFC 3339).
 Instant = str
@@ -77,18 +77,15 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 # files` describes it.
 JointAngleFormat = Literal["opensim", "camargo", "csv"]
 
-# Answer about two gaits: which one is better, no difference, cannot tell, or which one is unsafe. `retracted` is
-# reserved for the service.
-Judgement = Literal[
-    "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
-]
-
 # Identifier of a lab session.
 LabSessionId = str
 
 # State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `closed`, the
 # session accepts no more data.
 LabSessionState = Literal["planned", "under_way", "closed"]
+
+# A leg: `left` (intact) or `right` (prosthesis).
+Leg = Literal["left", "right"]
 
 # Identifier of a measurement file of a lab session.
 MeasurementFileId = str
@@ -106,6 +103,12 @@ MemberId = str
 # Kind of member.
 MemberKind = Literal["user", "token"]
 
+# Answer about two gaits in the order in which they were shown or walked: which one is better, no difference, cannot
+# tell, or which one is unsafe. `retracted` is reserved for the service.
+OrderedAnswer = Literal[
+    "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
+]
+
 # Outcome of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too.
 Outcome = Literal["converged", "not_converged"]
 
@@ -114,9 +117,6 @@ PairAnswer = Literal["a", "b", "no_difference"]
 
 # Who gives the answer.
 PersonSource = Literal["subject", "clinician", "script"]
-
-# A reference gait: joint angles over the gait cycle, the measured person, and the processing.
-ReferenceGaitDocument = dict[str, Any]
 
 # Identifier of a reference gait.
 ReferenceGaitId = str
@@ -144,8 +144,8 @@ SafetyReviewId = str
 # Identifier of a sign-in session of a user.
 SessionId = str
 
-# Input for `gaitwright solve --problem`: subject, device, bounds, settings, reference gait, limits and warm start.
-SolveProblem = dict[str, Any]
+# How a user signed in.
+SignInMethod = Literal["link", "password"]
 
 # How a solve ended: `converged`, every constraint is satisfied; `infeasible`, at a local minimum of the violation, with
 # no gait near it; `stalled`, without further progress; `iteration_limit` and `time_limit`, at that limit; `cancelled`,
@@ -308,6 +308,157 @@ class AttemptResult(_AttemptResultRequired, total=False):
     report: Optional[SolveReport]
 
 
+AuditDetail = TypedDict(
+    "AuditDetail",
+    {
+        # `session.begin`: network address of the browser. Null if it is not known.
+        "address": "Optional[str]",
+        # `trial.ask`: true if the script was given its open trial again.
+        "again": "bool",
+        # The answer, in the words of the request: `preference.give`, `assessment.give`, `lab_session.answer`.
+        "answer": "str",
+        # `study.change`: whether the study is archived.
+        "archived": "bool",
+        # Author of the answer, report, review or retraction.
+        "author": "str",
+        # Values before the change: `study.change`, `subject.correct`, `user.role`.
+        "before": "AuditedBefore",
+        # Body mass, kg: `subject.add`, `subject.correct`, `reference_gait.import`. Null if it is not known.
+        "body_mass_kg": "Optional[float]",
+        # Values of bounds by name: those suggested (`suggestion.give`), or relaxed (`trial.relax`).
+        "bounds": "dict[str, float]",
+        # `session.begin`: how the user signed in.
+        "by": "SignInMethod",
+        # Size of the backup, bytes: `backup.complete`, `record.backup`.
+        "bytes": "int",
+        # `blind_pair.answer`: whether the rater could have known the allocation.
+        "could_have_known": "bool",
+        # `gait.review`: the decision.
+        "decision": "SafetyDecision",
+        # `session.refused`: number of failed attempts of the network.
+        "failed_attempts": "int",
+        # `session.refuse`, `session.wait`: number of failed attempts of the network so far.
+        "failed_attempts_of_network": "int",
+        # `trial.certify`: reasons of a failed certificate; otherwise empty.
+        "failures": "list[str]",
+        # `backup.complete`: name of the file.
+        "file": "str",
+        # `study.import`: SHA-256 of the archive, hexadecimal.
+        "file_sha256": "str",
+        # `session.refused`: time of the first attempt.
+        "first_at": "Instant",
+        # `study.create`: the study whose set-up was copied. Null if it is not a fork.
+        "forked_from": "Optional[StudyId]",
+        # `subject.consent`: the consent form.
+        "form": "str",
+        # Value before the change: the state (`study.start`, `study.pause`, `study.resume`, `study.stop`) or the number of
+        # trials (`study.extend`).
+        "from": "AuditedStateOrNumber",
+        # `trial.tell`: Gait RMSE, rad. Null if it was not reported.
+        "gait_rmse_rad": "Optional[float]",
+        # Body height, m: `subject.add`, `subject.correct`, `reference_gait.import`. Null if it is not known.
+        "height_m": "Optional[float]",
+        # `study.prune`: trials whose gaits were kept.
+        "kept": "list[TrialId]",
+        # Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.record`).
+        "kind": "AuditedKind",
+        # `session.refused`: time of the last attempt.
+        "last_at": "Instant",
+        # Identifier of the member: `study.member_add`, `study.member_end`.
+        "member": "MemberId",
+        # `subject.muscles`: the muscle values.
+        "muscles": "MuscleParameters",
+        # Name of the object, of the member, or of the user who tried to sign in.
+        "name": "str",
+        # `session.refused`: number of different names that were tried.
+        "names": "int",
+        # Network of the address: `session.refuse`, `session.refused`, `session.wait`.
+        "network": "str",
+        # Note about the answer, walk or session.
+        "note": "str",
+        # `study.change`: notes.
+        "notes": "str",
+        # Number of the trial, lab session, blind pair or answer.
+        "number": "int",
+        # `suggestion.give`: the trial whose gait the suggestion improves.
+        "over": "TrialId",
+        # `study.change`: maximum number of trials that run at once.
+        "parallel_trials": "int",
+        # `trial.certify`: whether the certificate passed.
+        "passed": "bool",
+        # `study.change`: priority.
+        "priority": "int",
+        # `subject.add`: the pseudonym.
+        "pseudonym": "str",
+        # Name of the rater: `blind_pair.draw`, `blind_pair.retract`, `study.unblind`.
+        "rater": "str",
+        # Reason for the change, or why an answer was not used. Null if none was given.
+        "reason": "Optional[str]",
+        # `lab_session.record`: the measurement file.
+        "recording": "MeasurementFileId",
+        # `lab_session.process`: the measurement files that were processed.
+        "recordings": "list[MeasurementFileId]",
+        # `trial.explain`: name of a bound with a relaxed value of which a gait exists. Null if none was found.
+        "relaxed_bound": "Optional[str]",
+        # Whether only members see the study: `study.create`, `study.restrict`.
+        "restricted": "bool",
+        # `lab_session.process`: the processed EMG.
+        "result": "EmgResultId",
+        # Role of the user: `user.add`, `user.role`.
+        "role": "Role",
+        # `gait.review`: the safety reports that were reviewed.
+        "safety_reports": "list[AuditedSafetyReport]",
+        # `record.backup`: true.
+        "scheduled": "bool",
+        # `token.make`: scopes of the token.
+        "scopes": "list[Right]",
+        # `trial.ask`: name of the script.
+        "script": "str",
+        # Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.simulate`).
+        "seed": "int",
+        # `session.end`: the sign-in session.
+        "session": "SessionId",
+        # `lab_session.process`: filters.
+        "settings": "EmgSettings",
+        # `lab_session.record`: SHA-256 of the file, hexadecimal.
+        "sha256": "str",
+        # `study.import`: public key of the signature, hexadecimal. Null without a signature.
+        "signed_by": "Optional[str]",
+        # State, as in `StudyState` (`study.create`, `study.extend`) or `TrialState` (`trial.tell`).
+        "state": "str",
+        # `subject.withdraw`: studies that were stopped.
+        "stopped": "list[StudyId]",
+        # The study.
+        "study": "StudyId",
+        # `study.change`: tags.
+        "tags": "list[str]",
+        # Value after the change, as `from`.
+        "to": "AuditedStateOrNumber",
+        # `lab_session.controller_file`: whether the file was sent to the device.
+        "to_device": "bool",
+        # `study.prune`: number of gaits that were deleted.
+        "trajectories": "int",
+        # Trial of gait A: `preference.give`, `assessment.give`, `lab_session.plan`.
+        "trial_a": "TrialId",
+        # Trial of gait B, as `trial_a`.
+        "trial_b": "TrialId",
+        # `trial.relax`: number of trials of the study.
+        "trial_budget": "int",
+        # `study.import`: whether the key of the signature is trusted.
+        "trusted": "bool",
+        # `study.import`: number of gaits whose Gait RMSE could not be computed again.
+        "unchecked_rmse": "int",
+        # Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.record`, `lab_session.walk`.
+        "walk": "int",
+        # Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.simulate`.
+        "walks": "int",
+        # `trial.relax`: the trial without a gait whose bounds were relaxed.
+        "without_gait": "TrialId",
+    },
+    total=False,
+)
+
+
 class AuditRow(TypedDict):
     """Row of the audit trail."""
 
@@ -327,6 +478,41 @@ class AuditRow(TypedDict):
     previous: str
     # Sequence number.
     seq: int
+
+
+class AuditedBodyMeasures(TypedDict):
+    """Height and mass of a subject before a correction."""
+
+    # Body mass, kg.
+    body_mass_kg: float
+    # Body height, m.
+    height_m: float
+
+
+class AuditedSafetyReport(TypedDict):
+    """A safety report that was reviewed."""
+
+    # Time of the report.
+    at: Instant
+    # Its author.
+    by: str
+
+
+class AuditedStudySettings(TypedDict):
+    """Settings of a study before a change."""
+
+    # Whether the study was archived.
+    archived: bool
+    # Name.
+    name: str
+    # Notes.
+    notes: str
+    # Maximum number of trials that run at once.
+    parallel_trials: int
+    # Priority.
+    priority: int
+    # Tags.
+    tags: list[str]
 
 
 class Backup(TypedDict):
@@ -574,6 +760,73 @@ class Consent(TypedDict):
     seq: int
 
 
+class ContactRowName(TypedDict):
+    """A component of the ground reaction force on one contact point."""
+
+    # Direction: `x` forwards, `z` upwards.
+    axis: ForceAxis
+    # Point of the foot.
+    point: ContactPoint
+    # Leg: `left` (intact) or `right` (prosthesis).
+    side: Leg
+
+
+class _ControlledDomainRequired(TypedDict):
+    # Planned duration, s.
+    duration_s: float
+    # The event that ends the domain.
+    ends: str
+    # Name: DS2 and DS3 for double support, SS2 and SS1 for single support on the flat foot and on the toe, with _R or
+    # _L for the stance leg.
+    name: str
+    # The joints that the controller drives.
+    outputs: list[ControllerOutput]
+    # Hip position at the end, where the phase is 1, m.
+    phase_end_m: float
+    # Derivative of the hip position over the stance toe with respect to each angle, by the name of the angle: torso,
+    # hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, m/rad.
+    phase_gradient_m_per_rad: dict[str, float]
+    # Hip position at the start, where the phase is 0, m.
+    phase_start_m: float
+    # The stance leg; in double support, the leg that becomes the stance leg.
+    stance: Leg
+
+
+class ControlledDomain(_ControlledDomainRequired, total=False):
+    """A domain, as a controller tracks it."""
+
+    # Set point of the hip velocity, m/s. Null in underactuated domains, in which it is free.
+    hip_velocity_m_s: Optional[float]
+
+
+class _ControllerFileRequired(TypedDict):
+    # Name of the device.
+    device: str
+    # The domains of a stride, in order from right heel strike.
+    domains: list[ControlledDomain]
+    # Description of each field, by its name.
+    fields: dict[str, str]
+    # `gaitwright controller`.
+    format: str
+    # Version of the layout.
+    format_version: int
+    # Distance between right heel strikes, m.
+    stride_length_m: float
+    # Time from one right heel strike to the next, s.
+    stride_time_s: float
+    # Set points of the prosthetic joints over one stride, for tracking in time.
+    trajectory: SetPoints
+
+
+class ControllerFile(_ControllerFileRequired, total=False):
+    """The file that the controller of a device reads. Forward lean, hip flexion, knee flexion and ankle dorsiflexion
+    are positive. R is the prosthesis, L the intact leg.
+    """
+
+    # Whether the gait passed its certificate. Absent in the file of a blinded walk, because it could identify the gait.
+    certificate_passed: bool
+
+
 class ControllerFileDownload(TypedDict):
     """Download of the controller file of a walk."""
 
@@ -585,6 +838,15 @@ class ControllerFileDownload(TypedDict):
     to_device: bool
     # Number of the walk, 2 or 3.
     walk: int
+
+
+class ControllerOutput(TypedDict):
+    """A driven joint and its curve over the phase."""
+
+    # Bezier coefficients of the curve, of degree 5, rad.
+    bezier_rad: list[float]
+    # Name of the joint, such as `hip_L`; `torso` is the torso lean.
+    joint: str
 
 
 class Correction(TypedDict):
@@ -613,14 +875,14 @@ class CreatedInvitation(TypedDict):
     path: str
 
 
-class _FeedbackRowRequired(TypedDict):
+class _PreferenceRequired(TypedDict):
     # Name or pseudonym of the person who answered.
     author: str
     # Whether it comes from a rater's blind comparison.
     by_rater: bool
-    # Content of the entry.
-    content: FeedbackContent
-    # Whether the rater could have known the allocation. If so, the entry does not count as blind.
+    # What was preferred, in terms of trials.
+    content: PreferenceContent
+    # Whether the rater could have known the allocation. If so, it does not count as blind.
     could_have_known: bool
     # Time of recording.
     created_at: Instant
@@ -636,14 +898,14 @@ class _FeedbackRowRequired(TypedDict):
     study_id: StudyId
 
 
-class FeedbackRow(_FeedbackRowRequired, total=False):
-    """An entry of the feedback of a study."""
+class Preference(_PreferenceRequired, total=False):
+    """A preference, a tie or a suggestion of a study."""
 
-    # Retraction. Null if the entry was not retracted.
+    # Retraction. Null if it was not retracted.
     retraction: Optional[Retraction]
 
 
-class CreatedPreference(FeedbackRow):
+class CreatedPreference(Preference):
     """Recorded preference."""
 
     # Identifiers of other people's preferences about the same two gaits, at most the twenty newest.
@@ -772,6 +1034,48 @@ class Dimension(TypedDict):
     values: list[float]
 
 
+class _DomainTrajectoryRequired(TypedDict):
+    # For each output, the 6 Bezier coefficients of its curve over the phase, rad.
+    bezier: list[list[float]]
+    # Ground reaction forces at each node, in the order of `contact_rows`, N.
+    contact_forces: list[list[float]]
+    # Names of the components of the ground reaction forces.
+    contact_rows: list[ContactRowName]
+    # Duration, s.
+    duration_s: float
+    # Name: DS2 and DS3 for double support, SS2 and SS1 for single support on the flat foot and on the toe, with _R or
+    # _L for the stance leg.
+    name: str
+    # Coordinates that the virtual constraints drive, as places in a row of `q`, from 0.
+    outputs: list[int]
+    # Hip position at the end of the domain, where the phase is 1, m.
+    phase_end_m: float
+    # Hip position at the start of the domain, where the phase is 0, m.
+    phase_start_m: float
+    # Coordinates at each node: 9 numbers, the hip position forwards and upwards (m), then torso, hip_L, knee_L,
+    # ankle_L, hip_R, knee_R and ankle_R (rad).
+    q: list[list[float]]
+    # Velocities at each node, in the order of `q`, m/s and rad/s.
+    qd: list[list[float]]
+    # Accelerations at each node, in the order of `q`, m/s² and rad/s².
+    qdd: list[list[float]]
+    # Time of each node from the start of the stride, s.
+    time_s: list[float]
+    # Joint torques at each node: 6 numbers, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, N m.
+    u: list[list[float]]
+
+
+class DomainTrajectory(_DomainTrajectoryRequired, total=False):
+    """The trajectory in one domain, at equidistant nodes. Lists *at each node* have one row for each entry of
+    `time_s`.
+    """
+
+    # Impulse of the impact at the start of the domain, in the order of `contact_rows`, N s. Null without an impact.
+    impulse: Optional[list[float]]
+    # States of the muscles. Null without muscles.
+    muscles: Optional[MuscleTrajectory]
+
+
 class EmgReading(TypedDict, total=False):
     """How to read an EMG recording."""
 
@@ -873,50 +1177,6 @@ class Extend(TypedDict):
     trial_budget: int
 
 
-class FeedbackContentLabel(TypedDict):
-    """Label of a trial."""
-
-    # Category: 0 for not converged, 1 for converged.
-    category: int
-    # Kind of entry.
-    kind: Literal["label"]
-    # Identifier of the trial.
-    trial: TrialId
-
-
-class FeedbackContentPreference(TypedDict):
-    """One trial is better than another."""
-
-    # Kind of entry.
-    kind: Literal["preference"]
-    # Worse trial.
-    loser: TrialId
-    # Better trial.
-    winner: TrialId
-
-
-class FeedbackContentTie(TypedDict):
-    """Two trials are equally good."""
-
-    # One trial.
-    a: TrialId
-    # The other trial.
-    b: TrialId
-    # Kind of entry.
-    kind: Literal["tie"]
-
-
-class FeedbackContentSuggestion(TypedDict):
-    """An action would have been better than a trial."""
-
-    # Kind of entry.
-    kind: Literal["suggestion"]
-    # Trial that it would have been better than.
-    over: TrialId
-    # Index of the suggested action.
-    suggested: int
-
-
 class Fork(TypedDict, total=False):
     """A new study with the set-up of another one. Absent fields are copied."""
 
@@ -962,6 +1222,53 @@ class Frame(_FrameRequired, total=False):
     # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
     # muscles.
     activations: Optional[list[float]]
+
+
+class GaitDocument(TypedDict):
+    """A gait: eight domains over one stride from right heel strike. R is the prosthesis, L the intact leg."""
+
+    # The bounds a1 to a8.
+    bounds: Bounds
+    # The device.
+    device: DeviceDefinition
+    # The domains in the order DS2_R, DS3_R, SS2_R, SS1_R, DS2_L, DS3_L, SS2_L, SS1_L.
+    domains: list[DomainTrajectory]
+    # Version of this layout.
+    format_version: int
+    # Set points of the hip velocity, m/s: one for each sequence of domains without impact, DS2_R; DS3_R and SS2_R;
+    # DS2_L; DS3_L and SS2_L.
+    hip_velocity_m_s: list[float]
+    # Whether the gait has muscles.
+    muscles: bool
+    # Length of the step that ends with left heel strike, m.
+    right_step_length_m: float
+    # The other settings of the gait problem.
+    settings: GaitSettings
+    # Mean walking speed, m/s.
+    speed_m_s: float
+    # Stride length, m.
+    stride_length_m: float
+    # Stride time, s.
+    stride_time_s: float
+    # The subject.
+    subject: WalkerSubject
+
+
+class GaitProblem(TypedDict):
+    """The definition of a gait problem."""
+
+    # The bounds a1 to a8.
+    bounds: Bounds
+    # The device.
+    device: DeviceDefinition
+    # Whether the problem has muscles.
+    muscles: bool
+    # The reference gait, for Gait RMSE and for initial guesses.
+    reference: ReferenceGaitDocument
+    # The other settings of the problem.
+    settings: GaitSettings
+    # The subject.
+    subject: WalkerSubject
 
 
 class GaitSettingsLimitsDurationMaxS(TypedDict):
@@ -1223,7 +1530,7 @@ class LabAnswer(TypedDict):
     # Who recorded it.
     actor: str
     # The answer. First is walk 2, second is walk 3.
-    answer: Judgement
+    answer: OrderedAnswer
     # Whether the person who recorded the answer could have known the allocation: it was recorded after unblinding, or
     # by a user who had fetched a controller file.
     could_have_known: bool
@@ -1330,8 +1637,9 @@ class LearnerSettings(TypedDict, total=False):
     labels: Literal["in_utility", "separate"]
     # Factor on the lengthscale of every dimension.
     lengthscale_factor: float
-    # Number of trials after which `eubo` searches the whole search space instead of lines.
-    line_trials: int
+    # Number of trials after which `eubo` searches the whole search space instead of lines. Null: it always searches
+    # lines.
+    line_trials: Optional[int]
     # Number of random lines through the best action that `eubo` searches. With 0, it searches the whole search space.
     lines: int
     # Distribution of the noise: `logistic`, or `probit` for the normal distribution.
@@ -1467,6 +1775,19 @@ class Member(_MemberRequired, total=False):
 
     # Role of a user. Null for a token.
     role: Optional[Role]
+
+
+class MeshIntervals(TypedDict):
+    """Number of mesh intervals of each kind of domain."""
+
+    # Intervals of DS2.
+    ds2: int
+    # Intervals of DS3.
+    ds3: int
+    # Intervals of SS1.
+    ss1: int
+    # Intervals of SS2.
+    ss2: int
 
 
 class _MilestoneRequired(TypedDict):
@@ -1668,6 +1989,19 @@ class MuscleParameters(TypedDict, total=False):
     ta: MuscleParametersTa
     # Vasti.
     vas: MuscleParametersVas
+
+
+class MuscleTrajectory(TypedDict):
+    """States of the ten muscle-tendon units at each node. A row has 10 numbers, for HAM_L, GLU_L, HFL_L, GAS_L, VAS_L,
+    SOL_L, TA_L, HAM_R, GLU_R and HFL_R.
+    """
+
+    # Activations, 0 to 1.
+    activation: list[list[float]]
+    # Fibre lengths, in optimal fibre lengths.
+    fibre_length: list[list[float]]
+    # Fibre velocities, in optimal fibre lengths per second; negative in shortening.
+    fibre_velocity: list[list[float]]
 
 
 class _NewAssessmentRequired(TypedDict):
@@ -2027,6 +2361,69 @@ class PhasePortrait(TypedDict):
     velocity_rad_s: list[float]
 
 
+class PreferenceContentLabel(TypedDict):
+    """Label of a trial."""
+
+    # Category: 0 for not converged, 1 for converged.
+    category: int
+    # Kind of preference.
+    kind: Literal["label"]
+    # Identifier of the trial.
+    trial: TrialId
+
+
+class PreferenceContentPreference(TypedDict):
+    """One trial is better than another."""
+
+    # Kind of preference.
+    kind: Literal["preference"]
+    # Worse trial.
+    loser: TrialId
+    # Better trial.
+    winner: TrialId
+
+
+class PreferenceContentTie(TypedDict):
+    """Two trials are equally good."""
+
+    # One trial.
+    a: TrialId
+    # The other trial.
+    b: TrialId
+    # Kind of preference.
+    kind: Literal["tie"]
+
+
+class PreferenceContentSuggestion(TypedDict):
+    """An action would have been better than a trial."""
+
+    # Kind of preference.
+    kind: Literal["suggestion"]
+    # Trial that it would have been better than.
+    over: TrialId
+    # Index of the suggested action.
+    suggested: int
+
+
+class PrimalDualPoint(TypedDict):
+    """A primal-dual point of the nonlinear program with n variables and m rows, scaled."""
+
+    # n multipliers of the lower bounds of variables.
+    lower_multipliers: list[float]
+    # m multipliers of the rows.
+    row_multipliers: list[float]
+    # m multipliers of the lower bounds of slacks. Empty: from the multipliers of the rows.
+    slack_lower_multipliers: list[float]
+    # m multipliers of the upper bounds of slacks. Empty: from the multipliers of the rows.
+    slack_upper_multipliers: list[float]
+    # m slacks of the rows. Empty: the values of the rows.
+    slacks: list[float]
+    # n multipliers of the upper bounds of variables.
+    upper_multipliers: list[float]
+    # n variables.
+    x: list[float]
+
+
 class _ProblemRequired(TypedDict):
     # What went wrong in this request.
     detail: str
@@ -2188,6 +2585,30 @@ class ReferenceGait(TypedDict):
     id: ReferenceGaitId
     # Name shown to users.
     name: str
+
+
+class _ReferenceGaitDocumentRequired(TypedDict):
+    # 101 rows, at 0, 1, ..., 100 % of the gait cycle from right heel strike. Each row has the angles of torso, hip_L,
+    # knee_L, ankle_L and hip_R in this order, rad.
+    angles_rad: list[list[float]]
+    # Name.
+    name: str
+    # Citation, licence and processing of the data.
+    provenance: str
+
+
+class ReferenceGaitDocument(_ReferenceGaitDocumentRequired, total=False):
+    """A reference gait: joint angles over the gait cycle, and the measured person. Forward lean, hip flexion, knee
+    flexion and ankle dorsiflexion are positive.
+    """
+
+    # Body mass of the measured person, kg. Absent if it is not known.
+    body_mass_kg: float
+    # Height of the measured person, m. Absent if it is not known.
+    height_m: float
+    # Standard deviations of the angles over strides, in the rows and columns of `angles_rad`, rad. Absent if they are
+    # not known.
+    standard_deviation_rad: list[list[float]]
 
 
 class _ReferenceGaitMatchRequired(TypedDict):
@@ -2417,6 +2838,27 @@ class Session(_SessionRequired, total=False):
     browser: Optional[str]
 
 
+class SetPoints(TypedDict):
+    """Set points of the prosthetic joints. All lists have one entry for each sample."""
+
+    # Ankle angles, dorsiflexion positive, rad.
+    ankle_rad: list[float]
+    # Ankle velocities, rad/s; discontinuous at impacts.
+    ankle_rad_s: list[float]
+    # Feed-forward ankle torques, dorsiflexion positive, N m.
+    ankle_torque_n_m: list[float]
+    # Knee angles, flexion positive, rad.
+    knee_rad: list[float]
+    # Knee velocities, rad/s; discontinuous at impacts.
+    knee_rad_s: list[float]
+    # Feed-forward knee torques, flexion positive, N m.
+    knee_torque_n_m: list[float]
+    # Sampling rate, Hz.
+    rate_hz: float
+    # Time of each sample from right heel strike, s. The last sample is the end of the stride.
+    time_s: list[float]
+
+
 class SignInLink(TypedDict):
     """One-time sign-in link."""
 
@@ -2462,6 +2904,35 @@ class SolveOptionsLocalOptimumChoice(TypedDict):
     nearest_to_reference: SolveOptionsLocalOptimumChoiceNearestToReference
 
 
+class SolveOptionsSolver(TypedDict, total=False):
+    """Settings of the interior-point solver. Absent settings have their default values."""
+
+    # Bound multipliers of a cold start: `centred`, on the central path; `one`, all 1. Default `centred`.
+    bound_multiplier_start: Literal["centred", "one"]
+    # Minimum distance of a cold start from its bounds, relative to the larger of 1 and the bound, and to the distance
+    # between two bounds. Default 0.1.
+    bound_push: float
+    # Relaxation of every bound, relative to the larger of 1 and the bound. Default 1e-8.
+    bound_relaxation: float
+    # First regularisation of the Hessian. Default 1e-4.
+    hessian_regularisation_first: float
+    # Factorisation of the linear systems: `multifrontal`, pivots within blocks; `delayed_pivots`, pivots by a
+    # threshold, slower; `auto`, the first one, and the second one where it is inaccurate. Default `auto`.
+    linear_solver: Literal["auto", "multifrontal", "delayed_pivots"]
+    # Maximum number of second-order corrections in each iteration. Default 1.
+    max_second_order_corrections: int
+    # Initial weight of the proximal term after steps that the line search shortened often. Default 1e-4. 0 disables the
+    # term.
+    proximal_first: float
+    # Number of iterations that begin with a decreasing regularisation after the unregularised matrix has had the wrong
+    # inertia twice in a row, one more for each further time. Default 4.
+    regularisation_memory: int
+    # Share of the violation at which the restoration phase ends if the filter accepts the point. Default 0.9.
+    required_reduction: float
+    # Number of consecutive steps below 0.05 after which the restoration phase starts. Default 5. 0: never.
+    short_step_limit: int
+
+
 class SolveOptions(TypedDict, total=False):
     """Options of the solver: limits, tolerance, initial guesses and retries."""
 
@@ -2474,6 +2945,8 @@ class SolveOptions(TypedDict, total=False):
     max_iterations: int
     # Whether a cold start tries further initial guesses until one converges.
     retry: bool
+    # Settings of the interior-point solver. Absent settings have their default values.
+    solver: SolveOptionsSolver
     # Number of threads. The result does not depend on it.
     threads: int
     # Maximum number of rounds in which bounds are tightened and the solve continues, because the gait violates them
@@ -2483,6 +2956,20 @@ class SolveOptions(TypedDict, total=False):
     time_limit_s: Optional[float]
     # Scaled optimality tolerance.
     tolerance: float
+
+
+class _SolveProblemRequired(TypedDict):
+    # Options of the solver.
+    options: SolveOptions
+    # The gait problem.
+    problem: GaitProblem
+
+
+class SolveProblem(_SolveProblemRequired, total=False):
+    """Input for `gaitwright solve --problem`: the gait problem, options and warm start."""
+
+    # The warm start. Null for a cold start.
+    warm_start: Optional[WarmStart]
 
 
 class _SolveReportRequired(TypedDict):
@@ -2744,6 +3231,16 @@ class Tell(_TellRequired, total=False):
     reason: str
 
 
+class TightenedBounds(TypedDict):
+    """Margins of tightened bounds, scaled."""
+
+    # For each tightened row a list of its number, from 0, and the margin of its lower bound.
+    rows: list[list[float]]
+    # For each tightened variable a list of its number, from 0, and a list of two margins, of its lower and of its upper
+    # bound.
+    variables: list[list[MarginEntry]]
+
+
 class TransitionReason(TypedDict, total=False):
     """Reason for a command."""
 
@@ -2921,7 +3418,7 @@ class UnblindedPair(_UnblindedPairRequired, total=False):
     """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
 
     # Answer in terms of what was shown. Null if there is none yet.
-    answer: Optional[Judgement]
+    answer: Optional[OrderedAnswer]
     # Time of the answer. Null if there is none yet.
     answered_at: Optional[Instant]
     # Earlier pair that it repeats. Null if it is not a repeat.
@@ -3024,6 +3521,15 @@ class WalkView(_WalkViewRequired, total=False):
     recorded: Optional[LabSessionStep]
 
 
+class WalkerSubject(TypedDict):
+    """Height and mass of the person who walks."""
+
+    # Body mass, kg.
+    body_mass_kg: float
+    # Body height, m.
+    height_m: float
+
+
 class WalksOnGround(TypedDict):
     """Simulated walks on one kind of ground."""
 
@@ -3055,6 +3561,23 @@ class WalksOnGround(TypedDict):
     walks: int
 
 
+class _WarmStartRequired(TypedDict):
+    # Mesh of the earlier solve.
+    mesh: MeshIntervals
+    # Whether the earlier solve had muscles.
+    muscles: bool
+    # Scaled variables and multipliers.
+    point: PrimalDualPoint
+
+
+class WarmStart(_WarmStartRequired, total=False):
+    """The solution of an earlier solve, from which a solve begins."""
+
+    # Margins by which bounds are tightened, because an earlier gait violated them between nodes. Absent if there are
+    # none.
+    margins: TightenedBounds
+
+
 class Withdrawal(TypedDict):
     """A withdrawal of consent."""
 
@@ -3071,5 +3594,23 @@ class Workers(TypedDict):
     places: int
 
 
-# Content of an entry, in terms of trials.
-FeedbackContent = Union[FeedbackContentLabel, FeedbackContentPreference, FeedbackContentTie, FeedbackContentSuggestion]
+# Values before a change: settings of a study, height and mass of a subject, or the role of a user.
+AuditedBefore = Union[AuditedStudySettings, AuditedBodyMeasures, Role]
+
+
+# Kind of a member or of a measurement file.
+AuditedKind = Union[MemberKind, MeasurementKind]
+
+
+# State of a study, or a number of trials.
+AuditedStateOrNumber = Union[StudyState, int]
+
+
+# The number of a variable, or the margins of its lower and of its upper bound.
+MarginEntry = Union[int, list[float]]
+
+
+# Content of a preference, in terms of trials.
+PreferenceContent = Union[
+    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentTie, PreferenceContentSuggestion,
+]

@@ -2,6 +2,7 @@
 
 use crate::AppState;
 use crate::accessible::Id;
+use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::openapi_binary::Binary;
 use crate::paging::{Page, Paging};
@@ -11,8 +12,7 @@ use crate::visible::Visible;
 use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use futures_util::{StreamExt, stream};
 use gaitwright_service::access::{Administer, Read};
 use gaitwright_service::error::Error;
@@ -66,11 +66,7 @@ pub(super) async fn of_study(
         Err(error) => Some(Err(std::io::Error::other(error))),
     });
     let whole = stream::iter([Ok(first)]).chain(ReceiverStream::new(chunks).map(Ok)).chain(failure);
-    let headers = [
-        (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
-        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"study-{}.gait\"", id.short())),
-    ];
-    Ok((headers, Body::from_stream(whole)).into_response())
+    Ok(attachment("application/octet-stream", &format!("study-{}.gait", id.short()), Body::from_stream(whole)))
 }
 
 /// A writer that sends chunks. Data that is not flushed is dropped.

@@ -3,14 +3,14 @@
 use crate::AppState;
 use crate::access_log::OnlyWhileWalkable;
 use crate::accessible::Id;
+use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::problem_details::Refusal;
 use crate::resources::documents;
 use crate::visible::Visible;
 use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use gait_optimizer::export;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
@@ -55,7 +55,7 @@ pub(super) async fn problem(
     let input = PackedInput::of_trial(&mut reader, id).await?;
     drop(reader);
     let text = app.compute(move |pool| input.unpack(pool)?.to_json()).await??;
-    Ok(file("application/json", &format!("problem-trial-{number}.json"), text))
+    Ok(attachment("application/json", &format!("problem-trial-{number}.json"), text))
 }
 
 /// Download the gait as an OpenSim motion file
@@ -81,7 +81,7 @@ pub(super) async fn motion_file(
     drop(reader);
     let write = move |pool: &OnPool| Ok::<_, Error>(export::motion_file(&gait.unpack(pool)?, sampling.rate_hz)?);
     let text = app.compute(write).await??;
-    Ok(file("text/plain; charset=utf-8", &format!("gait-trial-{}.mot", trial.number), text))
+    Ok(attachment("text/plain; charset=utf-8", &format!("gait-trial-{}.mot", trial.number), text))
 }
 
 /// Download the controller file of a trial
@@ -118,16 +118,7 @@ pub(super) async fn controller(
 
 /// A controller file, which is sent only if every gait that it may be of is still walkable then.
 pub(super) fn controller_file_response(name: &str, text: String, gaits: Vec<TrialId>) -> Response {
-    let mut answer = file("application/json", name, text);
+    let mut answer = attachment("application/json", name, text);
     answer.extensions_mut().insert(OnlyWhileWalkable(gaits));
     answer
-}
-
-/// A response that a browser saves as `name`.
-pub(super) fn file(kind: &'static str, name: &str, text: String) -> Response {
-    let headers = [
-        (header::CONTENT_TYPE, kind.to_owned()),
-        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
-    ];
-    (headers, text).into_response()
 }

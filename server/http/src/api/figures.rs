@@ -2,6 +2,7 @@
 
 use crate::AppState;
 use crate::accessible::{Id, Named, accessible};
+use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::figures::{belief, lab_session, reference, study, trial};
@@ -9,8 +10,7 @@ use crate::openapi_binary::Binary;
 use crate::problem_details::Refusal;
 use crate::visible::Visible;
 use axum::extract::{Path, State};
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
@@ -176,11 +176,7 @@ async fn response(app: &mut AppState, figures: Vec<Figure>, file: String) -> Res
         }
     };
     let bytes = app.compute(draw).await??;
-    let headers = [
-        (header::CONTENT_TYPE, kind.to_owned()),
-        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{file}\"")),
-    ];
-    Ok((headers, bytes).into_response())
+    Ok(attachment(kind, &file, bytes))
 }
 
 /// File format.

@@ -1,8 +1,8 @@
 //! REST: measurement files of lab sessions, and their processing.
 
-use super::exports;
 use crate::AppState;
 use crate::accessible::Id;
+use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
@@ -90,7 +90,7 @@ pub(super) async fn content(
     };
     let name = format!("walk-{}-{}-{}.{ending}", recording.walk, kind_of_file(recording.kind), id.short());
     let tag = HeaderValue::from_str(&format!("\"{}\"", recording.raw_sha256));
-    let mut answer = exports::file(kind, &name, text);
+    let mut answer = attachment(kind, &name, text);
     answer.headers_mut().insert(header::ETAG, tag.map_err(|e| Error::Internal(e.to_string()))?);
     Ok(answer)
 }

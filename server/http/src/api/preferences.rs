@@ -7,7 +7,7 @@ use crate::csv_response::csv_response;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
-use crate::resources::feedback::FeedbackRow;
+use crate::resources::feedback::Preference;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -29,7 +29,7 @@ use utoipa::ToSchema;
     operation_id = "list_preferences",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "A page, oldest first", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, oldest first", body = Page<Preference>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -37,11 +37,11 @@ pub(super) async fn of_study(
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<i64>,
-) -> Result<Json<Page<FeedbackRow>>, Refusal> {
+) -> Result<Json<Page<Preference>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let rows = feedback::comparisons(&mut reader, id, paging.after.unwrap_or(0), paging.to_read()).await?;
-    Ok(Json(paging.page(rows, |row| row.seq)?.map(FeedbackRow::from)))
+    Ok(Json(paging.page(rows, |row| row.seq)?.map(Preference::from)))
 }
 
 /// Download preferences as CSV
@@ -113,14 +113,14 @@ fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
     operation_id = "get_preference",
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "Identifier of the preference")),
-    responses((status = 200, description = "Preference", body = FeedbackRow), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Preference", body = Preference), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<FeedbackId, Read>,
-) -> Result<Json<FeedbackRow>, Refusal> {
+) -> Result<Json<Preference>, Refusal> {
     Ok(Json(feedback::get(&mut *app.read().await?, id).await?.into()))
 }
 
@@ -128,7 +128,7 @@ pub(super) async fn get(
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct CreatedPreference {
     #[serde(flatten)]
-    row: FeedbackRow,
+    row: Preference,
     /// Identifiers of other people's preferences about the same two gaits, at most the twenty newest.
     other_answers: Vec<FeedbackId>,
 }
@@ -185,7 +185,7 @@ pub(super) struct Retract {
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "Identifier of the preference")),
     request_body = Retract,
-    responses((status = 200, description = "Retracted preference", body = FeedbackRow)),
+    responses((status = 200, description = "Retracted preference", body = Preference)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn retract(
@@ -198,5 +198,5 @@ pub(super) async fn retract(
         Err(before) => return Ok(before),
     };
     let row = answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
-    request.done(&app, writer, &FeedbackRow::from(row)).await
+    request.done(&app, writer, &Preference::from(row)).await
 }

@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
-use crate::resources::feedback::FeedbackRow;
+use crate::resources::feedback::Preference;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -24,7 +24,7 @@ use gaitwright_store::{StudyId, feedback, studies};
     operation_id = "list_suggestions",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "A page, oldest first", body = Page<FeedbackRow>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, oldest first", body = Page<Preference>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -32,11 +32,11 @@ pub(super) async fn of_study(
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<i64>,
-) -> Result<Json<Page<FeedbackRow>>, Refusal> {
+) -> Result<Json<Page<Preference>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let rows = feedback::suggestions(&mut reader, id, paging.after.unwrap_or(0), paging.to_read()).await?;
-    Ok(Json(paging.page(rows, |row| row.seq)?.map(FeedbackRow::from)))
+    Ok(Json(paging.page(rows, |row| row.seq)?.map(Preference::from)))
 }
 
 /// Record a suggestion
@@ -49,7 +49,7 @@ pub(super) async fn of_study(
     tag = "preferences",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body = Suggestion,
-    responses((status = 201, description = "Suggestion", body = FeedbackRow)),
+    responses((status = 201, description = "Suggestion", body = Preference)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn create(
@@ -64,5 +64,5 @@ pub(super) async fn create(
     let given = suggestion::give(&mut writer, &request.caller, id, &new).await?;
     let row = feedback::get(&mut writer, given).await?;
     let location = format!("/api/v1/preferences/{given}");
-    request.created(&app, writer, location, &FeedbackRow::from(row)).await
+    request.created(&app, writer, location, &Preference::from(row)).await
 }

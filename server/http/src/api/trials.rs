@@ -1,5 +1,6 @@
 //! REST: trials.
 
+use super::jobs::Job;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -17,6 +18,7 @@ use gait_optimizer::TunedBounds;
 use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
+use gaitwright_service::job::JobId;
 use gaitwright_service::studies::command;
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::trials_table::{self, Listing, SORTS};
@@ -156,14 +158,14 @@ pub(super) async fn cancel(
 
 /// Retry a trial
 ///
-/// Requeues a trial that ended without a result.
+/// Queues a trial again that ended without a result. The job of its solve can be followed and cancelled.
 #[utoipa::path(
     post,
     path = "/trials/{id}/retry",
     operation_id = "retry_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
-    responses((status = 200, description = "Queued trial", body = Trial)),
+    responses((status = 202, description = "Job that solves the trial", body = Job)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn retry(
@@ -175,8 +177,8 @@ pub(super) async fn retry(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let trial = command::retry(&mut writer, &request.actor, id).await?;
-    request.done(&app, writer, &Trial::from(trial)).await
+    command::retry(&mut writer, &request.actor, id).await?;
+    Job::respond(&request, &app, writer, JobId::Solve(id)).await
 }
 
 /// List iterations of a solve

@@ -15,7 +15,7 @@ use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::preference::{self, CurrentAnswer};
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_store::assessments::AssessmentAnswer;
-use gaitwright_store::blind_pairs::Judgement;
+use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};
 use gaitwright_store::{AssessmentId, Connection, FeedbackId, StudyId, Writer, commit};
@@ -86,7 +86,7 @@ impl GivenAnswer {
     async fn is_still_in_force(&self, db: &mut Connection, study: StudyId) -> Result<bool, Error> {
         match self {
             Self::Assessment(given) if self.is_about_safety() => {
-                let gaits = Judgement::from(given.answer).unsafe_of((given.trial_a, given.trial_b));
+                let gaits = OrderedAnswer::from(given.answer).unsafe_of((given.trial_a, given.trial_b));
                 Ok(SafetyReports::read(db, study).await?.are_all_in_force(&gaits))
             }
             _ => Ok(true),
@@ -113,7 +113,7 @@ impl AnswerForm {
             let (author, note) = (author.clone(), note.clone());
             GivenAnswer::Assessment(NewAssessment { trial_a: a, trial_b: b, answer, source, author, note })
         };
-        let judgement = match self.answer.as_str() {
+        let given = match self.answer.as_str() {
             "a" => preference(PairAnswer::A),
             "b" => preference(PairAnswer::B),
             "no_difference" => preference(PairAnswer::NoDifference),
@@ -125,7 +125,7 @@ impl AnswerForm {
                 return Err(Error::invalid("answer", other, "one of the answers on the form"));
             }
         };
-        Ok((judgement, identifier("key", &self.key)?))
+        Ok((given, identifier("key", &self.key)?))
     }
 
     /// A digest that distinguishes this answer from another one with the same key.
@@ -168,15 +168,15 @@ pub(super) async fn give(
     id: StudyId,
     form: &AnswerForm,
 ) -> Result<AnswerOutcome, Error> {
-    let (judgement, key) = form.read()?;
+    let (given, key) = form.read()?;
     let mut writer = app.write().await?;
     // The key of the form makes a repeated form (double click, reload, two tabs) count once.
     let request = form.fingerprint(id);
     // A safety report has a key of its own, because it is recorded even if the form was sent before with another answer.
-    let key = if judgement.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
+    let key = if given.is_about_safety() { format!("form {key} {request}") } else { format!("form {key}") };
     let before = idempotency::find(&mut writer, &caller.actor, &key).await?;
     // After a review, sending the report again records a new one.
-    let is_reviewed = before.is_some() && !judgement.is_still_in_force(&mut writer, id).await?;
+    let is_reviewed = before.is_some() && !given.is_still_in_force(&mut writer, id).await?;
     if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;
         let recorded = Recorded::try_from(before.body)?;
@@ -186,12 +186,12 @@ pub(super) async fn give(
         retract_recorded(&mut writer, caller, id, changed, (&form.author, CHANGED)).await?;
     }
     // A second answer is refused, and the page shows the first one. A safety report is always accepted.
-    if !judgement.is_about_safety()
+    if !given.is_about_safety()
         && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
     {
         return Ok(AnswerOutcome::AnsweredBefore(saved));
     }
-    let saved = match judgement {
+    let saved = match given {
         GivenAnswer::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
         GivenAnswer::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };

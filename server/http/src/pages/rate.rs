@@ -18,7 +18,7 @@ use gaitwright_service::access::{Caller, Rate, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::PairWithSides;
-use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
+use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
 use gaitwright_store::studies::{FeedbackMode, StudyFilter};
 use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
@@ -72,7 +72,7 @@ struct SavedBlindAnswer {
     study: StudyId,
     token: String,
     number: u32,
-    answer: Judgement,
+    answer: OrderedAnswer,
     at: Instant,
     can_be_retracted: bool,
 }
@@ -80,7 +80,7 @@ struct SavedBlindAnswer {
 impl SavedBlindAnswer {
     /// Whether it was retracted.
     fn is_retracted(&self) -> bool {
-        self.answer == Judgement::Retracted
+        self.answer == OrderedAnswer::Retracted
     }
 
     fn words(&self) -> &'static str {
@@ -203,9 +203,9 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlin
 
 async fn read_back(db: &mut Connection, shown: PairWithSides) -> Result<Option<SavedBlindAnswer>, Error> {
     let can_be_retracted = blind::can_be_retracted(db, &shown.pair).await?;
-    Ok(shown.answer().zip(shown.pair.answered_at).map(|(judgement, at)| SavedBlindAnswer {
+    Ok(shown.answer().zip(shown.pair.answered_at).map(|(answer, at)| SavedBlindAnswer {
         study: shown.pair.study_id,
-        answer: judgement,
+        answer,
         at,
         number: shown.pair.number,
         token: shown.pair.token,
@@ -272,7 +272,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
 /// The form of a pair.
 #[derive(Debug, Deserialize)]
 pub(super) struct PairForm {
-    answer: Judgement,
+    answer: OrderedAnswer,
     #[serde(default)]
     note: String,
     #[serde(default)]

@@ -1,4 +1,4 @@
-//! Entries of the feedback log, and retractions.
+//! Preferences, ties and suggestions, and retractions.
 
 use gait_learner::ActionIndex;
 use gaitwright_store::feedback::{self, Source};
@@ -6,17 +6,17 @@ use gaitwright_store::{FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// An entry of the feedback of a study.
+/// A preference, a tie or a suggestion of a study.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct FeedbackRow {
+pub(crate) struct Preference {
     /// Sequence number.
     seq: i64,
     /// Identifier.
     id: FeedbackId,
     /// Identifier of the study.
     study_id: StudyId,
-    /// Content of the entry.
-    content: FeedbackContent,
+    /// What was preferred, in terms of trials.
+    content: PreferenceContent,
     /// Who or what it came from.
     source: Source,
     /// Name or pseudonym of the person who answered.
@@ -25,15 +25,15 @@ pub(crate) struct FeedbackRow {
     note: String,
     /// Whether it comes from a rater's blind comparison.
     by_rater: bool,
-    /// Whether the rater could have known the allocation. If so, the entry does not count as blind.
+    /// Whether the rater could have known the allocation. If so, it does not count as blind.
     could_have_known: bool,
     /// Time of recording.
     created_at: Instant,
-    /// Retraction. Null if the entry was not retracted.
+    /// Retraction. Null if it was not retracted.
     retraction: Option<Retraction>,
 }
 
-impl From<feedback::FeedbackRow> for FeedbackRow {
+impl From<feedback::FeedbackRow> for Preference {
     fn from(row: feedback::FeedbackRow) -> Self {
         let feedback::FeedbackRow {
             seq,
@@ -64,10 +64,10 @@ impl From<feedback::FeedbackRow> for FeedbackRow {
     }
 }
 
-/// Content of an entry, in terms of trials.
+/// Content of a preference, in terms of trials.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub(crate) enum FeedbackContent {
+pub(crate) enum PreferenceContent {
     /// Label of a trial.
     Label {
         /// Identifier of the trial.
@@ -99,7 +99,7 @@ pub(crate) enum FeedbackContent {
     },
 }
 
-impl From<feedback::FeedbackContent> for FeedbackContent {
+impl From<feedback::FeedbackContent> for PreferenceContent {
     fn from(content: feedback::FeedbackContent) -> Self {
         match content {
             feedback::FeedbackContent::Label { trial, category } => Self::Label { trial, category },

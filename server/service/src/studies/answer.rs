@@ -3,11 +3,11 @@
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
+use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::trial_state::has_state;
 use crate::studies::walkable;
 use gaitwright_store::audit;
-use gaitwright_store::blind_pairs::Judgement;
+use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{Attribution, FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies};
@@ -31,11 +31,11 @@ pub enum PairAnswer {
 ///
 /// # Errors
 /// [`Error::Invalid`] with the answers that people give.
-pub(super) fn refuse_retracted(answer: Judgement) -> Result<(), Error> {
-    if answer != Judgement::Retracted {
+pub(super) fn refuse_retracted(answer: OrderedAnswer) -> Result<(), Error> {
+    if answer != OrderedAnswer::Retracted {
         return Ok(());
     }
-    let others = Judgement::ALL.into_iter().filter(|other| *other != answer).map(Judgement::as_str);
+    let others = OrderedAnswer::ALL.into_iter().filter(|other| *other != answer).map(OrderedAnswer::as_str);
     Err(Error::invalid("answer", "retracted", &format!("one of {}", others.collect::<Vec<_>>().join(", "))))
 }
 
@@ -72,17 +72,17 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     let study = studies::get(writer, study).await?;
     let attribution = attribution(caller, answer.source, answer.author.as_deref(), &answer.note)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
-    let judgement = match answer.answer {
-        PairAnswer::A => Judgement::First,
-        PairAnswer::B => Judgement::Second,
-        PairAnswer::NoDifference => Judgement::NoDifference,
+    let ordered = match answer.answer {
+        PairAnswer::A => OrderedAnswer::First,
+        PairAnswer::B => OrderedAnswer::Second,
+        PairAnswer::NoDifference => OrderedAnswer::NoDifference,
     };
     let fields = ("trial_a", "trial_b");
-    let statement = AttributedJudgement {
+    let statement = AttributedAnswer {
         study: study.id,
         pair: (a, b),
         fields,
-        judgement,
+        answer: ordered,
         attribution,
         second_answer: SecondAnswer::Refused,
     };

@@ -2,7 +2,7 @@
 //! unsafe).
 
 use super::answer::attribution;
-use super::preference::{self, AttributedJudgement, SecondAnswer};
+use super::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -50,11 +50,11 @@ pub async fn give(
 ) -> Result<AssessmentId, Error> {
     let study = studies::get(writer, study).await?;
     let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
-    let statement = AttributedJudgement {
+    let statement = AttributedAnswer {
         study: study.id,
         pair: (new.trial_a, new.trial_b),
         fields: ("trial_a", "trial_b"),
-        judgement: new.answer.into(),
+        answer: new.answer.into(),
         attribution,
         second_answer: SecondAnswer::Refused,
     };
@@ -70,18 +70,12 @@ pub async fn give(
 ///
 /// # Errors
 /// As [`preference::record`].
-pub(super) async fn write(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<AssessmentId, Error> {
+pub(super) async fn write(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<AssessmentId, Error> {
     let feedback_id = preference::record(writer, statement).await?;
-    let AttributedJudgement { study, pair, judgement, attribution, .. } = statement;
+    let AttributedAnswer { study, pair, answer, attribution, .. } = statement;
     let id = assessments::insert(
         writer,
-        &assessments::UnsavedAssessment {
-            study,
-            pair,
-            answer: judgement.try_into()?,
-            attribution,
-            feedback: feedback_id,
-        },
+        &assessments::UnsavedAssessment { study, pair, answer: answer.try_into()?, attribution, feedback: feedback_id },
     )
     .await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": feedback_id, "assessment_id": id }))

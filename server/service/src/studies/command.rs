@@ -87,8 +87,7 @@ pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &st
 ///
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] if the trial is open or has a result.
-pub async fn retry(writer: &mut Writer, actor: &Actor, id: TrialId) -> Result<Trial, Error> {
+pub async fn retry(writer: &mut Writer, actor: &Actor, id: TrialId) -> Result<(), Error> {
     trial_result::retried(writer, id).await?;
-    audit::append(writer, actor, "trial.retry", &format!("trial {id}"), &json!({})).await?;
-    Ok(trials::get(writer, id).await?)
+    Ok(audit::append(writer, actor, "trial.retry", &format!("trial {id}"), &json!({})).await?)
 }

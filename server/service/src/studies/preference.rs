@@ -7,7 +7,7 @@ use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
 use crate::error::Error;
 use crate::printable;
 use gait_learner::ActionIndex;
-use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
+use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
 use gaitwright_store::feedback::{self, Attribution, FeedbackContent, Source};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{BlindPairId, Connection, FeedbackId, StudyId, TrialId, Writer, assessments, authors, trials};
@@ -25,24 +25,24 @@ pub enum SecondAnswer {
     Allowed,
 }
 
-/// A judgement of two gaits.
+/// An answer about two gaits.
 #[derive(Debug, Clone, Copy)]
-pub struct AttributedJudgement<'a> {
+pub struct AttributedAnswer<'a> {
     /// The study.
     pub study: StudyId,
     /// The two gaits, in the order in which they were shown or walked.
     pub pair: (TrialId, TrialId),
     /// The names of their fields in the request.
     pub fields: (&'a str, &'a str),
-    /// The judgement.
-    pub judgement: Judgement,
+    /// The answer.
+    pub answer: OrderedAnswer,
     /// The author.
     pub attribution: Attribution<'a>,
     /// Whether the author may have answered before.
     pub second_answer: SecondAnswer,
 }
 
-/// Checks a judgement and passes it to the learner. Returns `None` if it states no preference.
+/// Checks an answer and passes it to the learner. Returns `None` if it states no preference.
 ///
 /// A preference needs two different walkable gaits, and no earlier answer of the same person. A safety report is
 /// accepted unless the subject withdrew consent; the learner takes it as a preference for the other gait only if that
@@ -51,8 +51,8 @@ pub struct AttributedJudgement<'a> {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a
 /// second answer.
-pub async fn record(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let AttributedJudgement { study, pair, fields, judgement, attribution, second_answer } = statement;
+pub async fn record(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<Option<FeedbackId>, Error> {
+    let AttributedAnswer { study, pair, fields, answer, attribution, second_answer } = statement;
     if !matches!(attribution.source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician or script"));
     }
@@ -60,7 +60,7 @@ pub async fn record(writer: &mut Writer, statement: AttributedJudgement<'_>) -> 
         let allowed = "a different trial: a gait cannot be compared with itself";
         return Err(Error::invalid(fields.1, pair.1.to_string(), allowed));
     }
-    if judgement.is_about_safety() {
+    if answer.is_about_safety() {
         return report_unsafe(writer, statement).await;
     }
     let pair = walkable::admit_pair(writer, study, fields, pair).await?;
@@ -68,15 +68,15 @@ pub async fn record(writer: &mut Writer, statement: AttributedJudgement<'_>) -> 
         let before = current_answer(writer, study, pair.trials(), attribution.author).await?;
         before.map_or(Ok(()), |_| Err(answered_before(attribution.author)))?;
     }
-    match judgement.feedback(pair.trials()) {
+    match answer.feedback(pair.trials()) {
         Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),
     }
 }
 
 /// Handles a safety report. A gait that was already reported does not lose again in the learner's log.
-async fn report_unsafe(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let AttributedJudgement { study, pair, fields, judgement, attribution, .. } = statement;
+async fn report_unsafe(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<Option<FeedbackId>, Error> {
+    let AttributedAnswer { study, pair, fields, answer, attribution, .. } = statement;
     let first = converged(writer, study, fields.0, pair.0).await?;
     let second = converged(writer, study, fields.1, pair.1).await?;
     let grounds = Grounds::read_for(writer, study, &[first.id, second.id]).await?;
@@ -84,7 +84,7 @@ async fn report_unsafe(writer: &mut Writer, statement: AttributedJudgement<'_>) 
         return Err(NotWalkable::Withdrawn.into());
     }
     let neither_is_reported = [&first, &second].iter().all(|trial| !grounds.safety_reports.forbids(trial));
-    let preference = judgement.feedback(pair).filter(|_| neither_is_reported && !is_same_gait(&first, &second));
+    let preference = answer.feedback(pair).filter(|_| neither_is_reported && !is_same_gait(&first, &second));
     match preference {
         Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
         None => Ok(None),
@@ -149,7 +149,7 @@ pub async fn current_answer(
 
 /// Whether a rater's answer counts: staff can retract the preference derived from it.
 async fn is_current(db: &mut Connection, shown: &BlindPair) -> Result<bool, Error> {
-    if shown.answer.is_none_or(|judgement| judgement == Judgement::Retracted) {
+    if shown.answer.is_none_or(|answer| answer == OrderedAnswer::Retracted) {
         return Ok(false);
     }
     Ok(match blind_pairs::feedback_of(db, shown.id).await? {
@@ -206,12 +206,19 @@ pub(super) async fn suggest(
             )));
         }
         if current_answer(writer, study, (trial.id, over.id), attribution.author).await?.is_some() {
-            return Err(answered_before(attribution.author));
+            return Err(Error::conflict(format!(
+                "{} has already compared trials {} and {}. Retract that answer first, then suggest these bounds again.",
+                attribution.author, trial.number, over.number
+            )));
         }
     }
     // Without a trial of these bounds, only another suggestion can be about them.
     if current_suggestion(writer, study, (suggested, over.action_index), attribution.author).await?.is_some() {
-        return Err(answered_before(attribution.author));
+        return Err(Error::conflict(format!(
+            "{} has already compared these bounds with those of trial {} in a suggestion. Retract that suggestion first, then \
+             suggest again.",
+            attribution.author, over.number
+        )));
     }
     let content = FeedbackContent::Suggestion { suggested, over: over.id };
     Ok(feedback::append(writer, study, &content, attribution).await?)

@@ -3,7 +3,7 @@
 use super::same_motion::GaitMotion;
 use crate::access::Reach;
 use gait_optimizer::TunedBounds;
-use gaitwright_store::blind_pairs::Judgement;
+use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::safety_reports as reports;
 use gaitwright_store::safety_reviews::{self, SafetyDecision, SafetyReview};
 use gaitwright_store::studies::{self, Study};
@@ -158,7 +158,7 @@ impl SafetyReports {
     async fn given_in(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::default();
         for shown in blind_pairs::assessments_of_study(db, study).await? {
-            if let Some((judgement, at)) = shown.answer.zip(shown.answered_at) {
+            if let Some((answer, at)) = shown.answer.zip(shown.answered_at) {
                 let by = format!("rater {}", shown.rater);
                 let report = |trial| ReportedGait {
                     trial,
@@ -168,7 +168,7 @@ impl SafetyReports {
                     source: SafetyReportSource::Rater(shown.id),
                     review: None,
                 };
-                found.add(judgement, shown.trials(), report);
+                found.add(answer, shown.trials(), report);
             }
         }
         for assessment in
@@ -201,7 +201,7 @@ impl SafetyReports {
                 // After unblinding its answers are assessments or preferences.
                 continue;
             }
-            if let Some(answer) = session.answer().filter(|answer| answer.judgement.is_about_safety()) {
+            if let Some(answer) = session.answer().filter(|answer| answer.answer.is_about_safety()) {
                 // Naming one of the two gaits would reveal the allocation, so both are kept from walking until unblinding.
                 let by = format!("the subject in lab session {} (blinded, so either gait)", session.number);
                 let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
@@ -225,11 +225,11 @@ impl SafetyReports {
         }
     }
 
-    fn add(&mut self, judgement: Judgement, pair: (TrialId, TrialId), report: impl Fn(TrialId) -> ReportedGait) {
-        if judgement == Judgement::CannotTell {
+    fn add(&mut self, answer: OrderedAnswer, pair: (TrialId, TrialId), report: impl Fn(TrialId) -> ReportedGait) {
+        if answer == OrderedAnswer::CannotTell {
             self.skipped.push(pair);
         }
-        self.in_force.extend(judgement.unsafe_of(pair).into_iter().map(report));
+        self.in_force.extend(answer.unsafe_of(pair).into_iter().map(report));
     }
 
     /// The reports in force about the gait of this trial.

@@ -9,7 +9,7 @@ mod biased_coin;
 pub use biased_coin::RandomDraw;
 
 use super::audit::Actor;
-use super::blind_pairs::{BlindPair, Judgement, SELECT};
+use super::blind_pairs::{BlindPair, OrderedAnswer, SELECT};
 use super::{
     BlindPairId, Connection, ControllerFileDownloadId, Instant, LabSessionId, StoreResult, StudyId, TrialId, now,
 };
@@ -187,13 +187,13 @@ impl PairWithSides {
     }
 
     /// Converts an answer from sides to gaits of the pair, or back.
-    pub fn turned(&self, judgement: Judgement) -> Judgement {
-        if self.swapped { judgement.swapped() } else { judgement }
+    pub fn turned(&self, answer: OrderedAnswer) -> OrderedAnswer {
+        if self.swapped { answer.swapped() } else { answer }
     }
 
     /// The answer in terms of sides.
-    pub fn answer(&self) -> Option<Judgement> {
-        self.pair.answer.map(|judgement| self.turned(judgement))
+    pub fn answer(&self) -> Option<OrderedAnswer> {
+        self.pair.answer.map(|answer| self.turned(answer))
     }
 }
 

@@ -26,7 +26,7 @@ pub(in super::super) async fn adopt(db: &mut Connection, before: &[Sealed]) -> S
 /// The error for a row that differs from its seal or its checksum, or that has none, or that is missing.
 pub(in super::super) fn touched(table: &str, key: &str) -> StoreError {
     let reason = format!("row {key} of {table} was changed, added or deleted outside the program");
-    StoreError::Damaged { what: "evidence", reason }
+    StoreError::Damaged { what: "seals", reason }
 }
 
 /// A row that a change touched, as it was before.

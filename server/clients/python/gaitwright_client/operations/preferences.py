@@ -13,11 +13,11 @@ from ..schemas import (
     AssessmentId,
     CreatedPreference,
     FeedbackId,
-    FeedbackRow,
     NewAssessment,
     NewPreference,
     NewSafetyReport,
     NewSafetyReview,
+    Preference,
     Retract,
     SafetyReport,
     SafetyReview,
@@ -62,9 +62,9 @@ class PreferencesMethods(Transport):
             ),
         )
 
-    def get_preference(self, preference_id: FeedbackId) -> FeedbackRow:
+    def get_preference(self, preference_id: FeedbackId) -> Preference:
         """Get a preference."""
-        return cast(FeedbackRow, self.request_json("GET", "/api/v1/preferences/{id}", {"id": preference_id}))
+        return cast(Preference, self.request_json("GET", "/api/v1/preferences/{id}", {"id": preference_id}))
 
     def retract_preference(
         self,
@@ -72,7 +72,7 @@ class PreferencesMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[Retract],
-    ) -> FeedbackRow:
+    ) -> Preference:
         """Retract a preference.
 
         The preference stays on record, but the learner no longer uses it.
@@ -80,7 +80,7 @@ class PreferencesMethods(Transport):
         Fields: reason; optionally author.
         """
         return cast(
-            FeedbackRow,
+            Preference,
             self.request_json(
                 "POST",
                 "/api/v1/preferences/{id}/retract",
@@ -122,7 +122,7 @@ class PreferencesMethods(Transport):
             ),
         )
 
-    def list_preferences(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[FeedbackRow]:
+    def list_preferences(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Preference]:
         """List preferences of a study.
 
         Includes retracted preferences. Oldest first.
@@ -170,7 +170,7 @@ class PreferencesMethods(Transport):
         """
         return Pages(self, "/api/v1/studies/{id}/safety-reports", {"id": study_id}, query={"limit": page_size})
 
-    def list_suggestions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[FeedbackRow]:
+    def list_suggestions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Preference]:
         """List suggestions of a study.
 
         Includes retracted suggestions. Oldest first.
@@ -183,7 +183,7 @@ class PreferencesMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[Suggestion],
-    ) -> FeedbackRow:
+    ) -> Preference:
         """Record a suggestion.
 
         The learner uses it like a preference. Retract it with `POST /api/v1/preferences/{id}/retract`.
@@ -191,7 +191,7 @@ class PreferencesMethods(Transport):
         Fields: bounds, over; optionally author, note, source.
         """
         return cast(
-            FeedbackRow,
+            Preference,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/suggestions",

@@ -234,20 +234,12 @@ class TrialsMethods(Transport):
         """
         return cast(SolveProblem, self.request_json("GET", "/api/v1/trials/{id}/problem.json", {"id": trial_id}))
 
-    def retry_trial(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Trial:
+    def retry_trial(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Job:
         """Retry a trial.
 
-        Requeues a trial that ended without a result.
+        Queues a trial again that ended without a result. The job of its solve can be followed and cancelled.
         """
-        return cast(
-            Trial,
-            self.request_json(
-                "POST",
-                "/api/v1/trials/{id}/retry",
-                {"id": trial_id},
-                key=idempotency_key,
-            ),
-        )
+        return cast(Job, self.request_json("POST", "/api/v1/trials/{id}/retry", {"id": trial_id}, key=idempotency_key))
 
     def get_sensitivities(self, trial_id: TrialId) -> TrialSensitivities:
         """Get the sensitivities of a trial.

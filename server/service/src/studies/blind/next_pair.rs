@@ -1,7 +1,7 @@
 //! Chooses the pair that a rater is shown next, as a pure function of the pending comparison, earlier blind pairs and
 //! a random number of the operating system. `store::allocations` draws the sides.
 
-use gaitwright_store::blind_pairs::{BlindPair, BlindPairKind, Judgement};
+use gaitwright_store::blind_pairs::{BlindPair, BlindPairKind, OrderedAnswer};
 use gaitwright_store::{BlindPairId, TrialId};
 
 /// One in this many blind pairs repeats an earlier pair.
@@ -23,7 +23,7 @@ pub struct NextPair {
 /// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
 /// earlier blind pairs of this rater; `reported` lists trials with a safety report in force.
 pub fn next_pair(random: u64, question: (TrialId, TrialId), before: &[BlindPair], reported: &[TrialId]) -> NextPair {
-    let retracted = before.last().filter(|last| last.answer == Some(Judgement::Retracted));
+    let retracted = before.last().filter(|last| last.answer == Some(OrderedAnswer::Retracted));
     if let Some(last) = retracted.filter(|last| !last.has_one_of(reported)) {
         // A rater who confused the sides must find them unchanged.
         let repeated =
@@ -60,8 +60,8 @@ fn repeatable<'a>(before: &'a [BlindPair], reported: &[TrialId], random: u64) ->
 }
 
 /// Whether an answer compares the two gaits.
-pub(super) fn is_plain(judgement: Judgement) -> bool {
-    matches!(judgement, Judgement::First | Judgement::Second | Judgement::NoDifference)
+pub(super) fn is_plain(answer: OrderedAnswer) -> bool {
+    matches!(answer, OrderedAnswer::First | OrderedAnswer::Second | OrderedAnswer::NoDifference)
 }
 
 /// Whether two pairs have the same gaits.
@@ -87,7 +87,7 @@ mod tests {
             repeats: next.repeats,
             could_have_known: false,
             created_at: now(),
-            answer: Some(Judgement::First),
+            answer: Some(OrderedAnswer::First),
             answered_at: Some(now()),
             note: String::new(),
         }
@@ -119,7 +119,7 @@ mod tests {
             let pending = question();
             let earlier = shown(1, next_pair(1, question(), &[], &[]));
             let next = next_pair(random, pending, std::slice::from_ref(&earlier), &[]);
-            let retracted = BlindPair { answer: Some(Judgement::Retracted), ..shown(2, next) };
+            let retracted = BlindPair { answer: Some(OrderedAnswer::Retracted), ..shown(2, next) };
             let id = retracted.id;
             let repeated = next_pair(3, pending, &[earlier, retracted], &[]);
             assert_eq!(repeated, NextPair { same_sides_as: Some(id), ..next });
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn settled_comparison_is_not_shown_again() {
         let retracted =
-            BlindPair { answer: Some(Judgement::Retracted), ..shown(1, next_pair(1, question(), &[], &[])) };
+            BlindPair { answer: Some(OrderedAnswer::Retracted), ..shown(1, next_pair(1, question(), &[], &[])) };
         let pending = question();
         assert_eq!(next_pair(1, pending, &[retracted], &[]).pair, pending);
     }

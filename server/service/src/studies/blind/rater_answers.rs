@@ -7,14 +7,14 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::answer as answering;
 use crate::studies::pending_comparison::open_question;
-use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
+use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
 use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
 use gaitwright_store::allocations::{self, PairWithSides, RandomDraw};
 use gaitwright_store::audit;
-use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind, Judgement, NewBlindPair, NewPairAnswer};
+use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind, NewBlindPair, NewPairAnswer, OrderedAnswer};
 use gaitwright_store::feedback::{self, Attribution, Source};
 use gaitwright_store::studies::FeedbackMode;
 use gaitwright_store::{
@@ -33,7 +33,7 @@ const NO_LONGER_SHOWN: &str = "This pair is no longer shown. Continue with the n
 #[serde(deny_unknown_fields)]
 pub struct RaterAnswer {
     /// The answer.
-    pub answer: Judgement,
+    pub answer: OrderedAnswer,
     /// Response time of the rater, ms.
     #[serde(default)]
     #[schema(minimum = 0)]
@@ -149,7 +149,7 @@ async fn is_answered(
 
 async fn cancel(writer: &mut Writer, open: &BlindPair) -> Result<(), Error> {
     let retracted = NewPairAnswer {
-        judgement: Judgement::Retracted,
+        answer: OrderedAnswer::Retracted,
         response_ms: None,
         note: "",
         feedback: None,
@@ -185,13 +185,13 @@ pub async fn answer(
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let attribution = Attribution { source, author: &caller.name, note: &given.note };
     // From here on the answer refers to gaits, not to sides.
-    let judgement = sided.turned(given.answer);
+    let answer = sided.turned(given.answer);
     if shown.answer.is_some() {
-        if !judgement.is_about_safety() {
+        if !answer.is_about_safety() {
             return Err(Error::conflict(answered_already(sided.answer())));
         }
-        let gaits = judgement.unsafe_of(shown.trials());
-        let is_repeated = shown.answer == Some(judgement) && shown.note == given.note;
+        let gaits = answer.unsafe_of(shown.trials());
+        let is_repeated = shown.answer == Some(answer) && shown.note == given.note;
         if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.are_all_in_force(&gaits)) {
             safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
@@ -199,11 +199,11 @@ pub async fn answer(
     }
     let second_answer = if shown.kind == BlindPairKind::Repeat { SecondAnswer::Allowed } else { SecondAnswer::Refused };
     let (study, pair, fields) = (shown.study_id, shown.trials(), ("first", "second"));
-    let statement = AttributedJudgement { study, pair, fields, judgement, attribution, second_answer };
+    let statement = AttributedAnswer { study, pair, fields, answer, attribution, second_answer };
     let feedback_id = preference::record(writer, statement).await.map_err(without_gaits)?;
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
     let row = NewPairAnswer {
-        judgement,
+        answer,
         response_ms: given.response_ms,
         note: &given.note,
         feedback: feedback_id,
@@ -229,27 +229,27 @@ fn without_gaits(error: Error) -> Error {
 }
 
 /// Explains which answer counts after a second one was refused.
-fn answered_already(before: Option<Judgement>) -> String {
+fn answered_already(before: Option<OrderedAnswer>) -> String {
     match before {
-        Some(Judgement::Retracted) => "This pair was already answered, and the answer was retracted.".to_owned(),
-        Some(judgement) => {
-            format!("This pair was already answered. Your first answer counts: {}.", sides_in_words(judgement))
+        Some(OrderedAnswer::Retracted) => "This pair was already answered, and the answer was retracted.".to_owned(),
+        Some(answer) => {
+            format!("This pair was already answered. Your first answer counts: {}.", sides_in_words(answer))
         }
         None => "This pair was already answered.".to_owned(),
     }
 }
 
 /// The answer of a rater about the two sides of a pair.
-pub fn sides_in_words(answer: Judgement) -> &'static str {
+pub fn sides_in_words(answer: OrderedAnswer) -> &'static str {
     match answer {
-        Judgement::First => "the first gait is better",
-        Judgement::Second => "the second gait is better",
-        Judgement::NoDifference => "no difference",
-        Judgement::CannotTell => "cannot tell",
-        Judgement::UnsafeFirst => "the first gait is unsafe",
-        Judgement::UnsafeSecond => "the second gait is unsafe",
-        Judgement::UnsafeBoth => "both gaits are unsafe",
-        Judgement::Retracted => "retracted",
+        OrderedAnswer::First => "the first gait is better",
+        OrderedAnswer::Second => "the second gait is better",
+        OrderedAnswer::NoDifference => "no difference",
+        OrderedAnswer::CannotTell => "cannot tell",
+        OrderedAnswer::UnsafeFirst => "the first gait is unsafe",
+        OrderedAnswer::UnsafeSecond => "the second gait is unsafe",
+        OrderedAnswer::UnsafeBoth => "both gaits are unsafe",
+        OrderedAnswer::Retracted => "retracted",
     }
 }
 
@@ -284,7 +284,7 @@ pub async fn can_be_retracted(db: &mut Connection, shown: &BlindPair) -> Result<
     let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
     let is_retractable = matches!(
         shown.answer,
-        Some(Judgement::First | Judgement::Second | Judgement::NoDifference | Judgement::CannotTell)
+        Some(OrderedAnswer::First | OrderedAnswer::Second | OrderedAnswer::NoDifference | OrderedAnswer::CannotTell)
     );
     Ok(last && is_retractable)
 }

@@ -3,7 +3,7 @@
 use super::next_pair::{is_plain, is_same_pair};
 use crate::error::Error;
 use gaitwright_store::allocations::{self, PairWithSides};
-use gaitwright_store::blind_pairs::{self, BlindPair, Judgement};
+use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
 use gaitwright_store::{Connection, StudyId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -83,14 +83,14 @@ fn of_rater(rater: &str, all: &[BlindPair], sides: &[PairWithSides]) -> RaterRel
     let count = |wanted: &dyn Fn(&BlindPair) -> bool| {
         u32::try_from(own.iter().filter(|shown| wanted(shown)).count()).unwrap_or(u32::MAX)
     };
-    let is_unsafe = |shown: &BlindPair| shown.answer.is_some_and(Judgement::is_about_safety);
+    let is_unsafe = |shown: &BlindPair| shown.answer.is_some_and(OrderedAnswer::is_about_safety);
     RaterReliability {
         rater: rater.to_owned(),
         shown: count(&|_| true),
-        answered: count(&|shown| shown.answer.is_some_and(|judgement| judgement != Judgement::Retracted)),
+        answered: count(&|shown| shown.answer.is_some_and(|answer| answer != OrderedAnswer::Retracted)),
         first_preferred: first_preferred(rater, sides),
         repeats_agree: repeats_agree(&own),
-        cannot_tell: count(&|s| s.answer == Some(Judgement::CannotTell)),
+        cannot_tell: count(&|s| s.answer == Some(OrderedAnswer::CannotTell)),
         unsafe_gaits: count(&is_unsafe),
         could_have_known: count(&|s| s.could_have_known),
     }
@@ -100,10 +100,9 @@ fn first_preferred(rater: &str, sides: &[PairWithSides]) -> Option<Share> {
     let mut own = sides.iter().filter(|sided| sided.pair.rater == rater).peekable();
     own.peek()?;
     let blind = own.filter(|sided| !sided.pair.could_have_known);
-    let answers: Vec<Judgement> = blind.filter_map(PairWithSides::answer).collect();
-    let count =
-        |judgement| u32::try_from(answers.iter().filter(|answer| **answer == judgement).count()).unwrap_or(u32::MAX);
-    let (first, second) = (count(Judgement::First), count(Judgement::Second));
+    let answers: Vec<OrderedAnswer> = blind.filter_map(PairWithSides::answer).collect();
+    let count = |wanted| u32::try_from(answers.iter().filter(|answer| **answer == wanted).count()).unwrap_or(u32::MAX);
+    let (first, second) = (count(OrderedAnswer::First), count(OrderedAnswer::Second));
     Some(Share::new(first, first.saturating_add(second)))
 }
 
@@ -116,7 +115,7 @@ fn repeats_agree(own: &[&BlindPair]) -> Share {
         let before = answered[..place].iter().rfind(|other| is_same_pair(other.trials(), shown.trials()));
         let Some(before) = before else { continue };
         let turned =
-            if before.trials() == shown.trials() { before.answer } else { before.answer.map(Judgement::swapped) };
+            if before.trials() == shown.trials() { before.answer } else { before.answer.map(OrderedAnswer::swapped) };
         of += 1;
         agree += u32::from(turned == shown.answer);
     }

@@ -4,7 +4,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::allocations::{self, PairWithSides};
-use gaitwright_store::blind_pairs::{self, BlindPairKind, Judgement};
+use gaitwright_store::blind_pairs::{self, BlindPairKind, OrderedAnswer};
 use gaitwright_store::{BlindPairId, Instant, StudyId, TrialId, Writer, audit, consents, studies};
 use serde::Serialize;
 use serde_json::json;
@@ -34,7 +34,7 @@ pub struct UnblindedPair {
     /// Time at which the pair was drawn.
     pub created_at: Instant,
     /// Answer in terms of what was shown. Null if there is none yet.
-    pub answer: Option<Judgement>,
+    pub answer: Option<OrderedAnswer>,
     /// Time of the answer. Null if there is none yet.
     pub answered_at: Option<Instant>,
 }

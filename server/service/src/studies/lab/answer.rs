@@ -10,11 +10,11 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::answer as answering;
 use crate::studies::assessment;
-use crate::studies::preference::{self, AttributedJudgement, SecondAnswer};
+use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::blind_pairs::Judgement;
+use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{Attribution, Source};
 use gaitwright_store::lab_answers::{self, LabAnswer};
 use gaitwright_store::lab_sessions::{LabSession, SessionStep};
@@ -36,7 +36,7 @@ pub struct NewAnswer {
     #[schema(minimum = 1)]
     pub number: u32,
     /// The answer. First is walk 2, second is walk 3.
-    pub answer: Judgement,
+    pub answer: OrderedAnswer,
     /// Free text, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -85,7 +85,7 @@ pub async fn give(
 
 /// Whether an answer is the same form, sent twice.
 fn is_same(current: &LabAnswer, new: &NewAnswer) -> bool {
-    (current.number, current.judgement, current.note.as_str()) == (new.number, new.answer, new.note.as_str())
+    (current.number, current.answer, current.note.as_str()) == (new.number, new.answer, new.note.as_str())
 }
 
 /// Records a safety report: as the answer of the session, in place of another answer while the session is blinded. If
@@ -109,14 +109,14 @@ async fn report_unsafe(
         {
             session_progress(writer, session.id).await
         }
-        Some(current) if walked.is_none() && !current.judgement.is_about_safety() => {
+        Some(current) if walked.is_none() && !current.answer.is_about_safety() => {
             retract_number(writer, caller, session.id, current.number).await?;
             add(writer, caller, session.id, next_number(session), new).await
         }
         Some(_) => {
             let walks = match new.answer {
-                Judgement::UnsafeFirst => "walk 2",
-                Judgement::UnsafeSecond => "walk 3",
+                OrderedAnswer::UnsafeFirst => "walk 2",
+                OrderedAnswer::UnsafeSecond => "walk 3",
                 _ => "walks 2 and 3",
             };
             // At most 80 characters, as every author.
@@ -178,16 +178,16 @@ pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> 
     let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
     let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
-    let statement = AttributedJudgement {
+    let statement = AttributedAnswer {
         study: study.id,
         pair: walked,
         fields: ("walk 2", "walk 3"),
-        judgement: given.judgement,
+        answer: given.answer,
         attribution: Attribution { source: Source::Subject, author: &author, note: &given.note },
         // Several sessions may compare the same two gaits.
         second_answer: SecondAnswer::Allowed,
     };
-    let feedback_id = if given.judgement.is_assessment() {
+    let feedback_id = if given.answer.is_assessment() {
         assessment::write(writer, statement).await.map(drop)
     } else {
         record_preference(writer, statement).await
@@ -202,7 +202,7 @@ pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> 
     }
 }
 
-async fn record_preference(writer: &mut Writer, statement: AttributedJudgement<'_>) -> Result<(), Error> {
+async fn record_preference(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<(), Error> {
     let feedback_id = preference::record(writer, statement).await?;
     Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": feedback_id })).await?)
 }

@@ -3,7 +3,7 @@
 
 use gaitwright_store::Instant;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::blind_pairs::Judgement;
+use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::lab_answers::LabAnswer;
 use gaitwright_store::lab_sessions::{LabSession, SessionStep};
 use serde::Serialize;
@@ -19,7 +19,7 @@ pub struct AnswerView {
     /// Number of the answer, from 1. It increases by one when an answer is retracted.
     pub number: u32,
     /// The answer. First is walk 2, second is walk 3.
-    pub answer: Judgement,
+    pub answer: OrderedAnswer,
     /// Free text.
     pub note: String,
     /// Who recorded it.
@@ -36,7 +36,7 @@ impl AnswerView {
         let unblinded = session.done(SessionStep::Unblinded).is_some_and(|done| done.at <= row.at);
         Self {
             number: row.number,
-            answer: row.judgement,
+            answer: row.answer,
             note: row.note.clone(),
             actor: row.actor.clone(),
             created_at: row.at,
@@ -71,7 +71,7 @@ pub(super) fn next_number(session: &LabSession) -> u32 {
 /// Whether the current answer can be retracted: the session is blinded, and it is not a safety report.
 pub(super) fn can_be_retracted(session: &LabSession) -> bool {
     let open = session.done(SessionStep::Closed).is_none() && session.done(SessionStep::Unblinded).is_none();
-    open && session.answer().is_some_and(|answer| !answer.judgement.is_about_safety())
+    open && session.answer().is_some_and(|answer| !answer.answer.is_about_safety())
 }
 
 /// Whether an actor may have fetched a controller file of this session before an instant. Any actor counts if a token

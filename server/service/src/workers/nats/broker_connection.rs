@@ -23,6 +23,8 @@ pub(super) const BROKER_HEARTBEAT: Duration = Duration::from_secs(2);
 /// A connection to a broker, and the names of our streams and subjects.
 #[derive(Debug, Clone)]
 pub(super) struct BrokerConnection {
+    /// Host and port, without a user and a password, for messages.
+    pub(super) address: String,
     pub(super) context: Context,
     pub(super) queue: String,
     pub(super) lease: Duration,
@@ -42,14 +44,17 @@ pub async fn reach(url: &str) -> Result<String, DispatchError> {
 impl BrokerConnection {
     /// Connects once the broker is available, and reconnects whenever the connection breaks.
     pub(super) async fn open(url: &str, queue: &str, lease: Duration) -> Result<Self, DispatchError> {
+        let address = url.rsplit(['@', '/']).next().unwrap_or_default().to_owned();
         let client = async_nats::ConnectOptions::new()
             .name(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))
             .reconnect_delay_callback(|_| AGAIN)
             .retry_on_initial_connect()
             .connect(url)
             .await
-            .map_err(|error| DispatchError::Unreachable(format!("The NATS broker cannot be reached: {error}.")))?;
-        Ok(Self { context: jetstream::new(client), queue: queue.to_owned(), lease })
+            .map_err(|error| {
+                DispatchError::Unreachable(format!("The NATS broker {address} cannot be reached: {error}."))
+            })?;
+        Ok(Self { address, context: jetstream::new(client), queue: queue.to_owned(), lease })
     }
 
     pub(super) fn job_subject(&self, attempt: Attempt) -> String {
@@ -127,7 +132,7 @@ impl BrokerConnection {
     /// Why the broker cannot be reached now, if it cannot.
     pub(super) fn problem(&self) -> Option<String> {
         (self.context.client().connection_state() != State::Connected)
-            .then(|| "The NATS broker cannot be reached.".to_owned())
+            .then(|| format!("The NATS broker {} cannot be reached.", self.address))
     }
 
     /// Refuses a message that is too large, for which the broker would close the connection.

@@ -60,7 +60,7 @@ impl JetStream {
                         _ => results(&link, &sender, &problem, &mut storage).await,
                     };
                     if let Err(error) = ended {
-                        tracing::warn!(%error, "cannot receive messages from workers; retrying");
+                        tracing::warn!(broker = %link.address, %error, "cannot receive messages from workers; retrying");
                         if task == 1 {
                             problem.send_replace(Some(error.to_string()));
                         }
@@ -136,7 +136,7 @@ impl Dispatch for JetStream {
         Box::pin(async move {
             if let Err(error) = self.recall(trial).await {
                 // Its result will arrive late and be ignored.
-                tracing::warn!(%trial, %error, "cannot remove a job from the broker");
+                tracing::warn!(broker = %self.link.address, %trial, %error, "cannot remove a job from the broker");
             }
         })
     }

@@ -123,7 +123,7 @@ impl Worker {
                     }
                     Ok(None) => slot = Some(permit),
                     Err(error) => {
-                        tracing::warn!(%error, "cannot pull a job; retrying");
+                        tracing::warn!(broker = %self.link.address, %error, "cannot pull a job; retrying");
                         tokio::time::sleep(AGAIN).await;
                         slot = Some(permit);
                     }

@@ -68,12 +68,10 @@ pub(super) async fn answers(
     );
     for shown in at("blind_pairs", blind_pairs::of_study(db, id).await)? {
         at(format!("blind pair {}", shown.id), of_gaits(trials, [shown.trial_a, shown.trial_b]))?;
-        reports.extend(
-            shown.answer.filter(|judgement| judgement.is_about_safety()).map(|_| SafetyReportId::from(shown.id)),
-        );
+        reports.extend(shown.answer.filter(|answer| answer.is_about_safety()).map(|_| SafetyReportId::from(shown.id)));
     }
     reports.extend(at("safety_reports", safety_reports::of_study(db, id).await)?.iter().map(|report| report.id));
-    let has_report = |session: &&LabSession| session.answers.iter().any(|answer| answer.judgement.is_about_safety());
+    let has_report = |session: &&LabSession| session.answers.iter().any(|answer| answer.answer.is_about_safety());
     reports.extend(sessions.iter().filter(has_report).map(|session| SafetyReportId::from(session.id)));
     for review in at("safety_reviews", safety_reviews::of_study(db, id).await)? {
         let what = format!("safety review {}", review.id);
