@@ -348,7 +348,7 @@ fn unknown_get_route_fails_until_it_is_classified() {
 }
 
 /// What each command has to do with people and devices.
-const COMMANDS: [(&str, &str); 24] = [
+const COMMANDS: [(&str, &str); 25] = [
     ("convert", "makes tables and pictures of a gait file, and nothing for a device"),
     ("import", "writes the rows of an archive after checking them: `archives.rs` holds its rules"),
     ("signing-key", "makes a key to sign archives"),
