@@ -143,9 +143,9 @@ create table studies (
     seed                 integer not null constraint studies_seed check (seed between 0 and 9007199254740991),
     state                text not null
                          constraint studies_state
-                         check (state in ('draft', 'running', 'waiting', 'paused', 'finished', 'stopped')),
+                         check (state in ('not_started', 'running', 'waiting', 'paused', 'finished', 'stopped')),
     state_reason         text not null default '',
-    forked_from          text references studies (id),
+    cloned_from          text references studies (id),
     -- Tags, notes and the time of archiving help people to find a study. They do not affect its trials.
     tags                 text constraint studies_tags check (json_valid(tags) and length(tags) <= 1000),
     notes                text constraint studies_notes_length check (length(notes) between 1 and 4000),
@@ -881,7 +881,7 @@ create table users (
     name        text not null collate nocase
                 constraint users_name_unique unique
                 constraint users_name_length check (length(name) between 1 and 80),
-    role        text not null constraint users_role check (role in ('admin', 'clinician', 'rater')),
+    role        text not null constraint users_role check (role in ('administrator', 'clinician', 'rater')),
     -- A PHC string; null if the user signs in with one-time links only.
     password    text,
     disabled_at text,

@@ -288,7 +288,7 @@ async fn error_page_links_only_to_permitted_pages() {
 #[tokio::test]
 async fn sign_in_link_works_once_and_then_the_password() {
     let (_folder, service) = service().await;
-    let (_, link) = user(&service, "Ada", Role::Admin).await;
+    let (_, link) = user(&service, "Ada", Role::Administrator).await;
     let path = format!("/sign-in/{link}");
     assert_eq!(send(&service, &As::Nobody, &Method::GET, &path, FORM, "").await.status, StatusCode::OK);
     let first = send(&service, &As::Nobody, &Method::POST, &path, FORM, "").await;
@@ -299,7 +299,7 @@ async fn sign_in_link_works_once_and_then_the_password() {
     assert!(again.text.contains("This link was already used or has expired"), "{}", again.text);
 
     let me = send(&service, &ada, &Method::GET, "/api/v1/me", "", "").await.json();
-    assert_eq!((&me["name"], &me["role"]), (&json!("Ada"), &json!("admin")));
+    assert_eq!((&me["name"], &me["role"]), (&json!("Ada"), &json!("administrator")));
     let short = send(&service, &ada, &Method::POST, "/account", FORM, "password=short").await;
     assert_eq!(short.status, StatusCode::UNPROCESSABLE_ENTITY);
     let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse+battery").await;
@@ -397,7 +397,7 @@ async fn wrong_passwords_wait_longer_each_time_and_are_audited() {
 #[tokio::test]
 async fn sessions_end_if_idle_or_disabled_and_tokens_if_revoked() {
     let (_folder, mut service) = service().await;
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let script = token(&service, &[Right::Read]).await;
     let me = "/api/v1/me";
@@ -435,7 +435,7 @@ async fn sessions_end_if_idle_or_disabled_and_tokens_if_revoked() {
 #[tokio::test]
 async fn signed_in_browser_without_an_origin_cannot_change_anything() {
     let (_folder, service) = service().await;
-    let As::Session(secret) = signed_in(&service, Role::Admin).await else { panic!() };
+    let As::Session(secret) = signed_in(&service, Role::Administrator).await else { panic!() };
     for (header_name, value, expected) in [
         ("x-nothing", "", StatusCode::FORBIDDEN),
         ("sec-fetch-site", "cross-site", StatusCode::FORBIDDEN),
@@ -475,7 +475,7 @@ async fn every_response_has_the_security_headers() {
         assert!(policy.contains("default-src 'self'") && !policy.contains("unsafe"), "{policy}");
     }
     let large = "x".repeat(2 << 20);
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     let answer = send(&service, &admin, &Method::POST, "/api/v1/subjects", "application/json", &large).await;
     assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
     service.stop().await;
@@ -484,7 +484,7 @@ async fn every_response_has_the_security_headers() {
 #[tokio::test]
 async fn parallel_guesses_are_limited_like_sequential_ones() {
     let (_folder, service) = service().await;
-    let (_, _) = user(&service, "Ada", Role::Admin).await;
+    let (_, _) = user(&service, "Ada", Role::Administrator).await;
     let guess = |number: u32| {
         let service = &service;
         async move { service.post_text("/sign-in", FORM, &format!("name=Ada&password=guess+{number}")).await.status }

@@ -135,8 +135,8 @@ async fn token_without_read_right_is_logged_when_a_change_returns_a_study() {
     let json = "application/json";
     let changed = send(&service, &runs, &Method::PATCH, &path, json, r#"{"priority": 3}"#).await;
     assert!(changed.status == StatusCode::OK && changed.json()["subject_id"] == subject.to_string());
-    let forked = send(&service, &runs, &Method::POST, &format!("{path}/fork"), json, "{}").await;
-    assert_eq!(forked.status, StatusCode::CREATED, "{}", forked.text);
+    let cloned = send(&service, &runs, &Method::POST, &format!("{path}/clone"), json, "{}").await;
+    assert_eq!(cloned.status, StatusCode::CREATED, "{}", cloned.text);
     let body = r#"{"pseudonym": "P2", "height_m": 1.8, "body_mass_kg": 70}"#;
     let added = send(&service, &runs, &Method::POST, "/api/v1/subjects", json, body).await;
     let added = Some(added.json()["id"].as_str().unwrap().parse().unwrap());
@@ -155,7 +155,8 @@ async fn token_without_read_right_is_logged_when_a_change_returns_a_study() {
 #[tokio::test]
 async fn log_rows_name_caller_object_and_subject() {
     let (_folder, service, study) = with_study().await;
-    let (clinician, admin) = (signed_in(&service, Role::Clinician).await, signed_in(&service, Role::Admin).await);
+    let (clinician, admin) =
+        (signed_in(&service, Role::Clinician).await, signed_in(&service, Role::Administrator).await);
     let script = token(&service, &[Right::Rate]).await;
     let subject = service.subject().await;
     let trial = service.trials(study).await[0].id;
@@ -351,7 +352,7 @@ async fn command_line_export_and_backup_are_logged_while_the_service_runs() {
 #[tokio::test]
 async fn corrected_height_and_mass_apply_to_new_studies_only() {
     let (_folder, service, study) = with_study().await;
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     let subject = service.subject().await;
     let trial = service.trials(study).await[0].id;
     let fetch = async |path: String| send(&service, &admin, &Method::GET, &path, FORM, "").await;

@@ -560,7 +560,8 @@ async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() 
     let human = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let rater = rater_of(&service, &[study, human]).await;
-    let callers = [rater.clone(), signed_in(&service, Role::Admin).await, token(&service, &[Right::Read]).await];
+    let callers =
+        [rater.clone(), signed_in(&service, Role::Administrator).await, token(&service, &[Right::Read]).await];
     // Answered pairs and an open one; sessions that are walked and answered, also with a walk that was unsafe.
     let mut own = String::new();
     for answer in ["first", "second", "no_difference", ""] {

@@ -39,7 +39,7 @@ async fn damaged_record_is_not_backed_up_and_a_damaged_backup_is_not_restored() 
     let name = database.to_str().unwrap();
     assert!(run(&["backup", "--database", name, "good.db"]).status.success());
     for (sql, what) in [
-        ("update users set role = 'admin'", "of users"),
+        ("update users set role = 'administrator'", "of users"),
         ("update sessions set by_link = 1 - by_link", "of sessions"),
         ("drop trigger users_no_delete", "trigger users_no_delete"),
         ("create table more (x)", "table more"),

@@ -124,7 +124,7 @@ async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &s
 #[tokio::test]
 async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let (_folder, service) = callers::service().await;
-    let (rater, admin) = (rater_of(&service, &[]).await, signed_in(&service, Role::Admin).await);
+    let (rater, admin) = (rater_of(&service, &[]).await, signed_in(&service, Role::Administrator).await);
     // One pair in ten is a repeat, by chance: one study in sixty has none.
     let mut with_repeats = None;
     for _ in 0..8 {
@@ -280,7 +280,7 @@ async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
-    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
+    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.items();
     let id = users.as_array().unwrap().iter().find(|user| user["name"] == "a rater").unwrap()["id"].clone();
     for role in ["clinician", "rater"] {
@@ -306,7 +306,7 @@ async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
-    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
+    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let json_of = "application/json";
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, json_of, "{}").await.json()["pair"].clone();
@@ -365,7 +365,7 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let (_folder, service) = callers::service().await;
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
-    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
+    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let post = async |who: &As, path: &str, body: Value| {
         send(&service, who, &Method::POST, path, "application/json", &body.to_string()).await
     };
@@ -437,7 +437,8 @@ async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let rater = rater_of(&service, &[study]).await;
-    let (admin, clinician) = (signed_in(&service, Role::Admin).await, signed_in(&service, Role::Clinician).await);
+    let (admin, clinician) =
+        (signed_in(&service, Role::Administrator).await, signed_in(&service, Role::Clinician).await);
     let (page, form) = (format!("/studies/{study}/members"), "application/x-www-form-urlencoded");
     let read = async |who: &As| send(&service, who, &Method::GET, &page, "", "").await.text;
     assert!(!read(&admin).await.contains("id=\"raters\""), "nobody has compared gaits yet");

@@ -101,9 +101,9 @@ async fn new_studies_use_the_recorded_muscles_of_their_subject() {
     let of = async |study| service.get(study).await.plan.gait_settings.muscles;
     assert!(of(before).await.is_published());
     assert_eq!(of(after).await.sol.max_force_n, Some(4200.0));
-    // A fork has the set-up of its parent, not values that were recorded later.
-    let fork = service.post(&format!("/api/v1/studies/{before}/fork"), &json!({})).await.json();
-    assert!(of(fork["id"].as_str().unwrap().parse().unwrap()).await.is_published());
+    // A clone has the set-up of its parent, not values that were recorded later.
+    let clone = service.post(&format!("/api/v1/studies/{before}/clone"), &json!({})).await.json();
+    assert!(of(clone["id"].as_str().unwrap().parse().unwrap()).await.is_published());
     assert_eq!(service.put(&api, &json!({})).await.status, StatusCode::OK);
     let published = service.study(|new| new.trial_budget = 1).await;
     assert!(of(published).await.is_published());

@@ -125,7 +125,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     scene.one(done, "post /studies", &format!("{api}/studies"), study).await;
     let of_draft = format!("{api}/studies/{draft}");
     scene.one(done, "patch /studies/{id}", &of_draft, json!({"priority": -10})).await;
-    for (act, body) in [("fork", json!({})), ("start", json!({})), ("pause", json!({})), ("resume", json!({}))] {
+    for (act, body) in [("clone", json!({})), ("start", json!({})), ("pause", json!({})), ("resume", json!({}))] {
         scene.one(done, &format!("post /studies/{{id}}/{act}"), &format!("{of_draft}/{act}"), body).await;
     }
     service.wait_for(*draft, &[StudyState::Finished]).await;

@@ -81,7 +81,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let cancelled = service.trials(running).await.into_iter().find(ended).unwrap().id;
     for (path, body) in [
         ("/api/v1/studies".to_owned(), json!({"subject_id": person})),
-        (format!("/api/v1/studies/{finished}/fork"), json!({})),
+        (format!("/api/v1/studies/{finished}/clone"), json!({})),
         (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 310})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
         (format!("/api/v1/studies/{finished}/suggestions"), suggestion),

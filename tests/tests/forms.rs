@@ -586,11 +586,11 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     let (_folder, service) = service().await;
     let send = async |body: &str| service.post_text("/users", FORM, body).await;
     assert!(send("button=add_user&name=K1&role=clinician").await.status.is_success());
-    let taken = send("button=add_user&name=K1&role=admin").await;
+    let taken = send("button=add_user&name=K1&role=administrator").await;
     is_page(&taken, StatusCode::CONFLICT, "A user named");
     for kept in [
         "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",
-        "value=\"admin\" selected",
+        "value=\"administrator\" selected",
         "id=\"fault\"",
     ] {
         assert!(taken.text.contains(kept), "{kept}: {}", taken.text);
@@ -697,7 +697,7 @@ async fn study_is_renamed_tagged_found_and_archived() {
     for query in ["?text=visit", "?text=SHOES", "?tag=pilot", "?text=treadm&state=finished"] {
         assert_eq!((lists(query).await, rest(query).await), ([true, false], [true, false]), "{query}");
     }
-    assert_eq!(lists("?state=draft").await, [false, false]);
+    assert_eq!(lists("?state=not_started").await, [false, false]);
     assert_eq!(lists("?text=%25").await, [false, false], "no wildcard");
     is_page(&service.fetch("/?state=lost").await, StatusCode::UNPROCESSABLE_ENTITY, "a state from the list");
 
@@ -786,7 +786,7 @@ async fn clone_has_the_set_up_of_its_study_with_relaxed_bounds() {
 #[tokio::test]
 async fn equal_names_are_refused_or_numbered_without_naming_hidden_studies() {
     let (_folder, service) = callers::service().await;
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let subject = service.subject().await;
     let body = |name: &str, extra: &str| {

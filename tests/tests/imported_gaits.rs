@@ -109,10 +109,10 @@ async fn report_covers_the_same_motion_in_an_imported_study() {
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let study = service.study(|new| new.trial_budget = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let fork = service.post(&format!("/api/v1/studies/{study}/fork"), &json!({"start": true})).await.json();
-    let fork: StudyId = fork["id"].as_str().unwrap().parse().unwrap();
-    service.wait_for(fork, &[StudyState::Finished]).await;
-    let files = [exported(&service.store, study).await, exported(&service.store, fork).await];
+    let clone = service.post(&format!("/api/v1/studies/{study}/clone"), &json!({"start": true})).await.json();
+    let clone: StudyId = clone["id"].as_str().unwrap().parse().unwrap();
+    service.wait_for(clone, &[StudyState::Finished]).await;
+    let files = [exported(&service.store, study).await, exported(&service.store, clone).await];
     service.stop().await;
 
     let other = Service::start_as_is(&folder.path().join("b.db"), Consistent::default(), 1).await;
@@ -121,7 +121,7 @@ async fn report_covers_the_same_motion_in_an_imported_study() {
     let report = format!("/api/v1/trials/{}/safety-reports", reported.id);
     assert_eq!(other.post(&report, &json!({"note": "stumbled"})).await.status, StatusCode::CREATED);
     import(&other.store, &files[1]).await.unwrap();
-    let twin = converged(&other.store, fork).await.into_iter().find(|trial| trial.action == reported.action).unwrap();
+    let twin = converged(&other.store, clone).await.into_iter().find(|trial| trial.action == reported.action).unwrap();
     let closed = admitted(&other.store, twin.id).await;
     assert!(matches!(closed, Err(NotWalkable::SameGaitReportedUnsafe { .. })), "{closed:?}");
     other.stop().await;

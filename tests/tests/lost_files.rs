@@ -86,7 +86,7 @@ const SUBJECT: &str =
 
 #[tokio::test]
 async fn record_that_another_program_writes_to_accepts_no_further_changes() {
-    let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'admin', '')";
+    let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'administrator', '')";
     let trigger = "create trigger evil after insert on assessments begin \
                    update assessments set note = 'x' where id = new.id; end";
     for sql in [user, trigger, "update subjects set notes = 'forged'", "create table more (x)"] {

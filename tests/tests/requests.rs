@@ -270,7 +270,7 @@ const STRANGER: &str = "192.0.2.7:50000";
 #[tokio::test]
 async fn cookies_and_origins_follow_the_headers_of_a_trusted_proxy() {
     let (_folder, service, router) = behind_a_proxy().await;
-    let (_, link) = callers::user(&service, "Ada", Role::Admin).await;
+    let (_, link) = callers::user(&service, "Ada", Role::Administrator).await;
     let send = async |request: Request<Body>| Answer::of(router.clone().oneshot(request).await.unwrap()).await;
     let forwarded = [
         ("host", "127.0.0.1:8080"),

@@ -161,7 +161,7 @@ async fn change_based_on_an_old_revision_is_refused() {
 }
 
 #[tokio::test]
-async fn finished_study_is_extended_forked_and_compared() {
+async fn finished_study_is_extended_cloned_and_compared() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.trial_budget = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -173,13 +173,13 @@ async fn finished_study_is_extended_forked_and_compared() {
     service.wait_for(study, &[StudyState::Finished]).await;
     assert_eq!(service.trials(study).await.len(), 5);
 
-    let fork = service.post(&format!("{path}/fork"), &json!({"seed": 9, "start": true})).await;
-    assert_eq!(fork.status, StatusCode::CREATED, "{}", fork.text);
-    let fork = fork.json();
-    assert_eq!((&fork["forked_from"], &fork["seed"], &fork["trial_budget"]), (&json!(study), &json!(9), &json!(5)));
-    let forked: StudyId = fork["id"].as_str().unwrap().parse().unwrap();
-    service.wait_for(forked, &[StudyState::Finished]).await;
-    let both = service.fetch(&format!("/api/v1/study-comparison?ids={study},{forked}")).await.items();
+    let clone = service.post(&format!("{path}/clone"), &json!({"seed": 9, "start": true})).await;
+    assert_eq!(clone.status, StatusCode::CREATED, "{}", clone.text);
+    let clone = clone.json();
+    assert_eq!((&clone["cloned_from"], &clone["seed"], &clone["trial_budget"]), (&json!(study), &json!(9), &json!(5)));
+    let cloned: StudyId = clone["id"].as_str().unwrap().parse().unwrap();
+    service.wait_for(cloned, &[StudyState::Finished]).await;
+    let both = service.fetch(&format!("/api/v1/study-comparison?ids={study},{cloned}")).await.items();
     assert_eq!((&both[0]["id"], &both[1]["trials"]["total"]), (&json!(study), &json!(5)));
     assert!(both[0]["best_gait_rmse_rad"].is_f64());
     for ids in [study.to_string(), format!("{study},{study}")] {

@@ -70,7 +70,7 @@ async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted()
         ("update gaits set gait = x'00'", "gaits"),
         ("update trials set gait_rmse_rad = gait_rmse_rad + 1e-12", "trials"),
         ("update studies set seed = seed + 1", "studies"),
-        ("update users set role = 'admin'", "users"),
+        ("update users set role = 'administrator'", "users"),
         (
             "insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at) \
              select 'x', study_id, 'tie', min(id), max(id), 'subject', 'K', '' from trials group by study_id",
@@ -230,10 +230,10 @@ async fn unnoticed(store: &Store, table: &str, sql: &str) {
 #[tokio::test]
 async fn later_change_does_not_seal_a_row_of_another_program() {
     let (folder, database) = filled().await;
-    let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'admin', '')";
+    let user = "insert into users (id, name, role, created_at) values ('mallory', 'mallory', 'administrator', '')";
     for (table, sql, change) in [
         ("users", user, "update users set password = 'x' where id = 'mallory'"),
-        ("users", "update users set role = 'admin'", "update users set password = 'x'"),
+        ("users", "update users set role = 'administrator'", "update users set password = 'x'"),
         ("studies", "update studies set created_at = '2000'", "update studies set name = name || '2'"),
         ("studies", "update studies set created_at = '2000'", "update studies set created_at = created_at"),
         ("tokens", "update tokens set scopes = '[\"administer\"]'", "update tokens set revoked_at = '2000'"),

@@ -332,7 +332,7 @@ async fn refused_connections_do_not_delay_those_of_another_address() {
 async fn nobody_administers(folder: &Path) {
     let store = Store::open(&folder.join("gaitwright.db")).await.unwrap();
     let mut writer = store.write().await.unwrap();
-    let new = NewUser { name: "admin".to_owned(), role: Role::Admin };
+    let new = NewUser { name: "admin".to_owned(), role: Role::Administrator };
     user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
     sqlx::query("update users set disabled_at = created_at").execute(&mut **writer).await.unwrap();
     commit(writer).await.unwrap();
@@ -360,13 +360,13 @@ async fn users_link_command_prints_a_working_sign_in_link() {
     nobody_administers(folder.path()).await;
     let store = Store::open(&folder.path().join("gaitwright.db")).await.unwrap();
     let mut writer = store.write().await.unwrap();
-    let new = NewUser { name: "Ada".to_owned(), role: Role::Admin };
+    let new = NewUser { name: "Ada".to_owned(), role: Role::Administrator };
     user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     drop(store);
     let listed = String::from_utf8(run(&["users", "list"]).stdout).unwrap();
-    assert_eq!(listed, "admin\tadmin\tone-time link\tdisabled\nAda\tadmin\tone-time link\n");
+    assert_eq!(listed, "admin\tadministrator\tone-time link\tdisabled\nAda\tadministrator\tone-time link\n");
     assert_eq!(run(&["users", "link", "Bob"]).status.code(), Some(2));
     assert_eq!(run(&["users", "link", "admin"]).status.code(), Some(2), "who is disabled gets none");
     let link = String::from_utf8(run(&["users", "link", "ada"]).stdout).unwrap();

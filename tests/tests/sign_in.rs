@@ -132,9 +132,9 @@ async fn with_late_body(
 async fn change_is_refused_if_rights_or_consent_end_before_its_body_is_complete() {
     let (_folder, mut service) = service().await;
     service.access = Arc::new(AccessState::by_sign_in(3600.0));
-    let root = signed_in(&service, Role::Admin).await;
+    let root = signed_in(&service, Role::Administrator).await;
     let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
-    let (id, link) = user(&service, "Eve", Role::Admin).await;
+    let (id, link) = user(&service, "Eve", Role::Administrator).await;
     let mut writer = service.store.write().await.unwrap();
     let (_, session) = sign_in::with_link(&mut writer, &link).await.unwrap();
     commit(writer).await.unwrap();
@@ -160,7 +160,7 @@ async fn change_is_refused_if_rights_or_consent_end_before_its_body_is_complete(
 async fn right_password_is_accepted_while_others_fail_elsewhere() {
     let (_folder, mut service) = service().await;
     service.access = standing_still();
-    with_password(&service, "admin", Role::Admin, RIGHT).await;
+    with_password(&service, "admin", Role::Administrator, RIGHT).await;
     let mut refused = Vec::new();
     for _ in 0..6 {
         refused.push(sign_in_from(&service, ATTACKER, None, "admin", "guess").await.status);
@@ -294,7 +294,7 @@ async fn failures_of_a_network_begin_with_the_first_failure_after_a_success() {
 #[tokio::test]
 async fn ten_thousand_aborted_sign_ins_do_not_erase_the_failures_of_an_account() {
     let (folder, service) = service().await;
-    with_password(&service, "Ada", Role::Admin, RIGHT).await;
+    with_password(&service, "Ada", Role::Administrator, RIGHT).await;
     for _ in 0..5 {
         sign_in_from(&service, ATTACKER, None, "Ada", "guess").await;
     }
@@ -327,7 +327,7 @@ async fn ten_thousand_aborted_sign_ins_do_not_erase_the_failures_of_an_account()
 async fn sign_in_with_another_name_does_not_reset_the_count_of_failures() {
     let (_folder, mut service) = service().await;
     service.access = standing_still();
-    with_password(&service, "admin", Role::Admin, RIGHT).await;
+    with_password(&service, "admin", Role::Administrator, RIGHT).await;
     with_password(&service, "Bea", Role::Rater, RIGHT).await;
     abort_attempts(&service, "192.0.2.66", (0..1001).map(|number| format!("nobody {number}"))).await;
     let mut statuses = Vec::new();
@@ -342,7 +342,7 @@ async fn sign_in_with_another_name_does_not_reset_the_count_of_failures() {
 #[tokio::test]
 async fn audit_trail_shows_the_number_of_thirty_thousand_attempts() {
     let (_folder, service) = service().await;
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     abort_attempts(&service, "192.0.2.66", (0..30_000).map(|_| "admin".to_owned())).await;
     let page = send(&service, &admin, &Method::GET, "/users", "", "").await.text;
     assert!(page.contains("192.0.2.66") && page.contains("30000"), "{page}");
@@ -387,9 +387,9 @@ async fn account_page_refuses_easily_guessed_passwords() {
 #[tokio::test]
 async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
     let (_folder, service) = service().await;
-    let admin = with_password(&service, "admin", Role::Admin, RIGHT).await;
+    let admin = with_password(&service, "admin", Role::Administrator, RIGHT).await;
     let me = session_of(&sign_in_from(&service, OWNER, None, "admin", RIGHT).await);
-    let (ada, link) = user(&service, "Ada", Role::Admin).await;
+    let (ada, link) = user(&service, "Ada", Role::Administrator).await;
     let disable = format!("/api/v1/users/{admin}/disable");
     let demote = format!("/api/v1/users/{admin}/role");
     let demoted = json!({"role": "clinician"});
@@ -414,7 +414,7 @@ async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
 #[tokio::test]
 async fn role_changes_apply_from_the_next_request_and_are_audited() {
     let (_folder, service) = service().await;
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     let (ada, link) = user(&service, "Ada", Role::Rater).await;
     let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
     let ada_session = session_of(&come);
@@ -423,7 +423,7 @@ async fn role_changes_apply_from_the_next_request_and_are_audited() {
         send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status,
         StatusCode::FORBIDDEN
     );
-    assert_eq!(put(&service, &ada_session, &role, &json!({"role": "admin"})).await.0, StatusCode::FORBIDDEN);
+    assert_eq!(put(&service, &ada_session, &role, &json!({"role": "administrator"})).await.0, StatusCode::FORBIDDEN);
     let (done, changed) = put(&service, &admin, &role, &json!({"role": "clinician"})).await;
     assert_eq!((done, &changed["role"]), (StatusCode::OK, &json!("clinician")));
     assert_eq!(send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status, StatusCode::OK);
@@ -460,13 +460,13 @@ async fn token_by(service: &Service, id: UserId, name: &str, role: Role) -> As {
 #[tokio::test]
 async fn disabling_a_user_ends_their_tokens_and_sessions() {
     let (_folder, service) = service().await;
-    let root = signed_in(&service, Role::Admin).await;
-    with_password(&service, "Dee", Role::Admin, RIGHT).await;
+    let root = signed_in(&service, Role::Administrator).await;
+    with_password(&service, "Dee", Role::Administrator, RIGHT).await;
     let mut made = Vec::new();
     for name in ["Ada", "Bob", "Cy"] {
-        let id = with_password(&service, name, Role::Admin, RIGHT).await;
+        let id = with_password(&service, name, Role::Administrator, RIGHT).await;
         let session = session_of(&sign_in_from(&service, OWNER, None, name, RIGHT).await);
-        made.push((id, session, token_by(&service, id, name, Role::Admin).await));
+        made.push((id, session, token_by(&service, id, name, Role::Administrator).await));
     }
     for (_, session, token) in &made {
         assert_eq!((status(&service, session).await, status(&service, token).await), (StatusCode::OK, StatusCode::OK));
@@ -495,7 +495,7 @@ async fn disabling_a_user_ends_their_tokens_and_sessions() {
 #[tokio::test]
 async fn sessions_are_listed_and_ended_one_by_one() {
     let (_folder, service) = service().await;
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     with_password(&service, "Ada", Role::Rater, RIGHT).await;
     let desk = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
     let phone = session_of(&sign_in_from(&service, [10, 0, 0, 2], None, "Ada", RIGHT).await);
@@ -642,7 +642,7 @@ async fn event_streams_end_when_their_authorization_ends() {
     let (_folder, mut service) = service().await;
     let offset = Arc::new(AtomicI64::new(0));
     service.access = access(LIMITS, &offset);
-    let admin = with_password(&service, "Ada", Role::Admin, RIGHT).await;
+    let admin = with_password(&service, "Ada", Role::Administrator, RIGHT).await;
     let root = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
     let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
     let path = format!("/api/v1/studies/{study}/events");
@@ -656,7 +656,7 @@ async fn event_streams_end_when_their_authorization_ends() {
     }
     // Raters reach the studies that they are assigned to: this one loses the right to read alone.
     member(&service, study, MemberKind::User, "demoted").await;
-    let script = token_by(&service, admin, "Ada", Role::Admin).await;
+    let script = token_by(&service, admin, "Ada", Role::Administrator).await;
     let by_token = listen(&service, &script, &path).await;
     let (mut streams, sessions): (Vec<_>, Vec<_>) = listening.into_iter().unzip();
 
@@ -709,13 +709,13 @@ fn one_module_creates_event_streams_and_checks_the_caller() {
 async fn new_administrator_is_created_if_all_are_disabled() {
     let (_folder, service) = service().await;
     let mut writer = service.store.write().await.unwrap();
-    let add = NewUser { name: "admin".to_owned(), role: Role::Admin };
+    let add = NewUser { name: "admin".to_owned(), role: Role::Administrator };
     let admin = user_administration::add(&mut writer, &Actor::program(), &add).await.unwrap();
     assert_eq!(user_administration::operator_administrator(&mut writer).await.unwrap().id, admin.id);
     let disable = "update users set disabled_at = created_at";
     sqlx::query(disable).execute(&mut **writer).await.unwrap();
     let fresh = user_administration::operator_administrator(&mut writer).await.unwrap();
-    assert_eq!((fresh.name.as_str(), fresh.role, fresh.has_password), ("admin-2", Role::Admin, false));
+    assert_eq!((fresh.name.as_str(), fresh.role, fresh.has_password), ("admin-2", Role::Administrator, false));
     assert!(user_administration::link(&mut writer, &Actor::terminal(), fresh.id).await.is_ok());
     commit(writer).await.unwrap();
     service.stop().await;

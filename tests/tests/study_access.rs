@@ -51,7 +51,7 @@ async fn change(service: &Service, who: &As, method: &Method, path: &str, body: 
 impl Closed {
     async fn new() -> Self {
         let (folder, service) = service().await;
-        let admin = signed_in(&service, Role::Admin).await;
+        let admin = signed_in(&service, Role::Administrator).await;
         let set_up = |new: &mut gaitwright_service::studies::study_plan::NewStudy| {
             (new.name, new.feedback_mode, new.trial_budget) = (Some(NAME.to_owned()), FeedbackMode::Mixed, 30);
         };
@@ -385,7 +385,7 @@ async fn rater_accesses_assigned_studies_only_until_removed() {
 }
 
 #[tokio::test]
-async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restricted_too() {
+async fn clinician_who_restricts_a_study_stays_a_member_and_its_clone_is_restricted_too() {
     let (_folder, service, study, _) = asking().await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let script = token(&service, &[Right::Read]).await;
@@ -400,13 +400,13 @@ async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restrict
     assert_eq!(status(&clinician, &path).await, StatusCode::OK);
 
     member(&service, study, MemberKind::User, "a rater").await;
-    let fork = post(&service, &clinician, &format!("{path}/fork"), &json!({})).await;
-    let fork = format!("/api/v1/studies/{}", fork["id"].as_str().unwrap());
-    assert_eq!(status(&script, &fork).await, StatusCode::NOT_FOUND);
-    let members = send(&service, &clinician, &Method::GET, &format!("{fork}/members"), "", "").await.items();
+    let clone = post(&service, &clinician, &format!("{path}/clone"), &json!({})).await;
+    let clone = format!("/api/v1/studies/{}", clone["id"].as_str().unwrap());
+    assert_eq!(status(&script, &clone).await, StatusCode::NOT_FOUND);
+    let members = send(&service, &clinician, &Method::GET, &format!("{clone}/members"), "", "").await.items();
     let names: Vec<_> = members.as_array().unwrap().iter().map(|member| &member["name"]).collect();
     assert_eq!(names, [&json!("a clinician")], "raters are not copied");
-    let access = send(&service, &clinician, &Method::GET, &format!("{fork}/access"), "", "").await.json();
+    let access = send(&service, &clinician, &Method::GET, &format!("{clone}/access"), "", "").await.json();
     assert_eq!(access["restricted"], true);
 
     put(&service, &clinician, &format!("{path}/access"), &json!({"restricted": false})).await;
@@ -417,7 +417,7 @@ async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restrict
 #[tokio::test]
 async fn event_stream_of_a_removed_member_ends() {
     let (_folder, service, study, _) = asking().await;
-    let admin = signed_in(&service, Role::Admin).await;
+    let admin = signed_in(&service, Role::Administrator).await;
     let As::Session(secret) = signed_in(&service, Role::Clinician).await else { panic!("a session") };
     let added = member(&service, study, MemberKind::User, "a clinician").await;
     let path = format!("/api/v1/studies/{study}");
@@ -440,7 +440,8 @@ async fn event_stream_of_a_removed_member_ends() {
 #[tokio::test]
 async fn rater_is_invited_with_assignment_and_link_in_one_step() {
     let (_folder, service, study, _) = asking().await;
-    let (admin, clinician) = (signed_in(&service, Role::Admin).await, signed_in(&service, Role::Clinician).await);
+    let (admin, clinician) =
+        (signed_in(&service, Role::Administrator).await, signed_in(&service, Role::Clinician).await);
     let invite = format!("/api/v1/studies/{study}/invitations");
     let by_clinician = send(&service, &clinician, &Method::POST, &invite, JSON, r#"{"name": "R7"}"#).await;
     assert_eq!(by_clinician.status, StatusCode::FORBIDDEN);

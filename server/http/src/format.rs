@@ -143,7 +143,7 @@ pub(crate) fn source_name(source: Source) -> &'static str {
 #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
 pub(crate) fn role(role: &Role) -> &'static str {
     match role {
-        Role::Admin => "administrator",
+        Role::Administrator => "administrator",
         Role::Clinician => "clinician",
         Role::Rater => "rater",
     }

@@ -33,7 +33,7 @@ const NAMES: [(&str, &str, u32); 12] = [
     ("NewMember", "name", 120),
     ("NewStudy", "name", 120),
     ("Change", "name", 120),
-    ("Fork", "name", 120),
+    ("StudyClone", "name", 120),
     ("Ask", "script", 80),
     ("NewPreference", "author", 80),
     ("NewAssessment", "author", 80),
@@ -134,7 +134,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         {
             schemas.add("NewReferenceGait", field, &json!({ "minimum": least, "maximum": most }));
         }
-        for component in ["NewStudy", "Fork"] {
+        for component in ["NewStudy", "StudyClone"] {
             schemas.add(component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
             schemas.add(component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
         }

@@ -191,10 +191,10 @@ impl Unpacking {
                     row.set("state", text("paused"));
                     row.set("state_reason", text("The study was running when it was exported."));
                 }
-                if let Some(parent) = row.text("forked_from") {
+                if let Some(parent) = row.text("cloned_from") {
                     let found = sqlx::query("select 1 from studies where id = ?").bind(parent.to_owned());
                     if found.fetch_optional(&mut *db).await?.is_none() {
-                        row.set("forked_from", Cell::Null);
+                        row.set("cloned_from", Cell::Null);
                     }
                 }
             }

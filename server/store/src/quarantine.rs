@@ -15,8 +15,8 @@ pub(super) const ROWS_AHEAD: usize = 2;
 pub struct Quarantine {
     db: SqliteConnection,
     unpacking: Unpacking,
-    /// The parent of a fork, which an archive does not contain.
-    forked_from: Option<String>,
+    /// The parent of a clone, which an archive does not contain.
+    cloned_from: Option<String>,
 }
 
 impl Quarantine {
@@ -34,7 +34,7 @@ impl Quarantine {
         let mut db = options.connect().await?;
         schema_versions::fresh(&mut db).await?;
         sqlx::query("begin").execute(&mut db).await?;
-        Ok(Self { db, unpacking: Unpacking::default(), forked_from: None })
+        Ok(Self { db, unpacking: Unpacking::default(), cloned_from: None })
     }
 
     /// Adds a row.
@@ -43,8 +43,8 @@ impl Quarantine {
     /// A violated constraint, trigger or reference; errors of the database.
     pub async fn add(&mut self, table: &'static str, mut row: Row) -> StoreResult<()> {
         if table == "studies" {
-            self.forked_from = row.text("forked_from").map(str::to_owned);
-            row.set("forked_from", Cell::Null);
+            self.cloned_from = row.text("cloned_from").map(str::to_owned);
+            row.set("cloned_from", Cell::Null);
         }
         self.unpacking.write(&mut self.db, table, row).await?;
         Ok(())
@@ -59,9 +59,9 @@ impl Quarantine {
         Ok(())
     }
 
-    /// The parent of the study, if it is a fork.
-    pub fn forked_from(&self) -> Option<&str> {
-        self.forked_from.as_deref()
+    /// The parent of the study, if it is a clone.
+    pub fn cloned_from(&self) -> Option<&str> {
+        self.cloned_from.as_deref()
     }
 
     /// A connection for reading.

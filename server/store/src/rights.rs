@@ -71,13 +71,13 @@ impl Rights {
     }
 }
 
-/// Role of a user: `admin` has every right; `clinician` runs studies and gives preferences; `rater` compares gaits
+/// Role of a user: `administrator` has every right; `clinician` runs studies and gives preferences; `rater` compares gaits
 /// blind and records walks and answers in lab sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
     /// Has every right.
-    Admin,
+    Administrator,
     /// Runs studies and gives preferences.
     Clinician,
     /// Compares gaits blind, and records walks and answers in lab sessions.
@@ -86,12 +86,12 @@ pub enum Role {
 
 impl Role {
     /// Every role.
-    pub const ALL: [Self; 3] = [Self::Admin, Self::Clinician, Self::Rater];
+    pub const ALL: [Self; 3] = [Self::Administrator, Self::Clinician, Self::Rater];
 
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Admin => "admin",
+            Self::Administrator => "administrator",
             Self::Clinician => "clinician",
             Self::Rater => "rater",
         }
@@ -100,7 +100,7 @@ impl Role {
     /// The rights of the role.
     pub fn rights(self) -> Rights {
         match self {
-            Self::Admin => Rights::all(),
+            Self::Administrator => Rights::all(),
             Self::Clinician => Rights::of(&[Right::Read, Right::Run, Right::Answer, Right::Rate, Right::Device]),
             Self::Rater => Rights::of(&[Right::Rate]),
         }

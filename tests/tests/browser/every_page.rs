@@ -20,7 +20,7 @@ use std::path::PathBuf;
 /// Users and tokens in every state.
 async fn people(site: &Site) {
     let send = async |path: &str, body: Value| site.service.post(&format!("/api/v1/{path}"), &body).await.json();
-    for (name, role) in [("Ada", "admin"), ("K1", "clinician"), ("R1", "rater")] {
+    for (name, role) in [("Ada", "administrator"), ("K1", "clinician"), ("R1", "rater")] {
         let user = send("users", json!({"name": name, "role": role})).await;
         if role == "rater" {
             send(&format!("users/{}/disable", user["id"].as_str().unwrap()), json!({})).await;

@@ -20,7 +20,7 @@ async fn guarded() -> (Site, String) {
     })
     .await;
     let mut writer = site.service.store.write().await.unwrap();
-    let new = NewUser { name: "Ada".to_owned(), role: Role::Admin };
+    let new = NewUser { name: "Ada".to_owned(), role: Role::Administrator };
     let user = user_administration::add(&mut writer, &Actor::program(), &new).await.unwrap();
     let link = user_administration::link(&mut writer, &Actor::program(), user.id).await.unwrap();
     commit(writer).await.unwrap();

@@ -64,7 +64,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(studies::resume))
         .routes(routes!(studies::stop))
         .routes(routes!(studies::extend))
-        .routes(routes!(studies::fork))
+        .routes(routes!(studies::clone_study))
         .routes(routes!(study_comparison::get))
         .routes(routes!(trials::of_study))
         .routes(routes!(trials::of_study_csv))

@@ -15,7 +15,7 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::{StudyTransition, transitions_for_people};
-use gaitwright_service::studies::study_change::{self, Change, Extend, Fork};
+use gaitwright_service::studies::study_change::{self, Change, Extend, StudyClone};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::studies::{self, StudyFilter, StudyState};
 use gaitwright_store::{BorrowedWriter, Connection, StudyId, SubjectId, trials};
@@ -155,7 +155,7 @@ pub(super) struct TransitionReason {
 
 /// Start a study
 ///
-/// Possible while the study is `draft`.
+/// Possible while the study is `not_started`.
 #[utoipa::path(
     post,
     path = "/studies/{id}/start",
@@ -325,29 +325,29 @@ pub(super) async fn extend(
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
-/// Fork a study
+/// Clone a study
 ///
 /// Creates a study with the same set-up, without the trials.
 #[utoipa::path(
     post,
-    path = "/studies/{id}/fork",
-    operation_id = "fork_study",
+    path = "/studies/{id}/clone",
+    operation_id = "clone_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    request_body(content = Fork, description = "Optional: the fields that differ from the parent"),
+    request_body(content = StudyClone, description = "Optional: the fields that differ from the parent"),
     responses((status = 201, description = "New study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
-pub(super) async fn fork(
+pub(super) async fn clone_study(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    IdempotentWith(request, differs): IdempotentWith<Run, Fork>,
+    IdempotentWith(request, differs): IdempotentWith<Run, StudyClone>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = study_change::fork(&mut writer, &request.actor, id, &differs).await?;
+    let study = study_change::clone_study(&mut writer, &request.actor, id, &differs).await?;
     made(&app, &request, writer, study).await
 }
 

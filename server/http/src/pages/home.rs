@@ -100,7 +100,7 @@ impl ListQuery {
 
 /// Every state, in the order of a study.
 const STATES: [StudyState; 6] = [
-    StudyState::Draft,
+    StudyState::NotStarted,
     StudyState::Running,
     StudyState::Waiting,
     StudyState::Paused,

@@ -36,7 +36,7 @@ struct DetailsPage {
 impl DetailsPage {
     /// Whether the study can be archived now.
     fn may_be_archived(&self) -> bool {
-        self.study.archived_at.is_none() && (self.study.state.has_ended() || self.study.state == StudyState::Draft)
+        self.study.archived_at.is_none() && (self.study.state.has_ended() || self.study.state == StudyState::NotStarted)
     }
 }
 

@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn states_are_shown_in_words() {
         let counts = |states: &[&str]| states.iter().map(|state| ((*state).to_owned(), 1)).collect::<Vec<_>>();
-        assert_eq!(SystemPage::studies_by_state(&counts(&["draft", "finished"])), "1 not started, 1 finished");
+        assert_eq!(SystemPage::studies_by_state(&counts(&["not_started", "finished"])), "1 not started, 1 finished");
         assert_eq!(SystemPage::trials_by_state(&counts(&["not_converged"])), "1 not converged");
         assert_eq!(SystemPage::solves_by_state(&counts(&["done", "leased"])), "1 done, 1 running");
         assert_eq!(SystemPage::solves_by_state(&[]), "none");

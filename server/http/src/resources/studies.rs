@@ -16,8 +16,8 @@ pub(crate) struct Study {
     /// Set-up of the study.
     #[serde(flatten)]
     plan: StudyPlan,
-    /// Parent, if the study is a fork; otherwise null.
-    forked_from: Option<StudyId>,
+    /// Parent, if the study is a clone; otherwise null.
+    cloned_from: Option<StudyId>,
     /// State of the study.
     state: StudyState,
     /// Reason for the state; may be empty.
@@ -42,7 +42,7 @@ impl From<studies::Study> for Study {
         let studies::Study {
             id,
             plan,
-            forked_from,
+            cloned_from,
             state,
             state_reason,
             revision,
@@ -55,7 +55,7 @@ impl From<studies::Study> for Study {
         Self {
             id,
             plan: plan.into(),
-            forked_from,
+            cloned_from,
             state,
             state_reason,
             revision,

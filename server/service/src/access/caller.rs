@@ -27,7 +27,7 @@ impl Caller {
         let principal = Principal::User(id);
         Self {
             reach: match role {
-                Role::Admin => Reach::Every,
+                Role::Administrator => Reach::Every,
                 Role::Clinician => Reach::Open(principal),
                 Role::Rater => Reach::Assigned(principal),
             },

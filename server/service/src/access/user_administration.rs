@@ -52,7 +52,7 @@ pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewUser) -> Result<Us
 pub async fn operator_administrator(writer: &mut Writer) -> Result<User, Error> {
     let all = users::all(writer).await?;
     let mut admins: Vec<&User> =
-        all.iter().filter(|user| user.role == Role::Admin && user.disabled_at.is_none()).collect();
+        all.iter().filter(|user| user.role == Role::Administrator && user.disabled_at.is_none()).collect();
     admins.sort_by_key(|user| (!user.name.eq_ignore_ascii_case(FIRST), !user.has_password, user.id));
     if let Some(first) = admins.first() {
         return Ok((*first).clone());
@@ -60,7 +60,7 @@ pub async fn operator_administrator(writer: &mut Writer) -> Result<User, Error> 
     let is_free = |name: &String| !all.iter().any(|user| printable::is_same_name(&user.name, name));
     let numbered = (2..).map(|number: u32| format!("{FIRST}-{number}"));
     let name = std::iter::once(FIRST.to_owned()).chain(numbered).find(is_free).unwrap_or_default();
-    add(writer, &Actor::program(), &NewUser { name, role: Role::Admin }).await
+    add(writer, &Actor::program(), &NewUser { name, role: Role::Administrator }).await
 }
 
 /// Creates a one-time sign-in link and returns its secret, which is not stored.
@@ -99,7 +99,7 @@ pub async fn set_password(writer: &mut Writer, actor: &Actor, id: UserId, hashed
 pub async fn set_disabled(writer: &mut Writer, actor: &Actor, id: UserId, disabled: bool) -> Result<User, Error> {
     let user = users::get(writer, id).await?;
     if disabled && user.disabled_at.is_none() {
-        if user.role == Role::Admin {
+        if user.role == Role::Administrator {
             keep_an_administrator(writer, id).await?;
         }
         let now = monotonic_clock::recorded(writer).await?;
@@ -121,7 +121,7 @@ pub async fn set_role(writer: &mut Writer, actor: &Actor, id: UserId, role: Role
     if user.role == role {
         return Ok(user);
     }
-    if user.role == Role::Admin {
+    if user.role == Role::Administrator {
         if user.disabled_at.is_none() {
             keep_an_administrator(writer, id).await?;
         }
@@ -148,7 +148,9 @@ enum WayIn {
 /// session, and a session is weaker than a password.
 async fn keep_an_administrator(db: &mut Connection, lost: UserId) -> Result<(), Error> {
     let (mut own, mut others) = (WayIn::Never, None);
-    for user in users::all(db).await?.iter().filter(|user| user.role == Role::Admin && user.disabled_at.is_none()) {
+    for user in
+        users::all(db).await?.iter().filter(|user| user.role == Role::Administrator && user.disabled_at.is_none())
+    {
         let operator_administrator = if user.has_password {
             WayIn::Password
         } else if sessions::live(db, Some(user.id)).await?.is_empty() {
@@ -180,5 +182,5 @@ async fn keep_an_administrator(db: &mut Connection, lost: UserId) -> Result<(), 
 /// Errors of the database.
 pub async fn has_admin(db: &mut Connection) -> Result<bool, Error> {
     let all = users::all(db).await?;
-    Ok(all.iter().any(|user| user.role == Role::Admin && user.has_password && user.disabled_at.is_none()))
+    Ok(all.iter().any(|user| user.role == Role::Administrator && user.has_password && user.disabled_at.is_none()))
 }

@@ -1,9 +1,9 @@
 //! The state machine of a study, as a pure function.
 //!
 //! ```text
-//! draft -> running <-> waiting        running, waiting -> finished
+//! not_started -> running <-> waiting        running, waiting -> finished
 //!          running, waiting -> paused -> running
-//!          draft, running, waiting, paused -> stopped
+//!          not_started, running, waiting, paused -> stopped
 //!          finished, stopped -> running     (with a larger budget: `extend`)
 //! ```
 
@@ -69,7 +69,7 @@ impl From<NotPossible> for Error {
 
 /// A state as the adjective of a sentence: `The study is not started`.
 pub fn in_words(state: StudyState) -> &'static str {
-    if state == StudyState::Draft { "not started" } else { state.as_str() }
+    if state == StudyState::NotStarted { "not started" } else { state.as_str() }
 }
 
 /// The state of a study after a transition.
@@ -77,16 +77,16 @@ pub fn in_words(state: StudyState) -> &'static str {
 /// # Errors
 /// [`NotPossible`] if the state does not allow the transition.
 pub fn after(state: StudyState, transition: StudyTransition) -> Result<StudyState, NotPossible> {
-    use StudyState::{Draft, Finished, Paused, Running, Stopped, Waiting};
+    use StudyState::{Finished, NotStarted, Paused, Running, Stopped, Waiting};
     match (state, transition) {
-        (Draft, StudyTransition::Start)
+        (NotStarted, StudyTransition::Start)
         | (Waiting, StudyTransition::Answered)
         | (Paused, StudyTransition::Resume)
         | (Finished | Stopped, StudyTransition::Extend) => Ok(Running),
         (Running, StudyTransition::Ask) => Ok(Waiting),
         (Running | Waiting, StudyTransition::Pause) => Ok(Paused),
         (Running | Waiting, StudyTransition::Finish) => Ok(Finished),
-        (Draft | Running | Waiting | Paused, StudyTransition::Stop) => Ok(Stopped),
+        (NotStarted | Running | Waiting | Paused, StudyTransition::Stop) => Ok(Stopped),
         _ => Err(NotPossible { state, transition }),
     }
 }
@@ -121,13 +121,13 @@ mod tests {
     proptest! {
         #[test]
         fn ended_study_resumes_only_when_extended(transitions in proptest::collection::vec(any_transition(), 0..40)) {
-            let mut state = StudyState::Draft;
+            let mut state = StudyState::NotStarted;
             for transition in transitions {
                 let before = state;
                 match after(state, transition) {
                     Ok(next) => {
                         prop_assert_ne!(next, before);
-                        prop_assert_ne!(next, StudyState::Draft);
+                        prop_assert_ne!(next, StudyState::NotStarted);
                         if matches!(before, StudyState::Finished | StudyState::Stopped) {
                             prop_assert_eq!(transition, StudyTransition::Extend);
                         }
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn every_state_is_reachable_and_can_be_left() {
         for state in [
-            StudyState::Draft,
+            StudyState::NotStarted,
             StudyState::Running,
             StudyState::Waiting,
             StudyState::Paused,

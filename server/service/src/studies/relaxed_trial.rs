@@ -114,7 +114,7 @@ fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
             "The study is archived. Press \u{201c}Show in the list of studies again\u{201d} in its details first."
         }
         StudyState::Running | StudyState::Finished => return Ok(()),
-        StudyState::Draft => "The study has not started.",
+        StudyState::NotStarted => "The study has not started.",
         StudyState::Waiting => "The study is waiting for an answer. Answer the comparison first.",
         StudyState::Paused => "The study is paused. Resume it first.",
         StudyState::Stopped => "The study was stopped. Extend it first.",

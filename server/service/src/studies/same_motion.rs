@@ -1,5 +1,5 @@
 //! Tells whether two trials of a subject have the same gait, as when they differ only in a bound that is not active, or
-//! when one study is the fork of another.
+//! when one study is the clone of another.
 
 use gait_optimizer::{SolveReport, TunedBounds};
 use gaitwright_store::trials::{Trial, TrialState};

@@ -1,4 +1,4 @@
-//! Changes a study: its name, tags, notes and limits, its number of trials, or a fork of it. For pages and REST.
+//! Changes a study: its name, tags, notes and limits, its number of trials, or a clone of it. For pages and REST.
 
 use super::lifecycle::{self, StudyTransition};
 use super::snapshot::has_changed;
@@ -110,7 +110,7 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
     };
     let archived_at = match change.archived {
         Some(true) if study.archived_at.is_none() => {
-            if !study.state.has_ended() && study.state != StudyState::Draft {
+            if !study.state.has_ended() && study.state != StudyState::NotStarted {
                 return Err(Error::conflict("A study that has not ended cannot be archived. Stop it first."));
             }
             Some(now())
@@ -184,7 +184,7 @@ pub(super) async fn raise_budget(
 /// A new study with the set-up of another one. Absent fields are copied.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Fork {
+pub struct StudyClone {
     /// Name shown to users.
     #[serde(default)]
     pub name: Option<String>,
@@ -209,24 +209,24 @@ pub struct Fork {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`].
-pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) -> Result<Study, Error> {
+pub async fn clone_study(writer: &mut Writer, actor: &Actor, id: StudyId, clone: &StudyClone) -> Result<Study, Error> {
     let from = studies::get(writer, id).await?;
     let mut new = study_plan::NewStudy::like(&from.plan);
-    new.name = Some(fork.name.clone().unwrap_or_else(|| fork_of(&from.plan.name)));
-    new.seed = fork.seed.unwrap_or(new.seed);
-    new.trial_budget = fork.trial_budget.unwrap_or(new.trial_budget);
-    new.muscles = fork.muscles.unwrap_or(new.muscles);
-    new.feedback_mode = fork.feedback_mode.unwrap_or(new.feedback_mode);
-    new.start = fork.start;
+    new.name = Some(clone.name.clone().unwrap_or_else(|| clone_name(&from.plan.name)));
+    new.seed = clone.seed.unwrap_or(new.seed);
+    new.trial_budget = clone.trial_budget.unwrap_or(new.trial_budget);
+    new.muscles = clone.muscles.unwrap_or(new.muscles);
+    new.feedback_mode = clone.feedback_mode.unwrap_or(new.feedback_mode);
+    new.start = clone.start;
     let made = study_plan::create_from(writer, actor, new, Some(id)).await?;
     // The set-up of a restricted study stays visible to its members only.
     members::inherit(writer, id, made.id, actor.as_str()).await?;
     Ok(made)
 }
 
-/// The default name of a fork: that of the study, shortened if it would be too long.
-fn fork_of(name: &str) -> String {
-    const MARK: &str = " (fork)";
+/// The default name of a clone: that of the study, shortened if it would be too long.
+fn clone_name(name: &str) -> String {
+    const MARK: &str = " (clone)";
     let kept: String = name.chars().take(study_plan::LONGEST_NAME - MARK.len()).collect();
     format!("{}{MARK}", kept.trim_end())
 }

@@ -228,31 +228,31 @@ pub fn name_is_taken(name: &str, free: &str) -> Error {
     FieldError::in_words("name", &message).into()
 }
 
-/// The same, for a fork of a study.
+/// The same, for a clone of a study.
 pub(super) async fn create_from(
     writer: &mut Writer,
     actor: &Actor,
     new: NewStudy,
-    forked_from: Option<StudyId>,
+    cloned_from: Option<StudyId>,
 ) -> Result<Study, Error> {
     writer.check_free_space()?;
-    let state = if new.start { StudyState::Running } else { StudyState::Draft };
-    // A fork copies the set-up of its parent, muscle values included.
-    let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };
+    let state = if new.start { StudyState::Running } else { StudyState::NotStarted };
+    // A clone copies the set-up of its parent, muscle values included.
+    let new = if cloned_from.is_some() { new } else { with_own_muscles(writer, new).await? };
     let restricted = new.restricted;
     let mut plan = check(writer, new).await?;
-    if let Some(parent) = forked_from {
+    if let Some(parent) = cloned_from {
         // Both studies will be compared, so a correction of the subject since then does not apply.
         plan.body = studies::get(writer, parent).await?.plan.body;
     }
-    let study = studies::insert(writer, &plan, state, forked_from).await?;
+    let study = studies::insert(writer, &plan, state, cloned_from).await?;
     if restricted {
         members::set_restricted(writer, study.id, true, actor.as_str()).await?;
     }
     let payload = json!({ "state": study.state, "reason": "created" });
     events::append(writer, study.id, "study_changed", &payload).await?;
     let detail = json!({
-        "name": study.plan.name, "state": study.state, "seed": study.plan.seed, "forked_from": forked_from,
+        "name": study.plan.name, "state": study.state, "seed": study.plan.seed, "cloned_from": cloned_from,
         "restricted": restricted,
     });
     audit::append(writer, actor, "study.create", &format!("study {}", study.id), &detail).await?;

@@ -112,7 +112,7 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
 pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = reach_values(reach);
     let sql = concat!(
-        "select * from studies where state in ('waiting', 'paused', 'draft') and archived_at is null and ",
+        "select * from studies where state in ('waiting', 'paused', 'not_started') and archived_at is null and ",
         reached!("id"),
         " order by id desc limit ?4"
     );

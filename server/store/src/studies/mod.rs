@@ -23,8 +23,8 @@ pub struct Study {
     pub id: StudyId,
     /// Set-up of the study.
     pub plan: StudyPlan,
-    /// Parent, if the study is a fork.
-    pub forked_from: Option<StudyId>,
+    /// Parent, if the study is a clone.
+    pub cloned_from: Option<StudyId>,
     /// State of the study.
     pub state: StudyState,
     /// Reason for the state; may be empty.
@@ -52,14 +52,14 @@ pub async fn insert(
     db: &mut Connection,
     plan: &StudyPlan,
     state: StudyState,
-    forked_from: Option<StudyId>,
+    cloned_from: Option<StudyId>,
 ) -> StoreResult<Study> {
     let at = now();
     let id = StudyId::fresh();
     sqlx::query(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
          solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
-         seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at, \
+         seed, state, evaluation, solve_seconds_budget, unchanged_limit, cloned_from, created_at, updated_at, \
          height_m, body_mass_kg, repeat_results, warm_start_from) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
@@ -82,7 +82,7 @@ pub async fn insert(
     .bind(plan.evaluation.as_str())
     .bind(plan.solve_seconds_budget)
     .bind(plan.unchanged_limit)
-    .bind(forked_from)
+    .bind(cloned_from)
     .bind(at)
     .bind(at)
     .bind(plan.body.height_m)
@@ -94,7 +94,7 @@ pub async fn insert(
     Ok(Study {
         id,
         plan: plan.clone(),
-        forked_from,
+        cloned_from,
         state,
         state_reason: String::new(),
         revision: 1,
@@ -215,7 +215,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             priority: row.try_get("priority")?,
             seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),
         },
-        forked_from: row.try_get("forked_from")?,
+        cloned_from: row.try_get("cloned_from")?,
         state: row.try_get::<&str, _>("state")?.parse()?,
         state_reason: row.try_get("state_reason")?,
         revision: row.try_get("revision")?,

@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer from a
+/// State of a study: `not_started`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer from a
 /// person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied; `stopped`,
 /// by a user or a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StudyState {
     /// Not started yet.
-    Draft,
+    NotStarted,
     /// Proposing and evaluating trials.
     Running,
     /// Waiting for a preference of a person.
@@ -29,7 +29,7 @@ impl StudyState {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Draft => "draft",
+            Self::NotStarted => "not_started",
             Self::Running => "running",
             Self::Waiting => "waiting",
             Self::Paused => "paused",
@@ -47,7 +47,7 @@ impl StudyState {
 impl FromStr for StudyState {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Draft, Self::Running, Self::Waiting, Self::Paused, Self::Finished, Self::Stopped]
+        [Self::NotStarted, Self::Running, Self::Waiting, Self::Paused, Self::Finished, Self::Stopped]
             .into_iter()
             .find(|state| state.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("study state", text))

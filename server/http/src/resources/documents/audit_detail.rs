@@ -69,8 +69,8 @@ pub(crate) struct AuditDetail {
     /// `session.refused`: time of the first attempt.
     #[schema(required = false)]
     first_at: Instant,
-    /// `study.create`: the study whose set-up was copied. Null if it is not a fork.
-    forked_from: Option<StudyId>,
+    /// `study.create`: the study whose set-up was copied. Null if it is not a clone.
+    cloned_from: Option<StudyId>,
     /// `subject.consent`: the consent form.
     #[schema(required = false)]
     form: String,

@@ -119,7 +119,7 @@ pub async fn import(store: &Store, actor: &Actor, archive: Archive) -> Result<St
 
 /// Copies every row into a transaction.
 async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer, trusted: bool) -> Result<(), Error> {
-    let forked_from = quarantine.forked_from().map(str::to_owned);
+    let cloned_from = quarantine.cloned_from().map(str::to_owned);
     let (sender, mut rows) = mpsc::channel::<archive::Read>(ROWS_AHEAD);
     let reading = async {
         let done = archive::read(quarantine.db(), study, &sender).await;
@@ -130,7 +130,7 @@ async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer, 
         let mut unpacking = Unpacking::default();
         while let Some(archive::Read { table, mut row, .. }) = rows.recv().await {
             if table == "studies" {
-                row.set("forked_from", forked_from.clone().map_or(Cell::Null, Cell::Text));
+                row.set("cloned_from", cloned_from.clone().map_or(Cell::Null, Cell::Text));
             }
             if table == "imports" && !trusted {
                 // No signature vouches for the earlier signatures that the archive lists.

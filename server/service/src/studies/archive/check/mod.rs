@@ -87,8 +87,8 @@ pub(super) struct CheckedArchive {
 
 /// Checks everything in quarantine.
 pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<CheckedArchive, Error> {
-    if let Some(parent) = quarantine.forked_from() {
-        at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is not an identifier")))?;
+    if let Some(parent) = quarantine.cloned_from() {
+        at("studies.cloned_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is not an identifier")))?;
     }
     let db = quarantine.db();
     let found = at("studies", studies::page(db, Reach::Every, &StudyFilter::newest(2)).await)?;
