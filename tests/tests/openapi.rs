@@ -14,7 +14,7 @@ use gaitwright_tests::compatibility::{Difference, compare};
 use gaitwright_tests::described::Description;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 #[test]
