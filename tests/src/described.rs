@@ -80,7 +80,7 @@ impl Description {
             };
             return Ok(one.clone());
         }
-        self.fits_itself(schema, value, place)?;
+        fits_itself(schema, value, place)?;
         let mut seen = BTreeSet::new();
         for (index, item) in value.as_array().into_iter().flatten().enumerate() {
             seen.extend(self.fits(&schema["items"], item, place).map_err(|wrong| format!("[{index}] {wrong}"))?);
@@ -102,40 +102,6 @@ impl Description {
             Some(name) => Err(format!("{place} has no {name}")),
             None => Ok(seen),
         }
-    }
-
-    /// Type, words, range and number of items of a value.
-    fn fits_itself(&self, schema: &Value, value: &Value, place: &str) -> Result<(), String> {
-        let kinds: Vec<&str> = match &schema["type"] {
-            Value::String(kind) => vec![kind],
-            Value::Array(kinds) => kinds.iter().filter_map(Value::as_str).collect(),
-            _ => Vec::new(),
-        };
-        let kind = match value {
-            Value::Null => "null",
-            Value::Bool(_) => "boolean",
-            Value::Number(number) if number.is_f64() => "number",
-            Value::Number(_) => "integer",
-            Value::String(_) => "string",
-            Value::Array(_) => "array",
-            Value::Object(_) => "object",
-        };
-        let fits = |expected: &&str| *expected == kind || (*expected == "number" && kind == "integer");
-        if !kinds.is_empty() && !kinds.iter().any(fits) {
-            return Err(format!("{place}: {value} is not {kinds:?}"));
-        }
-        if schema["enum"].as_array().is_some_and(|words| !value.is_null() && !words.contains(value)) {
-            return Err(format!("{place}: {value} is not one of {}", schema["enum"]));
-        }
-        let size = value.as_array().map(|items| items.len() as f64);
-        for (measured, least, most) in [(value.as_f64(), "minimum", "maximum"), (size, "minItems", "maxItems")] {
-            let Some(measured) = measured else { continue };
-            let end = |name: &str, none: f64| schema[name].as_f64().unwrap_or(none);
-            if measured < end(least, f64::NEG_INFINITY) || measured > end(most, f64::INFINITY) {
-                return Err(format!("{place}: {measured} is outside {least} or {most}"));
-            }
-        }
-        Ok(())
     }
 
     /// Every property of an object with its place and schema, and those that must be there, parts included.
@@ -165,6 +131,40 @@ impl Description {
         }
         (properties, required)
     }
+}
+
+/// Type, words, range and number of items of a value.
+fn fits_itself(schema: &Value, value: &Value, place: &str) -> Result<(), String> {
+    let kinds: Vec<&str> = match &schema["type"] {
+        Value::String(kind) => vec![kind],
+        Value::Array(kinds) => kinds.iter().filter_map(Value::as_str).collect(),
+        _ => Vec::new(),
+    };
+    let kind = match value {
+        Value::Null => "null",
+        Value::Bool(_) => "boolean",
+        Value::Number(number) if number.is_f64() => "number",
+        Value::Number(_) => "integer",
+        Value::String(_) => "string",
+        Value::Array(_) => "array",
+        Value::Object(_) => "object",
+    };
+    let fits = |expected: &&str| *expected == kind || (*expected == "number" && kind == "integer");
+    if !kinds.is_empty() && !kinds.iter().any(fits) {
+        return Err(format!("{place}: {value} is not {kinds:?}"));
+    }
+    if schema["enum"].as_array().is_some_and(|words| !value.is_null() && !words.contains(value)) {
+        return Err(format!("{place}: {value} is not one of {}", schema["enum"]));
+    }
+    let size = value.as_array().map(|items| items.len() as f64);
+    for (measured, least, most) in [(value.as_f64(), "minimum", "maximum"), (size, "minItems", "maxItems")] {
+        let Some(measured) = measured else { continue };
+        let end = |name: &str, none: f64| schema[name].as_f64().unwrap_or(none);
+        if measured < end(least, f64::NEG_INFINITY) || measured > end(most, f64::INFINITY) {
+            return Err(format!("{place}: {measured} is outside {least} or {most}"));
+        }
+    }
+    Ok(())
 }
 
 /// Checks every row of the audit trail. Returns the details that at least one of them has.
