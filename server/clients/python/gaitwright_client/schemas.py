@@ -128,9 +128,9 @@ ReferenceGaitId = str
 # scopes of a token are rights other than `administer`.
 Right = Literal["read", "run", "answer", "rate", "device", "administer"]
 
-# Role of a user: `admin` has every right; `clinician` runs studies and gives preferences; `rater` compares gaits blind
-# and records walks and answers in lab sessions.
-Role = Literal["admin", "clinician", "rater"]
+# Role of a user: `administrator` has every right; `clinician` runs studies and gives preferences; `rater` compares
+# gaits blind and records walks and answers in lab sessions.
+Role = Literal["administrator", "clinician", "rater"]
 
 # Decision of a safety review: `cleared`, somebody may walk with the gait; `unsafe`, it remains marked as unsafe.
 SafetyDecision = Literal["cleared", "unsafe"]
@@ -168,10 +168,10 @@ Strikes = Literal["force", "kinematics", "ends"]
 # Identifier of a study.
 StudyId = str
 
-# State of a study: `draft`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer from a
-# person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied; `stopped`, by
-# a user or a program.
-StudyState = Literal["draft", "running", "waiting", "paused", "finished", "stopped"]
+# State of a study: `not_started`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer
+# from a person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied;
+# `stopped`, by a user or a program.
+StudyState = Literal["not_started", "running", "waiting", "paused", "finished", "stopped"]
 
 # Identifier of a subject.
 SubjectId = str
@@ -331,6 +331,8 @@ AuditDetail = TypedDict(
         "by": "SignInMethod",
         # Size of the backup, bytes: `backup.complete`, `record.backup`.
         "bytes": "int",
+        # `study.create`: the study whose set-up was copied. Null if it is not a clone.
+        "cloned_from": "Optional[StudyId]",
         # `blind_pair.answer`: whether the rater could have known the allocation.
         "could_have_known": "bool",
         # `gait.review`: the decision.
@@ -347,8 +349,6 @@ AuditDetail = TypedDict(
         "file_sha256": "str",
         # `session.refused`: time of the first attempt.
         "first_at": "Instant",
-        # `study.create`: the study whose set-up was copied. Null if it is not a fork.
-        "forked_from": "Optional[StudyId]",
         # `subject.consent`: the consent form.
         "form": "str",
         # Value before the change: the state (`study.start`, `study.pause`, `study.resume`, `study.stop`) or the number of
@@ -858,6 +858,10 @@ class Correction(TypedDict):
     body_mass_kg: float
     # Time of the correction.
     created_at: Instant
+    # Body mass before the correction, kg.
+    former_body_mass_kg: float
+    # Body height before the correction, m.
+    former_height_m: float
     # Corrected body height, m.
     height_m: float
     # Reason for the correction.
@@ -1175,23 +1179,6 @@ class Extend(TypedDict):
 
     # Total number of trials. Must exceed the current budget.
     trial_budget: int
-
-
-class Fork(TypedDict, total=False):
-    """A new study with the set-up of another one. Absent fields are copied."""
-
-    # Who answers comparisons.
-    feedback_mode: Optional[FeedbackMode]
-    # Whether to solve with muscles.
-    muscles: Optional[bool]
-    # Name shown to users.
-    name: Optional[str]
-    # Seed for all random draws except allocations.
-    seed: Optional[int]
-    # Whether to start the study immediately.
-    start: bool
-    # Number of trials.
-    trial_budget: Optional[int]
 
 
 class StickFigure(TypedDict):
@@ -2189,7 +2176,7 @@ class NewSafetyReport(TypedDict, total=False):
 
 
 class _NewSafetyReviewRequired(TypedDict):
-    # `walkable`: the gait is cleared for walking. `unsafe`: the gait remains marked as unsafe, and the review is
+    # `cleared`: the gait is cleared for walking. `unsafe`: the gait remains marked as unsafe, and the review is
     # complete.
     decision: SafetyDecision
     # Reason, 1 to 2000 characters.
@@ -3112,8 +3099,8 @@ class Study(_StudyRequired, total=False):
     # Time at which the study was archived. Null if it is not archived. Lists leave out archived studies unless they are
     # asked for; `GET /api/v1/studies?archived=true` lists them.
     archived_at: Optional[Instant]
-    # Parent, if the study is a fork; otherwise null.
-    forked_from: Optional[StudyId]
+    # Parent, if the study is a clone; otherwise null.
+    cloned_from: Optional[StudyId]
 
 
 class StudyAccess(TypedDict):
@@ -3121,6 +3108,23 @@ class StudyAccess(TypedDict):
 
     # Whether only members and administrators can access the study. Raters must be members in any case.
     restricted: bool
+
+
+class StudyClone(TypedDict, total=False):
+    """A new study with the set-up of another one. Absent fields are copied."""
+
+    # Who answers comparisons.
+    feedback_mode: Optional[FeedbackMode]
+    # Whether to solve with muscles.
+    muscles: Optional[bool]
+    # Name shown to users.
+    name: Optional[str]
+    # Seed for all random draws except allocations.
+    seed: Optional[int]
+    # Whether to start the study immediately.
+    start: bool
+    # Number of trials.
+    trial_budget: Optional[int]
 
 
 class _StudyComparisonRequired(TypedDict):

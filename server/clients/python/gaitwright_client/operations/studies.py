@@ -13,11 +13,11 @@ from ..paging import Pages
 from ..schemas import (
     Change,
     Extend,
-    Fork,
     Import,
     Milestone,
     NewStudy,
     Recommendation,
+    StudyClone,
     StudyComparison,
     StudyId,
     StudyState,
@@ -116,6 +116,30 @@ class StudiesMethods(Transport):
         """
         return self.request_bytes("GET", "/api/v1/studies/{id}/archive", {"id": study_id})
 
+    def clone_study(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[StudyClone],
+    ) -> StudyView:
+        """Clone a study.
+
+        Creates a study with the same set-up, without the trials.
+
+        Fields: optionally feedback_mode, muscles, name, seed, start, trial_budget.
+        """
+        return cast(
+            StudyView,
+            self.request_json(
+                "POST",
+                "/api/v1/studies/{id}/clone",
+                {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
     def follow_study_events(self, study_id: StudyId, *, after: Optional[int] = None) -> Iterator[Event]:
         """Follow the events of a study.
 
@@ -148,30 +172,6 @@ class StudiesMethods(Transport):
                 "/api/v1/studies/{id}/extend",
                 {"id": study_id},
                 revision=revision,
-                body=body,
-                key=idempotency_key,
-            ),
-        )
-
-    def fork_study(
-        self,
-        study_id: StudyId,
-        *,
-        idempotency_key: Optional[str] = None,
-        **body: Unpack[Fork],
-    ) -> StudyView:
-        """Fork a study.
-
-        Creates a study with the same set-up, without the trials.
-
-        Fields: optionally feedback_mode, muscles, name, seed, start, trial_budget.
-        """
-        return cast(
-            StudyView,
-            self.request_json(
-                "POST",
-                "/api/v1/studies/{id}/fork",
-                {"id": study_id},
                 body=body,
                 key=idempotency_key,
             ),
@@ -274,7 +274,7 @@ class StudiesMethods(Transport):
     ) -> StudyView:
         """Start a study.
 
-        Possible while the study is `draft`.
+        Possible while the study is `not_started`.
 
         Fields: optionally reason.
         """
