@@ -14,12 +14,12 @@ const NUMBERS: [(&str, f64, f64, &str); 5] = [
     ),
     (
         "bound_push",
-        1e-300,
+        f64::MIN_POSITIVE,
         0.5,
         "Minimum distance of a cold start from its bounds, relative to the larger of 1 and the bound, and to the distance \
          between two bounds. Default 0.1.",
     ),
-    ("hessian_regularisation_first", 1e-300, 1e300, "First regularisation of the Hessian. Default 1e-4."),
+    ("hessian_regularisation_first", f64::MIN_POSITIVE, f64::MAX, "First regularisation of the Hessian. Default 1e-4."),
     (
         "proximal_first",
         0.0,
