@@ -19,6 +19,7 @@ pub mod explained;
 pub mod imports;
 pub mod large;
 pub mod measured;
+pub mod page_routes;
 pub mod people;
 pub mod read_allocations;
 pub mod scripted;

@@ -12,6 +12,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, studies};
 use gaitwright_tests::callers::{As, FORM, member, rater_of, send, service, signed_in, token};
+use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -81,14 +82,7 @@ fn addresses() -> Vec<(Method, String)> {
     for (path, item) in document["paths"].as_object().unwrap() {
         all.extend(item.as_object().unwrap().keys().map(|m| (m.to_uppercase().parse().unwrap(), path.clone())));
     }
-    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
-        let path = line.split('"').nth(1).unwrap().to_owned();
-        for (method, called) in [(Method::GET, "get("), (Method::POST, "post(")] {
-            if line.contains(called) && path != "/sign-out" {
-                all.push((method, path.clone()));
-            }
-        }
-    }
+    all.extend(page_routes::all().into_iter().filter(|(_, path)| path != "/sign-out"));
     all
 }
 

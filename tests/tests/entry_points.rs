@@ -14,6 +14,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{StudyId, TrialId, blind_pairs, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::sources;
 use serde_json::{Value, json};
@@ -150,14 +151,8 @@ fn operations() -> Vec<String> {
     for (path, item) in document["paths"].as_object().unwrap() {
         all.extend(item.as_object().unwrap().keys().map(|method| format!("{method} {path}")));
     }
-    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
-        let path = line.split('"').nth(1).unwrap();
-        for method in ["get", "post"] {
-            if line.contains(&format!("{method}(")) {
-                all.push(format!("{method} {path}"));
-            }
-        }
-    }
+    let pages = page_routes::all().into_iter();
+    all.extend(pages.map(|(method, path)| format!("{} {path}", method.as_str().to_lowercase())));
     all
 }
 
