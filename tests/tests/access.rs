@@ -233,7 +233,7 @@ async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
     assert!(refused.text.contains("Your entry was not saved"), "{}", refused.text);
     service.access = Arc::new(AccessState::by_sign_in(3600.0));
-    let heard = service.feedback(study).await.len();
+    let rows_before = service.feedback(study).await.len();
 
     // A wrong password does not lose the entry either.
     let carried = form_of(&hidden_fields(&refused.text));
@@ -243,7 +243,7 @@ async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     let signed_in =
         send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, &format!("{credentials}&{carried}")).await;
     assert!(signed_in.text.contains(&format!("action=\"{pair}\"")), "{}", signed_in.text);
-    assert_eq!(service.feedback(study).await.len(), heard, "signing in stores no answer");
+    assert_eq!(service.feedback(study).await.len(), rows_before, "signing in stores no answer");
     let body = form_of(&hidden_fields(&signed_in.text));
     let saved = send(&service, &session_of(&signed_in), &Method::POST, &pair, FORM, &body).await;
     assert_eq!(saved.status, StatusCode::SEE_OTHER, "{}", saved.text);

@@ -304,8 +304,8 @@ async fn access_log_is_append_only_and_pruned_by_age_only() {
     commit(writer).await.unwrap();
     let left: Vec<String> = stored(&service).await.into_iter().map(|row| row.object).collect();
     assert_eq!(left, ["10 days"]);
-    let verdict = seals::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, SealCheck::Intact { .. }), "{verdict:?}");
+    let check = seals::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(check, SealCheck::Intact { .. }), "{check:?}");
     service.stop().await;
 }
 

@@ -265,8 +265,8 @@ async fn rater_retracts_an_answer_that_a_clinician_retracted_and_sees_no_differe
     let pair = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     post(&service, &rater, &format!("/api/v1/blind-pairs/{token}/answer"), &json!({"answer": "first"})).await;
-    let heard = service.feedback(study).await.into_iter().find(|row| row.source.as_str() == "subject").unwrap();
-    let path = format!("/api/v1/preferences/{}/retract", heard.id);
+    let preference = service.feedback(study).await.into_iter().find(|row| row.source.as_str() == "subject").unwrap();
+    let path = format!("/api/v1/preferences/{}/retract", preference.id);
     let retracted = post(&service, &clinician, &path, &json!({"reason": "wrong person"})).await;
     assert!(retracted.status.is_success(), "{}", retracted.text);
     let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{token}/retract"), FORM, "").await;
