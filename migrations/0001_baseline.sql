@@ -374,7 +374,7 @@ create table gaits (
 ) strict;
 
 create trigger gaits_no_update before update on gaits
-begin select raise(abort, 'gaits are append-only'); end;
+begin select raise(abort, 'gaits are never changed'); end;
 
 -- Certificates of gaits: one for each version of the certificate.
 create table certificates (

@@ -405,12 +405,12 @@ fn of_fractions(angles_at: impl Fn(f64) -> [f64; 7]) -> MotionRecording {
 fn said_of(recording: &MotionRecording) -> String {
     let given = HeelStrikes::Given((0..5).map(|k| 1.1 * f64::from(k)).collect());
     match recording.reference("walk", &given, MeasuredPerson::default()) {
-        Ok(reference) => remark(&reference),
+        Ok(reference) => warning_of(&reference),
         Err(refused) => format!("refused: {refused}"),
     }
 }
 
-fn remark(reference: &ReferenceGait) -> String {
+fn warning_of(reference: &ReferenceGait) -> String {
     let said = reference.provenance.lines().find(|line| line.contains("from the built-in reference"));
     said.unwrap_or_default().to_owned()
 }
@@ -423,7 +423,7 @@ fn impossible_mean_strides_are_rejected() {
     assert_eq!(said_of(&unaltered), "", "the walk as it is");
     // The right heel is farthest ahead slightly before heel strike.
     let found = unaltered.reference("walk", &HeelStrikes::Kinematics, MeasuredPerson::default()).unwrap();
-    assert_eq!(remark(&found), "", "{}", found.provenance);
+    assert_eq!(warning_of(&found), "", "{}", found.provenance);
     let cases: [(Angles, &str); 6] = [
         (
             |[torso, rest @ ..]| with_torso(torso + 0.8, rest),
@@ -544,7 +544,7 @@ fn computed_gaits_can_become_reference_gaits() {
         let recording =
             MotionRecording::from_opensim("gait.mot", &motion_file(&gait, 200.0).unwrap(), None, None).unwrap();
         let reference = recording.reference("gait", &HeelStrikes::Ends, MeasuredPerson::default()).unwrap();
-        println!("| subject {subject}, muscles {muscles} | {} |", remark(&reference));
+        println!("| subject {subject}, muscles {muscles} | {} |", warning_of(&reference));
     }
 }
 

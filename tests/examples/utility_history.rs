@@ -10,8 +10,8 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::StudyId;
 use gaitwright_store::studies::FeedbackMode;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::people::answer_once;
 use gaitwright_tests::service::Service;
+use gaitwright_tests::users::answer_once;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

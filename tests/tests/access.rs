@@ -13,6 +13,7 @@ use gaitwright_store::members::MemberKind;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{As, FORM, member, send, service, session_of, signed_in, token, user};
+use gaitwright_tests::page_routes;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -158,47 +159,41 @@ const PAGES: [(&str, Option<Right>); 79] = [
 
 #[tokio::test]
 async fn every_page_is_shown_to_users_with_its_right() {
-    let listed = include_str!("../../server/http/src/pages/mod.rs");
     let (_folder, service) = service().await;
     let callers = everybody(&service).await;
     let mut seen = BTreeSet::new();
-    for line in listed.lines().filter(|line| line.contains(".route(\"")) {
-        let path = line.split('"').nth(1).unwrap();
-        for method in ["get", "post"] {
-            if !line.contains(&format!("{method}(")) || (path, method) == ("/account", "post") {
-                continue;
-            }
-            let entry = format!("{method} {path}");
-            let (_, needed) = PAGES.iter().find(|(known, _)| *known == entry).unwrap_or_else(|| panic!("{entry}"));
-            seen.insert(entry.clone());
-            let Some(needed) = needed else { continue };
-            let method: Method = method.to_uppercase().parse().unwrap();
-            let address = path
-                .replace("{id}", UNKNOWN)
-                .replace("{token}", "unknown")
-                .replace("{side}", "first")
-                .replace("{file}", "a.svg");
-            for (who, rights) in &callers {
-                let answer = send(&service, who, &method, &address, FORM, "").await;
-                let what = format!("{entry} as {who:?}: {}", answer.status);
-                if entry == "get /" && rights.contains(&Right::Rate) && !rights.contains(needed) {
-                    assert_eq!(answer.headers["location"], "/rate", "{what}");
-                } else if rights.contains(needed) {
-                    // The sample study needs no fields, so it is created.
-                    let created = entry == "post /studies/sample" && answer.status == StatusCode::SEE_OTHER;
-                    let refused = matches!(answer.status, StatusCode::SEE_OTHER | StatusCode::FORBIDDEN);
-                    assert!(created || !refused, "{what}");
-                } else if matches!(who, As::Nobody) && method == Method::POST {
-                    assert_eq!(answer.status, StatusCode::UNAUTHORIZED, "{what}");
-                } else if matches!(who, As::Nobody) {
-                    assert_eq!(answer.headers["location"], "/sign-in", "{what}");
-                } else {
-                    assert_eq!(answer.status, StatusCode::FORBIDDEN, "{what}");
-                }
+    for (method, path) in page_routes::all() {
+        if (path.as_str(), &method) == ("/account", &Method::POST) {
+            continue;
+        }
+        let entry = format!("{} {path}", method.as_str().to_lowercase());
+        let (_, needed) = PAGES.iter().find(|(known, _)| *known == entry).unwrap_or_else(|| panic!("{entry}"));
+        seen.insert(entry.clone());
+        let Some(needed) = needed else { continue };
+        let address = path
+            .replace("{id}", UNKNOWN)
+            .replace("{token}", "unknown")
+            .replace("{side}", "first")
+            .replace("{file}", "a.svg");
+        for (who, rights) in &callers {
+            let answer = send(&service, who, &method, &address, FORM, "").await;
+            let what = format!("{entry} as {who:?}: {}", answer.status);
+            if entry == "get /" && rights.contains(&Right::Rate) && !rights.contains(needed) {
+                assert_eq!(answer.headers["location"], "/rate", "{what}");
+            } else if rights.contains(needed) {
+                // The sample study needs no fields, so it is created.
+                let created = entry == "post /studies/sample" && answer.status == StatusCode::SEE_OTHER;
+                let refused = matches!(answer.status, StatusCode::SEE_OTHER | StatusCode::FORBIDDEN);
+                assert!(created || !refused, "{what}");
+            } else if matches!(who, As::Nobody) && method == Method::POST {
+                assert_eq!(answer.status, StatusCode::UNAUTHORIZED, "{what}");
+            } else if matches!(who, As::Nobody) {
+                assert_eq!(answer.headers["location"], "/sign-in", "{what}");
+            } else {
+                assert_eq!(answer.status, StatusCode::FORBIDDEN, "{what}");
             }
         }
     }
-    // A line of the router in another format would be missed.
     assert_eq!(seen, PAGES.iter().map(|(entry, _)| (*entry).to_owned()).collect());
     service.stop().await;
 }
@@ -239,7 +234,7 @@ async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
     assert!(refused.text.contains("Your entry was not saved"), "{}", refused.text);
     service.access = Arc::new(AccessState::by_sign_in(3600.0));
-    let heard = service.feedback(study).await.len();
+    let rows_before = service.feedback(study).await.len();
 
     // A wrong password does not lose the entry either.
     let carried = form_of(&hidden_fields(&refused.text));
@@ -249,7 +244,7 @@ async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     let signed_in =
         send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, &format!("{credentials}&{carried}")).await;
     assert!(signed_in.text.contains(&format!("action=\"{pair}\"")), "{}", signed_in.text);
-    assert_eq!(service.feedback(study).await.len(), heard, "signing in stores no answer");
+    assert_eq!(service.feedback(study).await.len(), rows_before, "signing in stores no answer");
     let body = form_of(&hidden_fields(&signed_in.text));
     let saved = send(&service, &session_of(&signed_in), &Method::POST, &pair, FORM, &body).await;
     assert_eq!(saved.status, StatusCode::SEE_OTHER, "{}", saved.text);

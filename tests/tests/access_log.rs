@@ -18,6 +18,7 @@ use gaitwright_store::{StudyId, commit, now};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{self, As, FORM, send, signed_in, token};
 use gaitwright_tests::cli;
+use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Service, for_localhost};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -28,11 +29,8 @@ const ANY_ID: &str = "01890000-0000-7000-8000-000000000000";
 
 /// Every route that is read: pages as the router lists them, operations as the description does.
 fn read_routes() -> BTreeSet<String> {
-    let pages = include_str!("../../server/http/src/pages/mod.rs");
-    let pages = pages.lines().filter(|line| line.contains(".route(\"") && line.contains("get("));
-    let mut routes: BTreeSet<String> = pages.map(|line| line.split('"').nth(1).unwrap().to_owned()).collect();
-    routes.extend(operations().into_iter().filter(|(method, _)| *method == Method::GET).map(|(_, path)| path));
-    routes
+    let all = page_routes::all().into_iter().chain(operations());
+    all.filter(|(method, _)| *method == Method::GET).map(|(_, path)| path).collect()
 }
 
 /// Every operation of the description, as method and path.
@@ -307,8 +305,8 @@ async fn access_log_is_append_only_and_pruned_by_age_only() {
     commit(writer).await.unwrap();
     let left: Vec<String> = stored(&service).await.into_iter().map(|row| row.object).collect();
     assert_eq!(left, ["10 days"]);
-    let verdict = seals::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, SealCheck::Intact { .. }), "{verdict:?}");
+    let check = seals::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(check, SealCheck::Intact { .. }), "{check:?}");
     service.stop().await;
 }
 

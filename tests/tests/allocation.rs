@@ -17,6 +17,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, signed_in, token};
 use gaitwright_tests::consistent_gaits::Consistent;
+use gaitwright_tests::page_routes;
 use gaitwright_tests::read_allocations::{gait_a_first, sides};
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::skipped::skipped;
@@ -472,9 +473,8 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
     }
     let forms: Vec<&str> = paths.iter().filter_map(|(_, form)| form.as_deref()).collect();
     assert!(forms.contains(&"text/csv"), "{forms:?}");
-    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains("get(")) {
-        paths.extend(line.split('"').nth(1).map(|path| (path.to_owned(), None)));
-    }
+    let pages = page_routes::all().into_iter().filter(|(method, _)| *method == Method::GET);
+    paths.extend(pages.map(|(_, path)| (path, None)));
     // These differ from one call to the next, or are the sides as the rater sees them.
     let left_out = [
         "/metrics",

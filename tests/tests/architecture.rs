@@ -199,14 +199,44 @@ fn rows_of_the_record_are_not_served() {
     assert!(bodies > 100, "{bodies}");
 }
 
+const LIBRARIES: [&str; 3] = ["optimizer/nlp/src", "optimizer/src", "learner/src"];
+
 /// The learner and the optimiser work on what they are given.
 #[test]
 fn libraries_do_no_input_or_output() {
-    for folder in ["optimizer/nlp/src", "optimizer/src", "learner/src"] {
+    for folder in LIBRARIES {
         for (file, text) in sources::below(folder) {
             for module in ["std::fs", "std::env", "std::net", "std::process", "std::io"] {
                 assert!(!text.contains(module), "{folder}/{file} uses {module}");
             }
+        }
+    }
+}
+
+/// Files that measure how long a solve takes, for its report and its time limit.
+const MEASURE_TIME: [&str; 6] = [
+    "optimizer/nlp/src/formulation.rs",
+    "optimizer/nlp/src/iterate.rs",
+    "optimizer/nlp/src/newton_system.rs",
+    "optimizer/nlp/src/solve.rs",
+    "optimizer/src/solve.rs",
+    "optimizer/src/solve/phases.rs",
+];
+
+/// Equal inputs and seeds give equal results.
+#[test]
+fn libraries_read_no_clock_and_draw_no_random_numbers_of_the_system() {
+    let clocks = ["std::time", "Instant::now", "SystemTime"];
+    let random = ["getrandom", "rand::rng", "thread_rng", "from_os_rng", "from_entropy", "OsRng", "RandomState"];
+    for folder in LIBRARIES {
+        for (file, text) in sources::below(folder) {
+            // A duration is not a clock.
+            let text = text.replace("std::time::Duration", "");
+            let path = format!("{folder}/{file}");
+            let clock = clocks.iter().find(|name| text.contains(*name));
+            assert_eq!(clock.is_some(), MEASURE_TIME.contains(&path.as_str()), "{path}: {clock:?}");
+            let drawn = random.iter().find(|name| text.contains(*name));
+            assert!(drawn.is_none(), "{path} uses {drawn:?}");
         }
     }
 }

@@ -139,9 +139,9 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     }
     let (study, shown) = with_repeats.expect("a repeated pair in eight studies");
     let feedback = service.feedback(study).await;
-    let heard: Vec<_> = feedback.iter().filter(|row| row.by_rater).collect();
-    assert_eq!(heard.len(), shown.len());
-    assert!(heard.iter().all(|row| !row.could_have_known), "a rater who may not read answers blindly");
+    let of_raters: Vec<_> = feedback.iter().filter(|row| row.by_rater).collect();
+    assert_eq!(of_raters.len(), shown.len());
+    assert!(of_raters.iter().all(|row| !row.could_have_known), "a rater who may not read answers blindly");
     let repeats = shown.iter().filter(|p| p.kind == BlindPairKind::Repeat).count();
     assert!(repeats > 0, "{repeats} repeats of {}", shown.len());
 
@@ -174,8 +174,8 @@ async fn rater_answer_counts_for_the_gait_shown_on_its_side() {
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, answer).await;
         let feedback = service.feedback(study).await;
-        let heard = feedback.iter().filter(|row| row.by_rater).map(|row| row.content);
-        for (said, (first, second)) in heard.zip(sides(&service.store, study).await) {
+        let of_raters = feedback.iter().filter(|row| row.by_rater).map(|row| row.content);
+        for (said, (first, second)) in of_raters.zip(sides(&service.store, study).await) {
             let (winner, loser) = if answer == "first" { (first, second) } else { (second, first) };
             assert_eq!(said, gaitwright_store::feedback::FeedbackContent::Preference { winner, loser });
             swapped.insert(winner > loser);
@@ -265,8 +265,8 @@ async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() 
         let path = format!("/api/v1/blind-pairs/{token}/answer");
         let said = send(&service, who, &Method::POST, &path, "application/json", "{\"answer\": \"second\"}").await;
         assert_eq!(said.status, StatusCode::OK, "{}", said.text);
-        let heard = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
-        assert_eq!(heard.could_have_known, unblinded, "{who:?}");
+        let newest = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
+        assert_eq!(newest.could_have_known, unblinded, "{who:?}");
     }
     let figures = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
     let marked: Vec<_> =
@@ -402,13 +402,13 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
     let pair = next(&service, study).await;
     let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["token"].as_str().unwrap());
     assert_eq!(say(&service, &pair, "first").await, StatusCode::OK);
-    let heard = |rows: &[gaitwright_store::feedback::FeedbackRow]| {
+    let answers_in_force = |rows: &[gaitwright_store::feedback::FeedbackRow]| {
         rows.iter().filter(|row| row.by_rater && row.retraction.is_none()).count()
     };
-    assert_eq!(heard(&service.feedback(study).await), 1);
+    assert_eq!(answers_in_force(&service.feedback(study).await), 1);
     let back = service.post_text(&at(&pair, "/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
-    assert_eq!(heard(&service.feedback(study).await), 0);
+    assert_eq!(answers_in_force(&service.feedback(study).await), 0);
     let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.items();
     assert_eq!((&figures[0]["shown"], &figures[0]["answered"]), (&json!(1), &json!(0)), "{figures}");
     assert_eq!(service.post_text(&at(&pair, "/retract"), FORM, "").await.status, StatusCode::CONFLICT);

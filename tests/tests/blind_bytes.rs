@@ -12,6 +12,7 @@ use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, studies};
 use gaitwright_tests::callers::{As, FORM, member, rater_of, send, service, signed_in, token};
+use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -81,14 +82,7 @@ fn addresses() -> Vec<(Method, String)> {
     for (path, item) in document["paths"].as_object().unwrap() {
         all.extend(item.as_object().unwrap().keys().map(|m| (m.to_uppercase().parse().unwrap(), path.clone())));
     }
-    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
-        let path = line.split('"').nth(1).unwrap().to_owned();
-        for (method, called) in [(Method::GET, "get("), (Method::POST, "post(")] {
-            if line.contains(called) && path != "/sign-out" {
-                all.push((method, path.clone()));
-            }
-        }
-    }
+    all.extend(page_routes::all().into_iter().filter(|(_, path)| path != "/sign-out"));
     all
 }
 
@@ -271,8 +265,8 @@ async fn rater_retracts_an_answer_that_a_clinician_retracted_and_sees_no_differe
     let pair = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     post(&service, &rater, &format!("/api/v1/blind-pairs/{token}/answer"), &json!({"answer": "first"})).await;
-    let heard = service.feedback(study).await.into_iter().find(|row| row.source.as_str() == "subject").unwrap();
-    let path = format!("/api/v1/preferences/{}/retract", heard.id);
+    let preference = service.feedback(study).await.into_iter().find(|row| row.source.as_str() == "subject").unwrap();
+    let path = format!("/api/v1/preferences/{}/retract", preference.id);
     let retracted = post(&service, &clinician, &path, &json!({"reason": "wrong person"})).await;
     assert!(retracted.status.is_success(), "{}", retracted.text);
     let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{token}/retract"), FORM, "").await;

@@ -281,15 +281,15 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let described = document["components"]["schemas"]["AuditDetail"]["properties"].as_object().unwrap();
     let missing: Vec<&String> = described.keys().filter(|name| !details.contains(*name)).collect();
     assert!(missing.is_empty(), "no row of the audit trail has {missing:?}");
-    let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, ChainCheck::Intact { .. }));
+    let check = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(check, ChainCheck::Intact { .. }));
     scene.service.stop().await;
 }
 
 /// The feedback of a study, without identifiers, times and authors.
-fn essence(trials: &[Trial], heard: &[FeedbackRow]) -> Vec<String> {
+fn essence(trials: &[Trial], feedback_rows: &[FeedbackRow]) -> Vec<String> {
     let number = |id: TrialId| trials.iter().find(|trial| trial.id == id).unwrap().number;
-    heard
+    feedback_rows
         .iter()
         .map(|row| match row.content {
             FeedbackContent::Label { trial, category } => format!("label {category} of {}", number(trial)),
@@ -306,8 +306,8 @@ async fn form_rest_and_unattended_run_write_the_same_rows_for_the_same_answers()
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let automatic = service.study(|new| new.trial_budget = 12).await;
     service.wait_for(automatic, &[StudyState::Finished]).await;
-    let heard = service.feedback(automatic).await;
-    let expected = essence(&service.trials(automatic).await, &heard);
+    let feedback_rows = service.feedback(automatic).await;
+    let expected = essence(&service.trials(automatic).await, &feedback_rows);
     for by_form in [false, true] {
         let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
         while service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await.state == StudyState::Waiting {
@@ -344,8 +344,8 @@ async fn form_rest_and_unattended_run_write_the_same_rows_for_the_same_answers()
                 tokio::time::sleep(Duration::from_millis(2)).await;
             }
         }
-        let heard = feedback::of_study(&mut service.store.read().await.unwrap(), study, 0).await.unwrap();
-        assert_eq!(essence(&service.trials(study).await, &heard), expected, "by form: {by_form}");
+        let feedback_rows = feedback::of_study(&mut service.store.read().await.unwrap(), study, 0).await.unwrap();
+        assert_eq!(essence(&service.trials(study).await, &feedback_rows), expected, "by form: {by_form}");
     }
     service.stop().await;
 }

@@ -12,8 +12,9 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
-use gaitwright_store::{StudyId, TrialId, blind_pairs, lab_sessions};
+use gaitwright_store::{StudyId, TrialId, blind_pairs, commit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use gaitwright_tests::sources;
 use serde_json::{Value, json};
@@ -150,14 +151,8 @@ fn operations() -> Vec<String> {
     for (path, item) in document["paths"].as_object().unwrap() {
         all.extend(item.as_object().unwrap().keys().map(|method| format!("{method} {path}")));
     }
-    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
-        let path = line.split('"').nth(1).unwrap();
-        for method in ["get", "post"] {
-            if line.contains(&format!("{method}(")) {
-                all.push(format!("{method} {path}"));
-            }
-        }
-    }
+    let pages = page_routes::all().into_iter();
+    all.extend(pages.map(|(method, path)| format!("{} {path}", method.as_str().to_lowercase())));
     all
 }
 
@@ -540,7 +535,7 @@ async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
             if blind_first { ((&blind, &said), (&open, &chosen)) } else { ((&open, &chosen), (&blind, &said)) };
         let given = scene.service.post(first.0, first.1).await;
         assert!(given.status.is_success(), "{}", given.text);
-        let heard = scene.service.feedback(scene.study).await.len();
+        let rows_before = scene.service.feedback(scene.study).await.len();
         let refused = scene.service.post(second.0, second.1).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{}: {}", second.0, refused.text);
         assert!(refused.text.contains("has already answered this comparison"), "{}", refused.text);
@@ -565,7 +560,7 @@ async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
                 .filter(|row| row.source != Source::Convergence && row.source != Source::GaitRmse)
                 .count()
         };
-        assert_eq!(of_people(heard), 0, "blind first: {blind_first}");
+        assert_eq!(of_people(rows_before), 0, "blind first: {blind_first}");
         let next =
             scene.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", scene.study), &json!({})).await.json();
         assert_ne!(next["pair"]["token"], json!(token), "the pair is not shown again");
@@ -684,5 +679,19 @@ async fn plan_made_before_a_safety_report_is_not_written() {
     scene.close(Rule::Safety).await;
     assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: nothing reaches the learner");
     assert!(!plan.is_written(&scene).await, "although no answer arrived");
+    scene.service.stop().await;
+}
+
+#[tokio::test]
+async fn plan_made_before_another_trial_is_not_written() {
+    let scene = Rated::new().await;
+    let plan = Plan::of(&scene).await;
+    assert!(plan.is_written(&scene).await);
+    let mut writer = scene.service.store.write().await.unwrap();
+    plan.snapshot.write_trial(&mut writer, &plan.trial).await.unwrap().expect("the plan is current");
+    commit(writer).await.unwrap();
+    // A later number, so that only the check of the snapshot can refuse it.
+    let late = Plan { trial: NewTrial { number: plan.trial.number + 1, ..plan.trial.clone() }, ..plan };
+    assert!(!late.is_written(&scene).await);
     scene.service.stop().await;
 }

@@ -21,7 +21,7 @@ use tower::ServiceExt;
 const SESSIONS: usize = 200;
 
 /// Events with their times of arrival.
-type Heard = Arc<Mutex<Vec<(Instant, String)>>>;
+type ReceivedEvents = Arc<Mutex<Vec<(Instant, String)>>>;
 
 async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Answer {
     let answer = send(service, who, &Method::POST, path, "application/json", &body.to_string()).await;
@@ -37,9 +37,9 @@ async fn listen(service: &Service, who: &As, path: &str) -> BodyDataStream {
     answer.into_body().into_data_stream()
 }
 
-fn keep_hearing(mut stream: BodyDataStream) -> Heard {
-    let heard = Heard::default();
-    let kept = Arc::clone(&heard);
+fn collect_events(mut stream: BodyDataStream) -> ReceivedEvents {
+    let received = ReceivedEvents::default();
+    let kept = Arc::clone(&received);
     tokio::spawn(async move {
         while let Some(Ok(bytes)) = stream.next().await {
             let text = String::from_utf8(bytes.to_vec()).unwrap();
@@ -48,7 +48,7 @@ fn keep_hearing(mut stream: BodyDataStream) -> Heard {
             }
         }
     });
-    heard
+    received
 }
 
 /// An event without identifiers, numbers and instants, all of which differ from session to session.
@@ -75,7 +75,7 @@ async fn event_streams_reveal_no_allocation_by_content_or_timing() {
     let mut gaits = service.trials(study).await;
     gaits.retain(|trial| trial.state == TrialState::Converged);
     let (reader, rater) = (signed_in(&service, Role::Clinician).await, rater_of(&service, &[study]).await);
-    let heard = keep_hearing(listen(&service, &reader, &format!("/api/v1/studies/{study}/events")).await);
+    let received = collect_events(listen(&service, &reader, &format!("/api/v1/studies/{study}/events")).await);
     let mut truth = Vec::new();
     let mut looks = BTreeSet::new();
     let (mut until_event, mut until_answer, mut walks) = (Vec::new(), Vec::new(), Vec::new());
@@ -83,7 +83,7 @@ async fn event_streams_reveal_no_allocation_by_content_or_timing() {
         let plan = json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id});
         let planned = post(&service, &reader, &format!("/api/v1/studies/{study}/lab-sessions"), &plan).await.json();
         let id = planned["id"].as_str().unwrap();
-        heard.lock().unwrap().clear();
+        received.lock().unwrap().clear();
         let begun = Instant::now();
         for walk in 1..=3 {
             post(&service, &rater, &format!("/api/v1/lab-sessions/{id}/walks"), &json!({"walk": walk})).await;
@@ -95,14 +95,14 @@ async fn event_streams_reveal_no_allocation_by_content_or_timing() {
         until_answer.push(asked.elapsed());
         let event = loop {
             let answered = |(_, text): &&(Instant, String)| text.starts_with("event: lab_session_answered");
-            if let Some((at, _)) = heard.lock().unwrap().iter().find(answered) {
+            if let Some((at, _)) = received.lock().unwrap().iter().find(answered) {
                 break *at;
             }
-            assert!(asked.elapsed() < Duration::from_secs(10), "{:?}", heard.lock().unwrap());
+            assert!(asked.elapsed() < Duration::from_secs(10), "{:?}", received.lock().unwrap());
             tokio::time::sleep(Duration::from_micros(200)).await;
         };
         until_event.push(event.saturating_duration_since(asked));
-        looks.insert(heard.lock().unwrap().iter().map(|(_, text)| masked(text)).collect::<String>());
+        looks.insert(received.lock().unwrap().iter().map(|(_, text)| masked(text)).collect::<String>());
         truth.push(gait_a_first(&service.store, id.parse().unwrap()).await);
     }
     assert_eq!(looks.len(), 1, "{looks:#?}");

@@ -586,7 +586,7 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     let (_folder, service) = service().await;
     let send = async |body: &str| service.post_text("/users", FORM, body).await;
     assert!(send("button=add_user&name=K1&role=clinician").await.status.is_success());
-    let taken = send("button=add_user&name=K1&role=administrator").await;
+    let taken = send("button=add_user&name=K1&role=administratoristrator").await;
     is_page(&taken, StatusCode::CONFLICT, "A user named");
     for kept in [
         "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",

@@ -481,11 +481,11 @@ async fn events_after_the_last_received_one_are_replayed() {
     let study = finished(&service, 2).await;
     let recorded = events::after(&mut service.store.read().await.unwrap(), study, 0, 100).await.unwrap();
     assert!(recorded.len() > 5, "{recorded:?}");
-    let mut heard = stream_of(&service, study, Some(recorded[1].seq)).await;
-    assert!(heard().await.contains("event: study_state"));
+    let mut next_event = stream_of(&service, study, Some(recorded[1].seq)).await;
+    assert!(next_event().await.contains("event: study_state"));
     let mut text = String::new();
     while text.matches("id: ").count() < recorded.len() - 2 {
-        text.push_str(&heard().await);
+        text.push_str(&next_event().await);
     }
     let seen: Vec<i64> = text.lines().filter_map(|line| line.strip_prefix("id: ")?.parse().ok()).collect();
     let expected: Vec<i64> = recorded[2..].iter().map(|event| event.seq).collect();
@@ -498,15 +498,15 @@ async fn event_stream_reports_the_end_of_a_study_and_resumes_with_it() {
     let (_folder, service) = service().await;
     let study = finished(&service, 2).await;
     let path = format!("/api/v1/studies/{study}");
-    let mut heard = stream_of(&service, study, None).await;
-    let first = heard().await;
+    let mut next_event = stream_of(&service, study, None).await;
+    let first = next_event().await;
     assert!(
         first.contains("event: study_state") && first.contains("finished") && first.contains("All 2 trials"),
         "{first}"
     );
     let extended = service.post(&format!("{path}/extend"), &json!({"trial_budget": 3})).await;
     assert_eq!(extended.status, StatusCode::OK, "{}", extended.text);
-    let next = heard().await;
+    let next = next_event().await;
     assert!(next.contains("event: study_changed") && next.contains("running") && next.contains("id: "), "{next}");
     service.stop().await;
 }

@@ -214,7 +214,7 @@ async fn walked(service: &Service, study: StudyId, trials: &[Trial]) -> (String,
 }
 
 /// The answers of people, as the learner received them.
-async fn heard(service: &Service, study: StudyId) -> Vec<FeedbackRow> {
+async fn subject_answers(service: &Service, study: StudyId) -> Vec<FeedbackRow> {
     let mut rows = service.feedback(study).await;
     rows.retain(|row| row.source == Source::Subject);
     rows
@@ -247,10 +247,10 @@ async fn subject_preference_reaches_the_learner_after_unblinding() {
     let said = json!({"number": 2, "answer": "second", "note": "softer"});
     let seen = service.post(&answers, &said).await.json();
     assert_eq!((&seen["answer"]["answer"], &seen["can_be_retracted"]), (&json!("second"), &json!(true)));
-    assert!(heard(&service, study).await.is_empty(), "before unblinding");
+    assert!(subject_answers(&service, study).await.is_empty(), "before unblinding");
 
     service.post(&format!("{session}/unblind"), &json!({"reason": "all were walked"})).await;
-    let rows = heard(&service, study).await;
+    let rows = subject_answers(&service, study).await;
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let (first, second) = row.walked().unwrap();
     assert_eq!(

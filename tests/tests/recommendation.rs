@@ -20,8 +20,8 @@ use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId, certificates, commit};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::certified::{Verdicts, certificate};
-use gaitwright_tests::people;
 use gaitwright_tests::service::Service;
+use gaitwright_tests::users;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
@@ -249,11 +249,11 @@ async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
     let beliefs = Arc::new(Beliefs::default());
     for answers in 0..5 {
-        people::asked(&service, study).await;
+        users::asked(&service, study).await;
         assert_eq!(utility_history(&service, study, &beliefs).await.len(), answers);
-        people::answer_once(&service, study).await;
+        users::answer_once(&service, study).await;
     }
-    people::asked(&service, study).await;
+    users::asked(&service, study).await;
     let points = utility_history(&service, study, &beliefs).await;
     assert_eq!(points.iter().map(|point| point.answers).collect::<Vec<_>>(), [1, 2, 3, 4, 5]);
     // The points that were kept are those that a new cache computes.

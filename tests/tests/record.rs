@@ -8,8 +8,10 @@ use gaitwright_store::audit::{self, ChainCheck};
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::{Store, StoreError, backup, read_only};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::every_table::filled;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
+use sqlx::AssertSqlSafe;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use std::path::Path;
 use tempfile::TempDir;
@@ -114,8 +116,8 @@ async fn every_change_writes_exactly_one_row_of_the_audit_trail() {
         assert!(done.status.is_success() || done.status.is_redirection(), "{path}: {}", done.text);
         assert_eq!(audit_rows(&service).await, before + count + 1, "{path}");
     }
-    let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, ChainCheck::Intact { rows, .. } if rows == before as u64 + 9));
+    let check = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(check, ChainCheck::Intact { rows, .. } if rows == before as u64 + 9));
     service.stop().await;
 }
 
@@ -135,8 +137,8 @@ async fn audit_verify_finds_one_changed_byte_of_the_audit_trail() {
     bytes[places[0] + needle.len() - 2] = b'7';
     std::fs::write(&database, bytes).unwrap();
     let pool = read_only::open(&database).await.unwrap();
-    let verdict = audit::verify(&mut pool.acquire().await.unwrap()).await.unwrap();
-    assert_eq!(verdict, ChainCheck::Broken { seq: 3 });
+    let check = audit::verify(&mut pool.acquire().await.unwrap()).await.unwrap();
+    assert_eq!(check, ChainCheck::Broken { seq: 3 });
 }
 
 #[tokio::test]
@@ -160,7 +162,7 @@ async fn evidence_tables_are_append_only_for_other_programs() {
         ("delete from audit", "the audit trail is append-only"),
         ("update events set kind = 'x'", "events are append-only"),
         ("delete from events", "events are append-only"),
-        ("update gaits set speed_m_s = 0", "gaits are append-only"),
+        ("update gaits set speed_m_s = 0", "gaits are never changed"),
         ("delete from trials", "trials are never deleted"),
         ("update trials set gait_rmse_rad = 0.001", "the result of a trial cannot be changed"),
         ("update trials set action_index = 0 where id = 'X'", "the proposal of a trial cannot be changed"),
@@ -170,6 +172,58 @@ async fn evidence_tables_are_append_only_for_other_programs() {
             other => panic!("{sql}: {other:?}"),
         }
     }
+}
+
+/// The code SQLITE_CONSTRAINT_TRIGGER.
+const BY_TRIGGER: &str = "1811";
+
+/// Tables whose rows may be updated. Other triggers protect the plan of a study, and the proposal and result of a trial.
+const UPDATED: [&str; 16] = [
+    "_sqlx_migrations",
+    "checksums",
+    "clock",
+    "devices",
+    "idempotency_keys",
+    "jobs",
+    "reference_gaits",
+    "sessions",
+    "sign_in_failures",
+    "sign_in_links",
+    "sign_in_sources",
+    "studies",
+    "subjects",
+    "tokens",
+    "trials",
+    "users",
+];
+
+/// Tables whose rows may be deleted: gaits only by `prune`, which needs no update.
+fn may_be_deleted(table: &str) -> bool {
+    table == "gaits" || UPDATED.contains(&table) && !["tokens", "trials", "users"].contains(&table)
+}
+
+#[tokio::test]
+async fn every_append_only_table_refuses_updates_and_deletions_of_other_programs() {
+    let (_folder, database) = filled().await;
+    let pool = intruder(&database).await;
+    let names = "select name from sqlite_schema where type = 'table' and name not glob 'sqlite_*'";
+    let tables: Vec<String> = sqlx::query_scalar(names).fetch_all(&pool).await.unwrap();
+    for table in &tables {
+        let columns = format!("select name from pragma_table_info('{table}') limit 1");
+        let column: String = sqlx::query_scalar(AssertSqlSafe(columns)).fetch_one(&pool).await.unwrap();
+        for (sql, allowed) in [
+            (format!("update {table} set {column} = {column}"), UPDATED.contains(&table.as_str())),
+            (format!("delete from {table}"), may_be_deleted(table)),
+        ] {
+            let mut changes = pool.begin().await.unwrap();
+            let done = sqlx::query(AssertSqlSafe(sql.clone())).execute(&mut *changes).await;
+            let refused =
+                matches!(&done, Err(sqlx::Error::Database(error)) if error.code().as_deref() == Some(BY_TRIGGER));
+            assert!(refused || allowed, "{sql}: {done:?}");
+            changes.rollback().await.unwrap();
+        }
+    }
+    assert!(tables.len() > 45, "{tables:?}");
 }
 
 #[tokio::test]

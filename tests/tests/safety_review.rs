@@ -67,8 +67,8 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
         ),
         "{shown}"
     );
-    let heard = service.feedback(study).await;
-    assert!(heard.iter().all(|row| row.retraction.is_none()));
+    let feedback = service.feedback(study).await;
+    assert!(feedback.iter().all(|row| row.retraction.is_none()));
 
     let walkable = json!({"decision": "cleared", "reason": "the video was cut", "author": "K2"});
     assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
@@ -88,8 +88,8 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     let reviews: Vec<_> = trail.iter().filter(|row| row.action == "gait.review").collect();
     assert_eq!(reviews.len(), 2);
     assert!(reviews.iter().any(|row| row.detail.to_string().contains("the video was cut")));
-    let heard = service.feedback(study).await;
-    let retracted: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
+    let feedback = service.feedback(study).await;
+    let retracted: Vec<_> = feedback.iter().filter_map(|row| row.retraction.as_ref()).collect();
     assert_eq!(
         retracted.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
         [("K2", "the video was cut")]
@@ -107,16 +107,16 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     let recommended = async || service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     let best = recommended().await["trial_id"].clone();
     let other = converged(&service, study).await.into_iter().find(|id| json!(id) != best).unwrap();
-    let remark = json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K1"});
-    let remarks = format!("/api/v1/studies/{study}/assessments");
-    service.post(&remarks, &remark).await;
+    let assessment = json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K1"});
+    let address = format!("/api/v1/studies/{study}/assessments");
+    service.post(&address, &assessment).await;
     assert_ne!(recommended().await["trial_id"], best);
     let best_id = best.as_str().unwrap();
     let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
     assert!(for_the_device.text.contains("Nobody may walk with it until"), "{}", for_the_device.text);
     let seen = safety_reports(&service, study).await[0]["id"].clone();
-    service.post(&remarks, &json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K3"})).await;
+    service.post(&address, &json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K3"})).await;
     let late = decide(&service, best_id, &json!({"decision": "cleared", "reason": "r", "reports": [seen]})).await;
     assert_eq!(late.status, StatusCode::CONFLICT);
     assert!(late.text.contains("a safety report by K3 that is not among"), "{}", late.text);

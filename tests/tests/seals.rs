@@ -295,7 +295,7 @@ async fn append_seal(database: &Path, table: &str, key: &str) {
 #[tokio::test]
 async fn audit_verify_finds_a_seal_of_an_unknown_table() {
     let (_folder, database) = filled().await;
-    let (table, key) = ("remarks", "01890000-0000-7000-8000-000000000000");
+    let (table, key) = ("unknown", "01890000-0000-7000-8000-000000000000");
     append_seal(&database, table, key).await;
     assert_eq!(verify(&database).await, SealCheck::Touched { table: table.to_owned(), key: key.to_owned() });
     assert!(matches!(Store::open(&database).await, Err(StoreError::Damaged { .. })));

@@ -328,8 +328,8 @@ async fn refused_connections_do_not_delay_those_of_another_address() {
     busy_connections_leave_health_answering(2..=19).await;
 }
 
-/// A record whose administrators are all disabled, as older versions let it become.
-async fn nobody_administers(folder: &Path) {
+/// Makes a record whose administrators are all disabled.
+async fn disable_every_administrator(folder: &Path) {
     let store = Store::open(&folder.join("gaitwright.db")).await.unwrap();
     let mut writer = store.write().await.unwrap();
     let new = NewUser { name: "admin".to_owned(), role: Role::Administrator };
@@ -343,7 +343,7 @@ async fn nobody_administers(folder: &Path) {
 async fn service_prints_a_sign_in_link_if_all_administrators_are_disabled() {
     for arguments in [&[][..], &["--sign-in-link"]] {
         let folder = tempfile::tempdir().unwrap();
-        nobody_administers(folder.path()).await;
+        disable_every_administrator(folder.path()).await;
         let process = Process::start(folder.path(), arguments, "sign in");
         let path = process.said.last().unwrap().split(process.address()).nth(1).unwrap().to_owned();
         let first = send(process.address(), "POST", &path, "").unwrap();
@@ -357,7 +357,7 @@ async fn users_link_command_prints_a_working_sign_in_link() {
     let run = |arguments: &[&str]| run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), arguments);
     let nothing = run(&["users", "link", "Ada"]);
     assert!(!nothing.status.success() && !folder.path().join("gaitwright.db").exists());
-    nobody_administers(folder.path()).await;
+    disable_every_administrator(folder.path()).await;
     let store = Store::open(&folder.path().join("gaitwright.db")).await.unwrap();
     let mut writer = store.write().await.unwrap();
     let new = NewUser { name: "Ada".to_owned(), role: Role::Administrator };

@@ -13,6 +13,7 @@ use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::callers::{As, FORM, member, send, service, signed_in, token};
 use gaitwright_tests::measured::motion;
+use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -125,17 +126,10 @@ fn entry_points() -> Vec<(Method, String, String)> {
             all.push((method.to_uppercase().parse().unwrap(), path.clone(), start.to_owned()));
         }
     }
-    let pages = include_str!("../../server/http/src/pages/mod.rs");
-    for line in pages.lines().filter(|line| line.contains(".route(\"")) {
-        let path = line.split('"').nth(1).unwrap();
-        let start = path.split('/').nth(1).unwrap();
-        if !path.contains("{id}") || SHARED_PAGES.contains(&start) {
-            continue;
-        }
-        for (method, word) in [(Method::GET, "get("), (Method::POST, "post(")] {
-            if line.contains(word) {
-                all.push((method, path.to_owned(), start.to_owned()));
-            }
+    for (method, path) in page_routes::all() {
+        let start = path.split('/').nth(1).unwrap().to_owned();
+        if path.contains("{id}") && !SHARED_PAGES.contains(&start.as_str()) {
+            all.push((method, path, start));
         }
     }
     all

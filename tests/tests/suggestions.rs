@@ -13,7 +13,8 @@ use gaitwright_tests::service::Service;
 use serde_json::json;
 use std::time::Duration;
 
-async fn heard(service: &Service, study: StudyId) -> Vec<Feedback> {
+/// The feedback that the learner receives.
+async fn learner_feedback(service: &Service, study: StudyId) -> Vec<Feedback> {
     let mut reader = service.store.read().await.unwrap();
     let study = studies::get(&mut reader, study).await.unwrap();
     StudySnapshot::read(&mut reader, study).await.unwrap().log().feedback
@@ -27,7 +28,7 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.into_iter().find(|trial| trial.state.as_str() == "converged").unwrap();
     let path = format!("/api/v1/studies/{study}/suggestions");
-    let before = heard(&service, study).await;
+    let before = learner_feedback(&service, study).await;
 
     let plan = service.get(study).await.plan;
     let a6 = plan.search_space.values(trial.action_index)[5];
@@ -43,7 +44,7 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{body}: {}", refused.text);
         assert_eq!(refused.json()["field"], field, "{body}");
     }
-    assert_eq!(heard(&service, study).await, before);
+    assert_eq!(learner_feedback(&service, study).await, before);
 
     let new = json!({"over": trial.id, "bounds": {"a6": other}, "source": "subject", "author": "S03"});
     let given = service.post(&path, &new).await;
@@ -53,7 +54,7 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
     let mut expected = plan.search_space.values(trial.action_index);
     expected[5] = other;
     assert_eq!(plan.search_space.values(suggested), expected);
-    let after = heard(&service, study).await;
+    let after = learner_feedback(&service, study).await;
     assert_eq!(after[before.len()..], [Feedback::Suggestion { suggested, over: trial.action_index }]);
     assert_eq!(service.fetch(&path).await.items()[0]["id"], given["id"]);
     let answers = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.text;
@@ -61,7 +62,7 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
 
     let retract = format!("/api/v1/preferences/{}/retract", given["id"].as_str().unwrap());
     assert_eq!(service.post(&retract, &json!({"reason": "mistyped"})).await.status, StatusCode::OK);
-    assert_eq!(heard(&service, study).await, before);
+    assert_eq!(learner_feedback(&service, study).await, before);
     assert_eq!(service.fetch(&path).await.items()[0]["retraction"]["reason"], "mistyped");
     service.stop().await;
 }

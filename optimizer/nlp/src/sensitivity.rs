@@ -40,7 +40,7 @@ pub struct ParameterDerivative {
 }
 
 impl ParameterDerivative {
-    /// A parameter on which nothing depends, for a program with `variables` and `rows`.
+    /// The derivative with respect to a parameter that has no effect on a program with `variables` and `rows`.
     pub fn zeros(variables: usize, rows: usize) -> Self {
         Self {
             objective: 0.0,

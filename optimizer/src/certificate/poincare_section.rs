@@ -1,4 +1,5 @@
-//! The section of the stride-to-stride map: the state after right heel strike without px, on which nothing depends.
+//! The section of the stride-to-stride map: the state after right heel strike without the horizontal position px, which has
+//! no effect on the motion.
 
 use super::feedback_linearization::State;
 use nalgebra::SVector;

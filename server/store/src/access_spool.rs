@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn every_noted_access_is_read_whatever_lies_between() {
+    fn accesses_between_damaged_lines_are_read() {
         let folder = tempfile::tempdir().unwrap();
         let record = folder.path().join("a.db");
         let garbage = || {

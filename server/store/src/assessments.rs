@@ -1,4 +1,4 @@
-//! Assessments: what staff say of two gaits that is no preference.
+//! Assessments: answers of staff about two gaits that state no preference.
 
 use super::blind_pairs::OrderedAnswer;
 use super::feedback::{Attribution, Retraction, Source};

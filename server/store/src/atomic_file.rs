@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn leftover_is_deleted_whatever_the_name_of_the_next_copy() {
+    fn leftover_is_deleted_by_a_next_copy_with_another_name() {
         let folder = tempfile::tempdir().unwrap();
         let killed = WholeFile::begin(&folder.path().join("copy1.db"), "a.db").unwrap();
         let name = killed.part().to_owned();

@@ -335,7 +335,7 @@ mod tests {
     use crate::studies::StudyState;
 
     #[test]
-    fn unknown_stored_value_is_quoted_with_what_to_do() {
+    fn error_about_an_unknown_stored_value_quotes_it_and_names_the_commands() {
         let error = "sleeping".parse::<StudyState>().unwrap_err().to_string();
         assert_eq!(
             error,

@@ -22,7 +22,7 @@ pub struct GaitSimulated {
     pub trial_id: TrialId,
     /// Its number.
     pub number: u32,
-    /// Number of simulated walks for each value of --ground.
+    /// Number of simulated walks on each ground.
     pub walks: u32,
     /// Seed of the disturbances.
     pub seed: u64,

@@ -1,6 +1,6 @@
-//! The record: one SQLite database, owned by one process. Only this module contains SQL.
+//! The record: one SQLite database, owned by one process. Only this crate contains SQL and depends on SQLite.
 //!
-//! Only this crate depends on SQLite. Reads go through a small pool of read-only connections that never block;
+//! Reads go through a small pool of read-only connections that never block;
 //! writes go through one connection, one after the other, so that no writer ever meets `SQLITE_BUSY`.
 //! A transaction never spans CPU or network work.
 

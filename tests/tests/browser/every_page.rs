@@ -114,12 +114,12 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let told = format!("/api/v1/lab-sessions/{}/unblind", walked[1]);
     site.service.post(&told, &json!({"reason": "every walk was recorded"})).await;
     let unsafe_one = converged[2].id;
-    let remark = json!({"trial_a": unsafe_one, "trial_b": converged[3].id, "answer": "unsafe_a", "author": "K1",
+    let assessment = json!({"trial_a": unsafe_one, "trial_b": converged[3].id, "answer": "unsafe_a", "author": "K1",
         "note": "stumbled twice"});
-    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &assessment).await;
     let lifted = converged[4].id;
-    let remark = json!({"trial_a": lifted, "trial_b": converged[3].id, "answer": "unsafe_a", "author": "K1"});
-    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
+    let assessment = json!({"trial_a": lifted, "trial_b": converged[3].id, "answer": "unsafe_a", "author": "K1"});
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &assessment).await;
     let decision = json!({"decision": "cleared", "author": "K2", "reason": "walked slowly, with a harness"});
     site.service.post(&format!("/api/v1/trials/{lifted}/safety-reviews"), &decision).await;
     people(site).await;

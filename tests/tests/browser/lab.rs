@@ -21,7 +21,7 @@ async fn planned(site: &Site) -> (StudyId, String) {
 }
 
 /// The answer of the subject, as the learner received it.
-async fn heard(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
+async fn subject_answers(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
     let mut rows = site.service.feedback(study).await;
     rows.retain(|row| row.source == Source::Subject);
     rows
@@ -61,7 +61,7 @@ async fn browser_lab_session_records_walks_and_asks_which_was_better() {
     page.wait_until("document.querySelector('.notice.good')?.textContent.includes('walk 3, the second with the device, was better') ?? false").await;
     page.reload().await;
     assert!(page.text(".notice.good").await.contains("walk 3, the second with the device, was better"));
-    assert!(heard(&site, study).await.is_empty(), "the session is still blind");
+    assert!(subject_answers(&site, study).await.is_empty(), "the session is still blind");
     page.is_clean(&site.origin).await;
 
     let page = browser.open(&site.at(&format!("/lab-sessions/{session}"))).await;
@@ -70,7 +70,7 @@ async fn browser_lab_session_records_walks_and_asks_which_was_better() {
     page.fill("#reason", "every walk was recorded").await;
     page.click("form[action$='/unblind'] button").await;
     page.wait_until("document.querySelector('main').innerText.includes('Unblinded by')").await;
-    assert_eq!(heard(&site, study).await.len(), 1);
+    assert_eq!(subject_answers(&site, study).await.len(), 1);
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     assert!(page.text(".answers").await.contains("the subject, "));
     page.is_clean(&site.origin).await;
@@ -206,8 +206,8 @@ async fn browser_staff_review_a_safety_report() {
     let trials = site.service.trials(study).await;
     let gait = trials.iter().find(|trial| format!("trial {}", trial.number) == best).unwrap().id;
     let other = trials.iter().find(|trial| trial.state == TrialState::Converged && trial.id != gait).unwrap().id;
-    let remark = json!({"trial_a": gait, "trial_b": other, "answer": "unsafe_a", "author": "R7"});
-    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
+    let assessment = json!({"trial_a": gait, "trial_b": other, "answer": "unsafe_a", "author": "R7"});
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &assessment).await;
     watched.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;
 
     // From the home page to the decision.

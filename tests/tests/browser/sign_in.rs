@@ -136,7 +136,10 @@ async fn browser_sends_an_answer_after_the_session_ended() {
     page.wait_until("document.querySelector('h1').textContent === 'Send your entry'").await;
     page.click("main form button").await;
     page.wait_for(".notice.good").await;
-    let heard = site.service.feedback(study).await;
-    assert_eq!(heard.iter().filter(|row| (row.author.as_str(), row.note.as_str()) == ("R1", "both fine")).count(), 1);
+    let feedback = site.service.feedback(study).await;
+    assert_eq!(
+        feedback.iter().filter(|row| (row.author.as_str(), row.note.as_str()) == ("R1", "both fine")).count(),
+        1
+    );
     browser.close().await;
 }

@@ -5,7 +5,7 @@ use crate::site::Site;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
-use gaitwright_tests::people;
+use gaitwright_tests::users;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -135,9 +135,9 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
     for _ in 0..4 {
-        people::answer_once(&site.service, study).await;
+        users::answer_once(&site.service, study).await;
     }
-    people::asked(&site.service, study).await;
+    users::asked(&site.service, study).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.resize(1280, 800).await;
     // The first button of the page.
@@ -161,7 +161,7 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
     let analysis = browser.open(&site.at(&format!("/studies/{study}/belief"))).await;
     assert!(analysis.text("#best tbody tr:nth-child(2)").await.contains(&sure), "{sure}");
     // A new answer adds a point without a reload.
-    people::answer_once(&site.service, study).await;
+    users::answer_once(&site.service, study).await;
     page.wait_until(&format!("document.querySelectorAll(`{chart} .dot`).length === 5")).await;
     page.is_clean(&site.origin).await;
     browser.close().await;
@@ -204,9 +204,9 @@ async fn browser_updates_do_not_overwrite_edited_fields() {
     page.run("window.field = document.querySelector('#more')").await;
     let mut gaits = site.service.trials(study).await;
     gaits.retain(|trial| trial.state == gaitwright_store::trials::TrialState::Converged);
-    let remark =
+    let assessment =
         serde_json::json!({"trial_a": gaits[0].id, "trial_b": gaits[1].id, "answer": "unsafe_a", "author": "K1"});
-    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &remark).await;
+    site.service.post(&format!("/api/v1/studies/{study}/assessments"), &assessment).await;
     page.wait_for("[data-part=state] [role=alert]").await;
     let typed = "`${window.field.value} ${document.querySelector('#more') === window.field}`";
     assert_eq!(page.value(typed).await, "67 true");

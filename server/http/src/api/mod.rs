@@ -1,4 +1,4 @@
-//! The REST interface under `/api/v1`, one file for each resource. Routes come from the descriptions, so every route is
+//! The REST interface under `/api/v1`: the handlers, by resource. Routes come from the descriptions, so every route is
 //! described.
 
 mod access_log;

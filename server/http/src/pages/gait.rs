@@ -88,7 +88,7 @@ impl GaitPage {
     }
 }
 
-/// What the page shows beyond what it always shows.
+/// The optional parts of the page.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GaitQuery {

@@ -56,7 +56,7 @@ impl NewExecutionReport {
 /// The state of the execution report of a gait in this process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Simulation {
-    /// This process has nothing to say of it.
+    /// This process has no request for it and no outcome.
     None,
     /// Queued.
     Queued(NewExecutionReport),

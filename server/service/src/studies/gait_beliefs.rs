@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn difference_below_its_standard_deviation_is_not_told() {
+    fn only_a_difference_above_its_standard_deviation_is_distinguishable() {
         let difference = |mean| Prediction { mean, standard_deviation: 0.5 };
         assert!(
             is_distinguishable(&difference(0.51))

@@ -1,6 +1,7 @@
 //! Status and cancellation of jobs: backups, and solves, certificates, execution reports and explanations of trials.
 //!
-//! A job has no row of its own. Its state follows from the record and the running process.
+//! Solves have a queue in the record, and requests for explanations a table. The state of every job follows from the record
+//! and the running process.
 
 use super::command;
 use super::execution::{self, Simulation};

@@ -176,8 +176,8 @@ fn answered_before(author: &str) -> Error {
     ))
 }
 
-/// Tells the learner that an action would have been better than a trial: a preference for the gait of these bounds. A
-/// trial that had them is subject to the rules of a comparison; without one, those of the other gait apply.
+/// Writes a suggestion into the learner's log: a preference for the suggested bounds over the gait of a trial. That gait
+/// must be walkable. If another trial already has these bounds, its gait must be walkable too, and differ.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a second answer.

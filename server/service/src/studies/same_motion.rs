@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn computed_motions_differ_beyond_the_tolerance_in_any_figure_whatever_their_bounds() {
+    fn computed_motions_are_compared_by_their_figures_and_not_by_their_bounds() {
         let one = motion(KnownBy::Figures(FIGURES), 15.0);
         let scales: [fn(&mut MotionFigures, f64); 4] = [
             |figures, factor| figures.cost_of_transport *= factor,

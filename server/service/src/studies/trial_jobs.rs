@@ -24,7 +24,7 @@ pub(super) trait TrialJob: Send + Sync {
     /// Whether [`Self::requested`] is read with every change of the record. If not, it is read once, and
     /// [`TrialJobs::ask`] announces later requests.
     const READS_REQUESTS: bool = false;
-    /// What a request says besides the trial.
+    /// The parameters of a request, without the trial.
     type Request: Clone + Send + Sync;
 
     /// The requests on record that were neither carried out nor cancelled since, oldest first.

@@ -81,3 +81,19 @@ async fn all_changes_of_a_rolled_back_transaction_fail() {
     assert_eq!(rows(&file).await, [2]);
     writing.close().await;
 }
+
+/// Otherwise a loss of power could take back changes that were acknowledged.
+#[tokio::test]
+async fn writing_connection_syncs_the_log_at_every_commit() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = crate::Store::open(&folder.path().join("a.db")).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    let journal_mode: String = sqlx::query_scalar("pragma journal_mode").fetch_one(&mut **writer).await.unwrap();
+    let synchronous: i64 = sqlx::query_scalar("pragma synchronous").fetch_one(&mut **writer).await.unwrap();
+    assert_eq!((journal_mode.as_str(), synchronous), ("wal", FULL));
+    drop(writer);
+    store.close().await;
+}
+
+/// The value of `pragma synchronous` for FULL.
+const FULL: i64 = 2;

@@ -271,7 +271,7 @@ pub(super) fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
     }
 }
 
-/// What a study has found, and what the record says of it.
+/// The results of a study, and the certificates, simulated walks and stored trajectory of its best gait.
 struct StudyFindings {
     outcome: StudyOutcome,
     certainty: Option<String>,

@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn preview_without_heel_strikes_says_what_is_missing() {
+    fn preview_without_heel_strikes_asks_for_their_times() {
         let shown = recording(Vec::new()).preview().unwrap();
         assert!(shown.strides.is_empty() && shown.traces.len() == 2);
         assert!(shown.refused.unwrap().to_string().contains("at least two heel-strike times"));

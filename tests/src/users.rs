@@ -1,4 +1,4 @@
-//! A person who answers the comparisons of a study.
+//! A user who answers the comparisons of a study.
 
 use crate::service::Service;
 use gaitwright_service::studies::pending_comparison::open_question;
