@@ -214,6 +214,23 @@ fn bounds_without_a_posture_are_solved_from_a_relaxed_guess() {
     }
 }
 
+/// A gait converges at the same violation whatever the tolerance of the solve.
+#[test]
+fn unfinished_solve_lists_violations_below_its_tolerance() {
+    let tolerance = 1e-3;
+    let options = SolveOptions { tolerance, time_limit_s: Some(0.0), retry: false, ..SolveOptions::default() };
+    let small = [1e-7, 1e-6, 1e-5, 1e-4].into_iter().find_map(|moved| {
+        let mut warm = COLD.warm_start.clone();
+        warm.point.x.iter_mut().for_each(|x| *x += moved);
+        let outcome = solve(&problem(""), Some(&warm), &options, &mut |_| {}, &CancelToken::new()).unwrap();
+        let is_small = (1e-6..tolerance).contains(&outcome.report.max_violation);
+        (outcome.report.status != SolveStatus::Converged && is_small).then_some(outcome)
+    });
+    let small = small.expect("no solve ended close to a gait");
+    assert!(!small.violations.is_empty(), "{:?}", small.report.max_violation);
+    assert!(small.violations.iter().all(|violation| violation.amount > 1e-6), "{:?}", small.violations);
+}
+
 #[test]
 fn unusable_warm_start_is_an_attempt_with_a_reason() {
     let mut warm = COLD.warm_start.clone();

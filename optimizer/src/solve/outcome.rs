@@ -4,8 +4,8 @@ use super::attempts::Candidate;
 use super::gait_results::GaitResults;
 use super::phases::SolveContext;
 use super::report::{
-    LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
-    Violation,
+    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport,
+    SolveStatus, StartedFrom, Violation,
 };
 use super::warm_start::WarmStart;
 use crate::gait_problem::margins::Margins;
@@ -80,13 +80,9 @@ pub(super) fn outcome(
         vhip_m_s: figures.vhip_m_s,
         attempts: tally.attempts,
     };
-    let violations = if status == SolveStatus::Converged {
-        Vec::new()
-    } else {
-        // NaN is a violation.
-        let above = violations.iter().filter(|v| v.amount.is_nan() || v.amount > context.options.tolerance);
-        above.take(MAX_VIOLATIONS).map(|v| describe(program, v)).collect()
-    };
+    // NaN is a violation.
+    let above = violations.iter().filter(|v| v.amount.is_nan() || v.amount > CONVERGED_VIOLATION);
+    let violations = above.take(MAX_VIOLATIONS).map(|v| describe(program, v)).collect();
     SolveOutcome { report, gait, warm_start, violations, other_local_optima: Vec::new() }
 }
 

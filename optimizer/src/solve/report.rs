@@ -228,7 +228,7 @@ pub struct SolveOutcome {
     pub gait: Gait,
     /// Warm start for another solve.
     pub warm_start: WarmStart,
-    /// The most violated rows above the tolerance, worst first; empty if converged.
+    /// The rows with violations above [`CONVERGED_VIOLATION`], worst first, at most 20; empty if converged.
     pub violations: Vec<Violation>,
     /// The other local optima, with one gait for each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
