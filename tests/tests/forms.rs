@@ -191,8 +191,9 @@ async fn answer_is_retracted_through_its_link_in_its_own_study_only() {
     }
     let read = service.fetch(&format!("/api/v1/preferences/{id}")).await.json();
     assert_eq!(read["retraction"], json!(null), "nothing was retracted");
+    let change = format!("/studies/{study}/compare?change={id}");
+    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains(&change));
     let link = format!("/studies/{study}/compare?saved={id}");
-    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains(&link));
     assert!(service.fetch(&link).await.text.contains(&format!("action=\"/studies/{study}/retract\"")));
     let answer = service.post_text(&format!("/studies/{study}/retract"), FORM, &form).await;
     assert_eq!(answer.status, StatusCode::SEE_OTHER);
@@ -200,7 +201,55 @@ async fn answer_is_retracted_through_its_link_in_its_own_study_only() {
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     let struck = page.split("class=\"retracted\">").nth(1).unwrap().split("</span>").next().unwrap();
     assert!(struck.contains("trial") && !struck.contains("typo") && page.contains("retracted: typo"));
-    assert!(!page.contains(&link), "a retracted answer cannot be changed");
+    assert!(!page.contains(&change), "a retracted answer cannot be changed");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn change_shows_its_own_comparison_and_replaces_the_answer() {
+    let (_folder, service) = service().await;
+    let (study, a, b) = finished(&service).await;
+    let body = json!({"trial_a": a, "trial_b": b, "answer": "b", "source": "clinician", "author": "K", "note": "firm"});
+    let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await.json();
+    let id = given["id"].as_str().unwrap();
+    let page = service.fetch(&format!("/studies/{study}/compare?change={id}")).await.text;
+    for (name, value) in [("a", a.to_string()), ("b", b.to_string()), ("changes", id.to_owned())] {
+        assert!(page.contains(&format!("type=\"hidden\" name=\"{name}\" value=\"{value}\"")), "{name}: {page}");
+    }
+    let form = format!("a={a}&b={b}&changes={id}&answer=a&source=clinician&author=K&note=&key={UNKNOWN}");
+    let path = format!("/studies/{study}/compare");
+    for _ in 0..2 {
+        let sent = service.post_text(&path, FORM, &form).await;
+        assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
+    }
+    let first = service.fetch(&format!("/api/v1/preferences/{id}")).await.json();
+    assert_eq!(first["retraction"]["reason"], "changed to another answer");
+    let people = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
+    let valid = people.as_array().unwrap().iter().filter(|row| row["author"] == "K" && row["retraction"].is_null());
+    let winners: Vec<String> = valid.map(|row| row["winner"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(winners, [a.to_string()]);
+    // The answer that was replaced cannot be replaced again.
+    let again = form.replace(UNKNOWN, "01890000-0000-7000-8000-000000000001");
+    assert_eq!(service.post_text(&path, FORM, &again).await.status, StatusCode::CONFLICT);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn finished_study_waits_for_no_answer_after_a_retraction() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Mixed)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let converged: Vec<_> =
+        service.trials(study).await.into_iter().filter(|trial| trial.state == TrialState::Converged).collect();
+    let body = json!({"trial_a": converged[0].id, "trial_b": converged[1].id, "answer": "a", "author": "K"});
+    let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await.json();
+    let form = format!("saved={}&author=K&reason=typo", given["id"].as_str().unwrap());
+    assert_eq!(
+        service.post_text(&format!("/studies/{study}/retract"), FORM, &form).await.status,
+        StatusCode::SEE_OTHER
+    );
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(page.contains("finished") && !page.contains("Waiting for your answer"), "{page}");
     service.stop().await;
 }
 
@@ -514,7 +563,8 @@ async fn refused_forms_name_fields_by_their_labels() {
     is_page(
         &refused,
         StatusCode::UNPROCESSABLE_ENTITY,
-        "\u{201c}Height, m\u{201d} is \u{201c}tall\u{201d}; it must be a number.",
+        "\u{201c}Height, m\u{201d} is \u{201c}tall\u{201d}; it must be a number in metres, such as 1.75, or feet and inches, such as \
+         5 ft 9 in.",
     );
     service.stop().await;
 }
@@ -681,7 +731,10 @@ async fn study_is_renamed_tagged_found_and_archived() {
     service.wait_for(other, &[StudyState::Finished]).await;
     let details = format!("/studies/{study}/details");
     let form = "button=save&name=Visit+2&tags=treadmill,+pilot,pilot&notes=shoes%0D%0Anew";
-    assert_eq!(made(&service.post_text(&details, FORM, form).await), study);
+    let saved = service.post_text(&details, FORM, form).await;
+    assert_eq!(saved.headers["location"], format!("{details}?saved=true"));
+    let confirmed = service.fetch(&format!("{details}?saved=true")).await.text;
+    assert!(confirmed.contains("<p class=\"notice good\" role=\"status\">Saved.</p>"));
     let stored = service.get(study).await;
     assert_eq!((stored.plan.name.as_str(), stored.tags.join(" ")), ("Visit 2", "pilot treadmill".to_owned()));
     assert_eq!(stored.notes, "shoes\nnew");

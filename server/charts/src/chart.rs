@@ -261,6 +261,8 @@ impl Chart {
             write!(svg, "<path class=\"mark\" d=\"M{at:.1} {TOP}V{bottom}\"/>")?;
         }
         for (x, text) in numbers(&places) {
+            // Right of the mark, so that the number of a mark on the axis does not touch the topmost tick.
+            let x = x + NAME_CHARACTER / 2.0;
             write!(svg, "<text class=\"label\" x=\"{x:.1}\" y=\"{}\">{text}</text>", TOP - 6.0)?;
         }
         Ok(())

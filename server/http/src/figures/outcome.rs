@@ -4,6 +4,7 @@ use gait_learner::LearnerError;
 use gaitwright_compute::OnPool;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::history::{self, Milestone};
+use gaitwright_service::studies::pending_comparison::{Question, awaited_question};
 use gaitwright_service::studies::pending_comparison::{Question, open_question};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::{last_believed, ranking_to_show};
@@ -47,7 +48,7 @@ impl StudyOutcome {
         }
         let open = match snapshot.study.plan.feedback_mode {
             FeedbackMode::Automatic => Question::None,
-            FeedbackMode::Human | FeedbackMode::Mixed => open_question(pool, snapshot)?,
+            FeedbackMode::Human | FeedbackMode::Mixed => awaited_question(pool, snapshot)?,
         };
         let question = open.trials().is_some();
         let question_after = match open {

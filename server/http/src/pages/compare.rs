@@ -23,7 +23,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::answer;
-use gaitwright_service::studies::pending_comparison::{Question, open_question};
+use gaitwright_service::studies::pending_comparison::{Question, awaited_question};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::walkable;
@@ -216,7 +216,7 @@ async fn show(
         };
     drop(reader);
     let ask = move |pool: &OnPool| {
-        let question = if large { Ok(Question::None) } else { open_question(pool, &snapshot) };
+        let question = if large { Ok(Question::None) } else { awaited_question(pool, &snapshot) };
         (snapshot, question)
     };
     let (snapshot, question) = app.compute(ask).await.map_err(Error::from)?;

@@ -58,15 +58,20 @@ impl Question {
     }
 }
 
+/// The comparison that a study waits for. A study that has ended waits for none, even if an answer was retracted.
+///
+/// # Errors
+/// When the learner cannot work with the log.
+pub fn awaited_question(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Question, LearnerError> {
+    if snapshot.study.state.has_ended() { Ok(Question::None) } else { open_question(pool, snapshot) }
+}
+
 /// The pair that a person should compare now: the newest converged gait and a different gait that nobody has compared
-/// with it. The pair does not depend on when certificates arrive. A study that has ended asks nothing, whatever was retracted.
+/// with it. The pair does not depend on when certificates arrive.
 ///
 /// # Errors
 /// When the learner cannot work with the log.
 pub fn open_question(_: &OnPool, snapshot: &StudySnapshot) -> Result<Question, LearnerError> {
-    if snapshot.study.state.has_ended() {
-        return Ok(Question::None);
-    }
     let plan = &snapshot.study.plan;
     let log = snapshot.log();
     let may_be_asked = |trial: &&Trial| snapshot.grounds.may_become_walkable(trial);
