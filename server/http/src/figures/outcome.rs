@@ -5,7 +5,6 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::history::{self, Milestone};
 use gaitwright_service::studies::pending_comparison::{Question, awaited_question};
-use gaitwright_service::studies::pending_comparison::{Question, open_question};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::{last_believed, ranking_to_show};
 use gaitwright_store::TrialId;
