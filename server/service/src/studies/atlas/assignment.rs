@@ -148,7 +148,7 @@ fn actions_in(space: &SearchSpace, levels: &[std::ops::Range<usize>]) -> Vec<Act
 /// The smallest step above the golden section of `all` that visits every place once.
 fn stride(all: usize) -> usize {
     let start = all * 618 / 1000;
-    (start.max(1)..).find(|step| greatest_common_divisor(*step, all.max(1)) == 1).unwrap_or(1)
+    (start.max(1)..=all).find(|step| greatest_common_divisor(*step, all.max(1)) == 1).unwrap_or(1)
 }
 
 fn greatest_common_divisor(a: usize, b: usize) -> usize {
