@@ -406,7 +406,7 @@ async fn sessions_end_if_idle_or_disabled_and_tokens_if_revoked() {
     };
     let disable = |id: String| format!("/api/v1/users/{id}/disable");
     let json = "application/json";
-    let last = send(&service, &admin, &Method::POST, &disable(id_of("admin")), json, "").await;
+    let last = send(&service, &admin, &Method::POST, &disable(id_of("administrator")), json, "").await;
     assert_eq!(last.status, StatusCode::CONFLICT, "somebody must administer");
     assert_eq!(
         send(&service, &admin, &Method::POST, &disable(id_of("clinician")), json, "").await.status,

@@ -74,7 +74,7 @@ impl Closed {
         let brought =
             post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &measured)
                 .await;
-        member(&service, study, MemberKind::User, "a admin").await;
+        member(&service, study, MemberKind::User, "a administrator").await;
         put(&service, &admin, &format!("{api}/access"), &json!({"restricted": true})).await;
         let listed = send(&service, &admin, &Method::GET, &format!("{api}/members"), "", "").await.items();
         let id = |value: &Value| value["id"].as_str().unwrap().to_owned();
@@ -218,7 +218,7 @@ async fn studies_of_a_subject_who_withdrew_cannot_be_changed_except_by_removing_
     }
     assert!(refused > 40, "{refused}");
     let page = format!("/studies/{study}/members");
-    for form in ["button=add&who=user+a+admin", "button=restrict", "button=open", "button=invite&name=R7"] {
+    for form in ["button=add&who=user+a+administrator", "button=restrict", "button=open", "button=invite&name=R7"] {
         let answer = send(service, admin, &Method::POST, &page, FORM, form).await;
         assert_eq!(answer.status, StatusCode::CONFLICT, "{form}: {}", answer.text);
     }
