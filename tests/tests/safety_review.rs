@@ -124,7 +124,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     // By the form, which sends the reports on its page.
     let page = service.fetch(&format!("/trials/{best_id}")).await.text;
     let seen = page.split("name=\"reports\" value=\"").nth(1).unwrap().split('"').next().unwrap();
-    let form = format!("decision=walkable&author=K2&reason=tried+slowly&reports={}", seen.replace(',', "%2C"));
+    let form = format!("decision=cleared&author=K2&reason=tried+slowly&reports={}", seen.replace(',', "%2C"));
     let sent = service.post_text(&format!("/trials/{best_id}/safety-review"), FORM, &form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
     assert_eq!(recommended().await["trial_id"], best);

@@ -216,8 +216,8 @@ async fn browser_staff_review_a_safety_report() {
     page.click("#waits ~ ul a").await;
     page.wait_for("[data-part=state] [role=alert] a[href$='#safety-review']").await;
     page.click("[data-part=state] [role=alert] a[href$='#safety-review']").await;
-    page.wait_for("#safety-review input[value=walkable]").await;
-    page.click("#safety-review input[value=walkable]").await;
+    page.wait_for("#safety-review input[value=cleared]").await;
+    page.click("#safety-review input[value=cleared]").await;
     page.fill("#author", "K1").await;
     page.fill("#reason", "walked slowly, with a harness").await;
     page.click("#safety-review button").await;

@@ -21,7 +21,8 @@ async fn browser_renames_finds_and_archives_a_study() {
     page.fill("#name", "Visit 3").await;
     page.fill("#tags", "pilot").await;
     page.click("button[value=save]").await;
-    page.wait_until("document.querySelector('h1').innerText === 'Visit 3'").await;
+    page.wait_until("document.querySelector('.notice.good')?.innerText === 'Saved.'").await;
+    assert_eq!(page.value("document.querySelector('#name').value").await, "Visit 3");
     let page = browser.open(&site.at("/")).await;
     page.fill("[name=text]", "visit").await;
     page.click(".filter button").await;

@@ -181,8 +181,7 @@ async fn browser_rater_answers_and_undoes_without_scripts() {
     page.wait_for(".notice.good").await;
     assert_eq!(answers(&site, study).await.len(), 1);
     page.click_plainly(".notice.good button").await;
-    page.wait_for("[data-next]").await;
-    assert!(page.text(".notice.good").await.contains("was retracted"));
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('was retracted') ?? false").await;
     assert!(answers(&site, study).await[0].retraction.is_some());
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     page.click_plainly("[data-next] button").await;
