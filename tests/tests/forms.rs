@@ -226,7 +226,7 @@ async fn change_shows_its_own_comparison_and_replaces_the_answer() {
     assert_eq!(first["retraction"]["reason"], "changed to another answer");
     let people = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
     let valid = people.as_array().unwrap().iter().filter(|row| row["author"] == "K" && row["retraction"].is_null());
-    let winners: Vec<String> = valid.map(|row| row["winner"].as_str().unwrap().to_owned()).collect();
+    let winners: Vec<String> = valid.map(|row| row["content"]["winner"].as_str().unwrap().to_owned()).collect();
     assert_eq!(winners, [a.to_string()]);
     // The answer that was replaced cannot be replaced again.
     let again = form.replace(UNKNOWN, "01890000-0000-7000-8000-000000000001");
@@ -636,7 +636,7 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     let (_folder, service) = service().await;
     let send = async |body: &str| service.post_text("/users", FORM, body).await;
     assert!(send("button=add_user&name=K1&role=clinician").await.status.is_success());
-    let taken = send("button=add_user&name=K1&role=administratoristrator").await;
+    let taken = send("button=add_user&name=K1&role=administrator").await;
     is_page(&taken, StatusCode::CONFLICT, "A user named");
     for kept in [
         "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",
