@@ -169,7 +169,7 @@ async fn ended_study_certifies_its_ten_best_gaits_in_order() {
     service.wait_for(study, &[StudyState::Finished]).await;
     let early = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     assert!(early.status == StatusCode::CONFLICT && early.text.contains("being certified"), "{}", early.text);
-    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait is being certified"));
+    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("being certified"));
 
     let found = settled(&service, study).await;
     assert_eq!((&found["certificate"], &found["passing"]), (&json!("failed"), &Value::Null));
