@@ -45,9 +45,9 @@ impl Atlas {
         let pool = Pool::new(1);
         let made = pool.run(move |pool| {
             let bar = ProgressBar::no_length();
-            let mut show = |assignment: &atlas::Assignment| {
-                bar.set_length(assignment.actions());
-                bar.set_position(assignment.assigned());
+            let mut show = |map: &atlas::GaitMap| {
+                bar.set_length(map.actions());
+                bar.set_position(map.assigned());
             };
             let made = atlas::make(pool, (problem, options, start), &progress_path, workers, &mut show, &cancel);
             bar.finish_and_clear();
@@ -57,10 +57,10 @@ impl Atlas {
             tell("stopped; run the same command again to continue");
             return Ok(CommandEnd::Interrupted);
         };
-        out.append(&atlas_table::text(&finished.assignment))?;
+        out.append(&atlas_table::text(&finished.map))?;
         let path = out.path().display().to_string();
         out.finish()?;
-        tell(&format!("{}; written to {path}", finished.assignment.in_words()));
+        tell(&format!("{}; written to {path}", finished.map.in_words()));
         if let Err(e) = finished.forget_progress() {
             tell(&format!("gaitwright: cannot remove the file of solves: {e}"));
         }

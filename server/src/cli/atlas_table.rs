@@ -2,7 +2,7 @@
 
 use super::solve::status_word;
 use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
-use gaitwright_service::studies::atlas::Assignment;
+use gaitwright_service::studies::atlas::GaitMap;
 
 /// The columns after the action. Scripts rely on them. `gait` numbers the gaits from 1, the root; actions with the same
 /// number have the same gait. `iterations` are those of the solve that found it. `active` lists the bounds that could not
@@ -23,7 +23,7 @@ const COLUMNS: [&str; 13] = [
     "active",
 ];
 
-pub(super) fn text(atlas: &Assignment) -> String {
+pub(super) fn text(atlas: &GaitMap) -> String {
     let mut table = CsvTable::default();
     table.row(atlas.bounds().chain(COLUMNS).map(CsvCell::from));
     for row in atlas.rows() {

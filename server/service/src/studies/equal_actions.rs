@@ -2,7 +2,7 @@
 //! differ are inactive in it.
 
 use super::snapshot::StudySnapshot;
-use gait_learner::{Dimension, ExcludedActions, LearnerError};
+use gait_learner::{ActionIndex, Dimension, ExcludedActions, LearnerError, SearchSpace};
 use gait_optimizer::{TunedBounds, UnchangedBound};
 use gaitwright_store::trials::{Trial, TrialState};
 use std::ops::Range;
@@ -15,15 +15,23 @@ pub(super) fn equal_actions(snapshot: &StudySnapshot) -> Result<ExcludedActions,
     let space = &snapshot.study.plan.search_space;
     let mut boxes = Vec::new();
     for trial in converged(snapshot) {
-        let own = space.levels(space.check(trial.action_index)?);
-        let unchanged = trial.report.iter().flat_map(|report| &report.unchanged_bounds);
-        let levels = |(dimension, own): (&Dimension, usize)| {
-            let bound = unchanged.clone().find(|bound| bound.bound == dimension.name);
-            bound.map_or(own..own + 1, |bound| levels_of(bound, dimension, own))
-        };
-        boxes.push(space.dimensions().iter().zip(own).map(levels).collect());
+        let unchanged = trial.report.as_ref().map_or(&[][..], |report| &report.unchanged_bounds);
+        boxes.push(levels_with_gait(space, space.check(trial.action_index)?, unchanged));
     }
     ExcludedActions::new(space, boxes)
+}
+
+/// The levels of each dimension with which the gait of an action stays a solution.
+pub(super) fn levels_with_gait(
+    space: &SearchSpace,
+    action: ActionIndex,
+    unchanged: &[UnchangedBound],
+) -> Vec<Range<usize>> {
+    let levels = |(dimension, own): (&Dimension, usize)| {
+        let bound = unchanged.iter().find(|bound| bound.bound == dimension.name);
+        bound.map_or(own..own + 1, |bound| levels_of(bound, dimension, own))
+    };
+    space.dimensions().iter().zip(space.levels(action)).map(levels).collect()
 }
 
 /// The tuned bounds that were active in no gait of the study. Empty if there are fewer than two gaits, or if one does not say.
@@ -46,7 +54,7 @@ fn converged(snapshot: &StudySnapshot) -> impl Iterator<Item = &Trial> {
 }
 
 /// The levels around `own` with which the gait stays a solution.
-pub fn levels_of(bound: &UnchangedBound, dimension: &Dimension, own: usize) -> Range<usize> {
+fn levels_of(bound: &UnchangedBound, dimension: &Dimension, own: usize) -> Range<usize> {
     let stays = |value: &&f64| bound.contains(**value);
     let (below, above) = dimension.values.split_at(own);
     let fewer = below.iter().rev().take_while(stays).count();

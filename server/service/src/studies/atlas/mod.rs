@@ -1,11 +1,11 @@
 //! An atlas: the gait of every action of Table I, from one root gait. It does not depend on the number of workers, and a killed
 //! process can continue it.
 
-mod assignment;
+mod gait_map;
 mod progress_file;
 mod solved_action;
 
-pub use assignment::{Assignment, AtlasRow};
+pub use gait_map::{AtlasRow, GaitMap};
 pub use solved_action::{GaitFigures, SolvedAction};
 
 use super::search_space;
@@ -40,7 +40,7 @@ pub fn make(
     (problem, options, start): (GaitProblem, SolveOptions, Option<WarmStart>),
     progress: &Path,
     workers: usize,
-    observer: &mut dyn FnMut(&Assignment),
+    observer: &mut dyn FnMut(&GaitMap),
     cancel: &CancelToken,
 ) -> Result<Option<Finished>, Error> {
     let Some(root) = root(&problem, &options, start.as_ref(), cancel)? else { return Ok(None) };
@@ -50,15 +50,15 @@ pub fn make(
     let mut progress = ProgressFile::open(progress, &input)?;
     let space = search_space::table_i().map_err(Error::Learner)?;
     let action = search_space::nearest_action(&space, family.problem.bounds).map_err(Error::Learner)?;
-    let mut assignment = Assignment::new(space, SolvedAction { action, ..root.solved });
-    let is_complete = solve_all(&family, &mut assignment, &mut progress, workers, observer, cancel)?;
-    Ok(is_complete.then_some(Finished { assignment, progress }))
+    let mut map = GaitMap::new(space, SolvedAction { action, ..root.solved });
+    let is_complete = solve_all(&family, &mut map, &mut progress, workers, observer, cancel)?;
+    Ok(is_complete.then_some(Finished { map, progress }))
 }
 
 /// A complete atlas.
 pub struct Finished {
     /// The gait of each action.
-    pub assignment: Assignment,
+    pub map: GaitMap,
     progress: ProgressFile,
 }
 
@@ -100,27 +100,27 @@ fn root(
 /// Solves in batches until every action has a gait or a failed solve. Returns whether it got there.
 fn solve_all(
     family: &Family,
-    assignment: &mut Assignment,
+    map: &mut GaitMap,
     progress: &mut ProgressFile,
     workers: usize,
-    observer: &mut dyn FnMut(&Assignment),
+    observer: &mut dyn FnMut(&GaitMap),
     cancel: &CancelToken,
 ) -> Result<bool, Error> {
     loop {
-        observer(assignment);
-        let batch = assignment.next_batch(BATCH);
+        observer(map);
+        let batch = map.next_batch(BATCH);
         if batch.is_empty() {
             return Ok(true);
         }
         let known = progress.take(&batch);
         let missing: Vec<ActionIndex> = batch[known.len()..].to_vec();
-        let solved = solve_batch(family, assignment, &missing, workers, cancel)?;
+        let solved = solve_batch(family, map, &missing, workers, cancel)?;
         if cancel.is_cancelled() {
             return Ok(false);
         }
         progress.append(&solved)?;
         for solved in known.into_iter().chain(solved) {
-            assignment.add(solved);
+            map.add(solved);
         }
     }
 }
@@ -128,12 +128,12 @@ fn solve_all(
 /// The solves of a batch, in its order.
 fn solve_batch(
     family: &Family,
-    assignment: &Assignment,
+    map: &GaitMap,
     batch: &[ActionIndex],
     workers: usize,
     cancel: &CancelToken,
 ) -> Result<Vec<SolvedAction>, Error> {
-    let bounds = batch.iter().map(|action| assignment.bounds_of(family.problem.bounds, *action));
+    let bounds = batch.iter().map(|action| map.bounds_of(family.problem.bounds, *action));
     let bounds: Vec<TunedBounds> = bounds.collect::<Result<_, _>>()?;
     let next = AtomicUsize::new(0);
     let solved: Vec<Mutex<Option<Result<SolvedAction, Error>>>> = batch.iter().map(|_| Mutex::new(None)).collect();

@@ -1,31 +1,31 @@
 //! Which gait each action has: that of its own solve, or one that another action shares with it.
 
 use super::solved_action::SolvedAction;
-use crate::studies::equal_actions::levels_of;
+use crate::studies::equal_actions::levels_with_gait;
 use crate::studies::search_space;
 use gait_learner::{ActionIndex, SearchSpace};
 use gait_optimizer::{ModelError, TunedBounds};
 
 /// The solves so far, and the solve of each action.
 #[derive(Debug)]
-pub struct Assignment {
+pub struct GaitMap {
     space: SearchSpace,
     solves: Vec<SolvedAction>,
     /// For each action, its place in `solves`.
     solve_of: Vec<Option<usize>>,
-    /// Number of actions that were visited in the order of [`Assignment::nth`].
+    /// Number of actions that were visited in the order of [`GaitMap::nth`].
     visited: usize,
     stride: usize,
 }
 
-impl Assignment {
+impl GaitMap {
     /// With the root gait, which has a solve already.
     pub(super) fn new(space: SearchSpace, root: SolvedAction) -> Self {
         let actions = usize::try_from(space.len()).unwrap_or(usize::MAX);
-        let mut assignment =
+        let mut map =
             Self { space, solves: Vec::new(), solve_of: vec![None; actions], visited: 0, stride: stride(actions) };
-        assignment.add(root);
-        assignment
+        map.add(root);
+        map
     }
 
     /// The names of the bounds, in the order of the values of an action.
@@ -85,15 +85,10 @@ impl Assignment {
     /// Adds a solve. Its gait is that of all actions in its box that have none, or whose own solve found none.
     pub(super) fn add(&mut self, solved: SolvedAction) {
         let place = self.solves.len();
-        let own = self.space.levels(solved.action);
         let actions = match &solved.gait {
             None => vec![solved.action],
             Some(gait) => {
-                let levels = self.space.dimensions().iter().zip(own).map(|(dimension, own)| {
-                    let bound = gait.unchanged_bounds.iter().find(|bound| bound.bound == dimension.name);
-                    bound.map_or(own..own + 1, |bound| levels_of(bound, dimension, own))
-                });
-                actions_in(&self.space, &levels.collect::<Vec<_>>())
+                actions_in(&self.space, &levels_with_gait(&self.space, solved.action, &gait.unchanged_bounds))
             }
         };
         let has_gait = solved.gait.is_some();
@@ -109,15 +104,10 @@ impl Assignment {
         }
     }
 
-    /// How far it is, as in `804 gaits from 810 solves; 6 of 11664 actions without a gait`.
+    /// How many actions have a gait, as in `289 solves: 11660 of 11664 actions have a gait`.
     pub fn in_words(&self) -> String {
-        let gaits = self.solves.iter().filter(|solved| solved.gait.is_some()).count();
-        let without = self.solve_of.iter().flatten().filter(|place| self.solves[**place].gait.is_none()).count();
-        format!(
-            "{gaits} gaits from {} solves; {without} of {} actions without a gait",
-            self.solves.len(),
-            self.actions()
-        )
+        let found = self.solve_of.iter().flatten().filter(|place| self.solves[**place].gait.is_some()).count();
+        format!("{} solves: {found} of {} actions have a gait", self.solves.len(), self.actions())
     }
 }
 
@@ -186,7 +176,7 @@ mod tests {
     #[test]
     fn actions_in_the_box_of_a_gait_are_not_solved() {
         let space = search_space::table_i().unwrap();
-        let mut atlas = Assignment::new(space.clone(), solved(&space, 0, &["a1", "a3", "a8"], true));
+        let mut atlas = GaitMap::new(space.clone(), solved(&space, 0, &["a1", "a3", "a8"], true));
         assert_eq!(atlas.assigned(), 2 * 3 * 3);
         let mut solves = 1;
         loop {
@@ -207,7 +197,7 @@ mod tests {
     #[test]
     fn gait_of_another_action_replaces_a_solve_without_a_gait() {
         let space = search_space::table_i().unwrap();
-        let mut atlas = Assignment::new(space.clone(), solved(&space, 5, &[], true));
+        let mut atlas = GaitMap::new(space.clone(), solved(&space, 5, &[], true));
         atlas.add(solved(&space, 0, &[], false));
         assert_eq!(atlas.solve_of[0], Some(1));
         atlas.add(solved(&space, 1, &["a8"], true));
