@@ -118,8 +118,8 @@ create table studies (
     base_bounds          text not null constraint studies_base_bounds_json check (json_valid(base_bounds)),
     search_space         text not null constraint studies_search_space_json check (json_valid(search_space)),
     learner              text not null constraint studies_learner_json check (json_valid(learner)),
-    feedback_mode        text not null
-                         constraint studies_feedback_mode check (feedback_mode in ('automatic', 'human', 'mixed')),
+    answer_source        text not null
+                         constraint studies_answer_source check (answer_source in ('gait_rmse', 'people', 'both')),
     -- What evaluates trials.
     evaluation           text not null default 'optimizer'
                          constraint studies_evaluation check (evaluation in ('optimizer', 'script')),

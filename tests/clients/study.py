@@ -33,7 +33,7 @@ from gaitwright_client.models import (
     Dimension,
     DimensionName,
     Evaluation,
-    FeedbackMode,
+    AnswerSource,
     Job,
     JobState,
     MilestonePage,
@@ -147,7 +147,7 @@ def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
             Dimension(name=DimensionName.A6, values=[0.05, 0.1, 0.15, 0.2], lengthscale=0.05),
         ]
     )
-    new = NewStudy(subject_id=subject, feedback_mode=FeedbackMode.HUMAN, search_space=space, trial_budget=4)
+    new = NewStudy(subject_id=subject, answer_source=AnswerSource.PEOPLE, search_space=space, trial_budget=4)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new)).id
     compared = 1
     while wait_until(client, study, StudyState.WAITING, StudyState.FINISHED) == StudyState.WAITING:

@@ -107,7 +107,7 @@ async function byAPerson(subject_id: string): Promise<void> {
       { name: "a6", values: [0.05, 0.1, 0.15, 0.2], lengthscale: 0.05 },
     ],
   };
-  const body = { subject_id, search_space, feedback_mode: "human" as const, trial_budget: 4 };
+  const body = { subject_id, search_space, answer_source: "people" as const, trial_budget: 4 };
   const { id } = created("studies", await client.POST("/api/v1/studies", { body }));
   const params = { path: { id } };
   let compared = 1;

@@ -10,7 +10,7 @@
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright_service::studies::same_motion::is_same_gait;
 use gaitwright_service::workers::{Assignment, Evaluate, GaitSolver};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
@@ -100,8 +100,8 @@ async fn main() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
-    let mixed = FeedbackMode::Mixed;
-    let study = service.study(|new| (new.trial_budget, new.muscles, new.feedback_mode) = (15, true, mixed)).await;
+    let mixed = AnswerSource::Both;
+    let study = service.study(|new| (new.trial_budget, new.muscles, new.answer_source) = (15, true, mixed)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut gaits: Vec<Trial> = Vec::new();
     for trial in service.trials(study).await {

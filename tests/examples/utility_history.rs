@@ -8,7 +8,7 @@
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::StudyId;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::users::answer_once;
@@ -21,7 +21,7 @@ async fn main() {
     for answers in if given.is_empty() { vec![30, 200] } else { given } {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (390, FeedbackMode::Human)).await;
+        let study = service.study(|new| (new.trial_budget, new.answer_source) = (390, AnswerSource::People)).await;
         for _ in 0..answers {
             answer_once(&service, study).await;
         }

@@ -5,7 +5,7 @@ use crate::service::Service;
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gaitwright_store::commit;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -21,7 +21,7 @@ pub async fn filled() -> (TempDir, PathBuf) {
 /// Writes a record with a row in every table.
 pub async fn fill(database: &Path) {
     let service = Service::start(database, Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());

@@ -10,7 +10,7 @@ use gaitwright_service::access::{Right, Role, secret, user_administration};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::commit;
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{As, FORM, member, send, service, session_of, signed_in, token, user};
 use gaitwright_tests::page_routes;
@@ -215,7 +215,7 @@ fn form_of(fields: &[(String, String)]) -> String {
 #[tokio::test]
 async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     let (_folder, mut service) = service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 3)).await;
+    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 3)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, _) = user(&service, "R1", Role::Rater).await;
     member(&service, study, MemberKind::User, "R1").await;

@@ -8,7 +8,7 @@ use gaitwright_http::openapi;
 use gaitwright_service::access::{Right, Role};
 use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, studies};
 use gaitwright_tests::callers::{As, FORM, member, rater_of, send, service, signed_in, token};
@@ -49,7 +49,7 @@ async fn get(service: &Service, who: &As, path: &str) -> Answer {
 
 /// A study that asks people, with its first question.
 async fn waiting(service: &Service, trials: u32) -> StudyId {
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, trials)).await;
+    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, trials)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     study
 }

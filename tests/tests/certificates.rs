@@ -7,7 +7,7 @@ use axum::http::StatusCode;
 use gait_optimizer::Mesh;
 use gait_optimizer::export::ControllerFile;
 use gaitwright_service::workers::{GaitCertifier, GaitSolver};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, events};
 use gaitwright_tests::cli;
@@ -126,7 +126,7 @@ async fn trial_is_certified_once() {
     let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
     let study = service
         .study(|new| {
-            new.feedback_mode = FeedbackMode::Human;
+            new.answer_source = AnswerSource::People;
             new.muscles = false;
             new.trial_budget = 1;
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };

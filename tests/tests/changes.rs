@@ -11,7 +11,7 @@ use gaitwright_service::access::Role;
 use gaitwright_service::studies::search_space;
 use gaitwright_store::audit::{self, ChainCheck};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, TrialId, feedback};
 use gaitwright_tests::analytic::Analytic;
@@ -69,7 +69,7 @@ impl Scene {
         service.wait_for(finished, &[StudyState::Finished]).await;
         let draft = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
         let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 9)).await;
-        let human = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 4)).await;
+        let human = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 4)).await;
         service.wait_for(human, &[StudyState::Waiting]).await;
         Self { service, finished, draft, script, human }
     }
@@ -309,7 +309,7 @@ async fn form_rest_and_unattended_run_write_the_same_rows_for_the_same_answers()
     let feedback_rows = service.feedback(automatic).await;
     let expected = essence(&service.trials(automatic).await, &feedback_rows);
     for by_form in [false, true] {
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+        let study = service.study(|new| (new.trial_budget, new.answer_source) = (12, AnswerSource::People)).await;
         while service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await.state == StudyState::Waiting {
             let trials = service.trials(study).await;
             // Answers as Gait RMSE would: the question is the newest gait against the one the page offers.

@@ -6,7 +6,7 @@ use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gaitwright_http::openapi;
 use gaitwright_store::audit;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::cli;
@@ -48,7 +48,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let finished = service.study(|new| new.trial_budget = 3).await;
     service.wait_for(finished, &[StudyState::Finished]).await;
     let draft = service.study(|new| new.start = false).await;
-    let human = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let human = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{human}/blind-pairs/next"), &json!({})).await.json();
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();

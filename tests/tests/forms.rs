@@ -5,7 +5,7 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode};
 use gaitwright_service::access::Role;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId};
 use gaitwright_tests::analytic::Analytic;
@@ -130,7 +130,7 @@ async fn study_form_checks_every_field() {
             ("height_m", ""),
             ("body_mass_kg", ""),
             ("muscles", "off"),
-            ("feedback_mode", "automatic"),
+            ("answer_source", "gait_rmse"),
             ("trial_budget", "2"),
             ("parallel_trials", "1"),
             ("seed", "1"),
@@ -147,7 +147,7 @@ async fn study_form_checks_every_field() {
     for (field, value, says) in [
         ("muscles", "maybe", "must be on or off"),
         ("muscles", "", "must be on or off"),
-        ("feedback_mode", "both", "it must be automatic, human or mixed"),
+        ("answer_source", "mixed", "it must be gait_rmse, people or both"),
         ("trial_budget", "-1", "it must be 1 to 10000"),
         ("parallel_trials", "1.5", "it must be 1 to 64"),
         ("seed", "-1", "it must be 0 to 9007199254740991"),
@@ -237,7 +237,7 @@ async fn change_shows_its_own_comparison_and_replaces_the_answer() {
 #[tokio::test]
 async fn finished_study_waits_for_no_answer_after_a_retraction() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (3, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let converged: Vec<_> =
         service.trials(study).await.into_iter().filter(|trial| trial.state == TrialState::Converged).collect();
@@ -365,7 +365,7 @@ async fn comparison_page_shows_both_gaits_and_keeps_the_input() {
 #[tokio::test]
 async fn study_without_answers_has_no_best_action() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(page.contains("No answers yet") && !page.contains("best action so far") && !page.contains(">best<"));
@@ -475,7 +475,7 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
         let rest = ["trial_budget=3", "seed=1", "tuned_a1=on", "values_a1=15,20", "tuned_a3=on"];
         let rest: Vec<&str> =
             rest.into_iter().filter(|field| !given.starts_with(field.split_once('=').unwrap().0)).collect();
-        format!("{changed}&subject={subject}&muscles=on&feedback_mode=automatic&parallel_trials=1&{}", rest.join("&"))
+        format!("{changed}&subject={subject}&muscles=on&answer_source=gait_rmse&parallel_trials=1&{}", rest.join("&"))
     };
     for (changed, field, said) in [
         ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5; it must be 0.05 to 50000"),
@@ -663,7 +663,7 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
 }
 
 /// The fields of the form for a new study, without subject.
-const STUDY: &str = "muscles=off&feedback_mode=human&parallel_trials=1&tuned_a5=on&device=&reference_gait=";
+const STUDY: &str = "muscles=off&answer_source=people&parallel_trials=1&tuned_a5=on&device=&reference_gait=";
 
 /// The study that a redirect leads to.
 #[track_caller]
@@ -690,7 +690,8 @@ async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
     ] {
         assert!(refused.text.contains(says), "{says}: {}", refused.text);
     }
-    for kept in ["value=\"human\" checked", "value=\"173\" inputmode=\"decimal\"", "value=\"65,7\"", "value=\"0,high\""]
+    for kept in
+        ["value=\"people\" checked", "value=\"173\" inputmode=\"decimal\"", "value=\"65,7\"", "value=\"0,high\""]
     {
         assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
     }
@@ -772,7 +773,7 @@ async fn study_is_renamed_tagged_found_and_archived() {
 #[tokio::test]
 async fn running_study_cannot_be_archived() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let refused = service.post_text(&format!("/studies/{study}/details"), FORM, "button=archive").await;
     is_page(&refused, StatusCode::CONFLICT, "A study that has not ended cannot be archived");

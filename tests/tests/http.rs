@@ -5,7 +5,7 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::TunedBounds;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, events};
 use gaitwright_tests::analytic::Analytic;
@@ -262,7 +262,7 @@ async fn preferences_are_created_read_and_retracted() {
 #[tokio::test]
 async fn study_with_human_answers_waits_for_each_and_page_and_rest_have_the_same_effect() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (4, AnswerSource::People)).await;
     let mut through_form = false;
     loop {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
@@ -397,7 +397,7 @@ async fn refused_study_form_is_shown_again_with_its_errors() {
     let (_folder, service) = service().await;
     let form = |height: &str, trials: &str| {
         format!(
-            "subject=new&pseudonym=S07&height_m={height}&body_mass_kg=70&muscles=on&feedback_mode=automatic\
+            "subject=new&pseudonym=S07&height_m={height}&body_mass_kg=70&muscles=on&answer_source=gait_rmse\
              &trial_budget={trials}&parallel_trials=1&seed=1&name="
         )
     };

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{FeedbackId, StudyId, TrialId, lab_sessions};
 use gaitwright_tests::callers::FORM;
@@ -45,7 +45,7 @@ async fn clear(service: &Service, gait: &str) {
 
 /// A study that waits for the answer to a pair, and the address of the pair.
 async fn pair(service: &Service) -> (StudyId, String) {
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     (study, pair["pair"]["token"].as_str().unwrap().to_owned())
@@ -118,7 +118,7 @@ async fn repeated_report_counts_once_until_staff_clear_the_gait() {
 #[tokio::test]
 async fn comparison_form_reports_a_gait_after_another_answer() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let trials = converged(&service, study).await;
     let [a, b] = [trials[0].id, trials[1].id];

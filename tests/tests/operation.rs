@@ -10,7 +10,7 @@ use gaitwright_service::studies::pruning::prune;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, certificates, commit, explanations, gaits, members, read_only, studies};
 use gaitwright_tests::analytic::Analytic;
@@ -40,7 +40,7 @@ async fn posterior(service: &Service, study: gaitwright_store::StudyId) -> Vec<(
 async fn exported_study_gives_the_same_posterior_in_another_record() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (12, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let converged: Vec<_> =

@@ -8,7 +8,7 @@ use axum::body::Body;
 use axum::http::{Request, StatusCode, header};
 use gaitwright_http::openapi;
 use gaitwright_service::studies::study_plan::NewStudy;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::{StudyId, SubjectId, TrialId};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::bodies_from_schema::Drawn;
@@ -47,7 +47,7 @@ impl Scene {
     async fn set() -> (TempDir, Self) {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let finished = service.study(|new| (new.trial_budget, new.feedback_mode) = (18, FeedbackMode::Mixed)).await;
+        let finished = service.study(|new| (new.trial_budget, new.answer_source) = (18, AnswerSource::Both)).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
         // Another subject, so that safety reports there do not affect gaits here.
         let own = service.subject().await;
@@ -55,7 +55,7 @@ impl Scene {
         let ids = subjects.as_array().unwrap().iter().map(|subject| subject["id"].as_str().unwrap().parse().unwrap());
         let other: SubjectId = ids.into_iter().find(|id| *id != own).unwrap();
         let of_another = |new: &mut NewStudy| {
-            (new.subject_id, new.trial_budget, new.feedback_mode) = (other, 40, FeedbackMode::Human);
+            (new.subject_id, new.trial_budget, new.answer_source) = (other, 40, AnswerSource::People);
         };
         let human = service.study(of_another).await;
         service.wait_for(human, &[StudyState::Waiting]).await;

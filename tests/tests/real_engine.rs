@@ -11,7 +11,7 @@ use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
 use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Evaluate, GaitSolver};
-use gaitwright_store::studies::{FeedbackMode, StudyFilter, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
 use gaitwright_tests::analytic::Analytic;
@@ -327,7 +327,7 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
 async fn tune_continues_an_interrupted_study_and_ignores_studies_of_another_kind() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("gaitwright.db");
-    let of_people = study_in(&database, |new| new.feedback_mode = FeedbackMode::Human).await;
+    let of_people = study_in(&database, |new| new.answer_source = AnswerSource::People).await;
     let coarser = study_in(&database, |new| new.gait_settings.mesh.ss2 += 1).await;
     let shorter = study_in(&database, |new| new.solve_options.max_iterations = 7).await;
     let tighter = study_in(&database, |new| new.base_bounds.a1 = 19.0).await;

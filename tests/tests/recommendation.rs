@@ -15,7 +15,7 @@ use gaitwright_service::studies::utility_history::UtilityPoint;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::feedback::Source;
 use gaitwright_store::gaits;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId, certificates, commit};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
@@ -246,7 +246,7 @@ async fn utility_history(service: &Service, study: StudyId, beliefs: &Arc<Belief
 async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (12, AnswerSource::People)).await;
     let beliefs = Arc::new(Beliefs::default());
     for answers in 0..5 {
         users::asked(&service, study).await;
@@ -288,7 +288,7 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let plan = |new: &mut NewStudy| {
-        (new.trial_budget, new.feedback_mode, new.repeat_results) = (6, FeedbackMode::Mixed, Some(true));
+        (new.trial_budget, new.answer_source, new.repeat_results) = (6, AnswerSource::Both, Some(true));
         new.search_space = Some(inactive_bound().into());
     };
     let study = service.study(plan).await;

@@ -244,7 +244,7 @@ async fn import_does_not_change_the_reference_gait_of_new_studies() {
     let (_folder, service) = service().await;
     let near = service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json();
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await.json();
-    let form = "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on";
+    let form = "muscles=on&answer_source=gait_rmse&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on";
     let kind = "application/x-www-form-urlencoded";
     let known = format!("{form}&subject={}&reference_gait=", service.subject().await);
     let tall = format!("{form}&subject=new&pseudonym=S09&height_m=1.98&body_mass_kg=66&reference_gait=");

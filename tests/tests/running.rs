@@ -327,7 +327,7 @@ async fn study_form_is_checked_while_another_change_holds_the_writer() {
         [(described, true), ("subject=new&pseudonym=paper-1&height_m=1.8&body_mass_kg=70", false)]
     {
         let form =
-            "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=";
+            "muscles=on&answer_source=gait_rmse&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=";
         let body = format!("{form}&{subject}");
         let asked = service.post_text("/studies/new/check", "application/x-www-form-urlencoded", &body);
         let answer = tokio::time::timeout(Duration::from_secs(5), asked).await.expect("it waits for the writer");

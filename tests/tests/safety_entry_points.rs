@@ -11,7 +11,7 @@ use gaitwright_service::studies::lab;
 use gaitwright_service::studies::safety_report::{self, NewSafetyReport};
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{DeviceId, StudyId, TokenId, commit};
 use gaitwright_tests::callers::FORM;
@@ -270,7 +270,7 @@ async fn report_stops_a_controller_file_that_waits_for_the_access_log() {
 #[tokio::test]
 async fn pair_is_no_longer_shown_to_its_rater_after_a_report() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let token = pair["pair"]["token"].as_str().unwrap();

@@ -7,7 +7,7 @@ use axum::http::{Method, Request, StatusCode, header};
 use gait_learner::Partner;
 use gaitwright_store::StudyId;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::service::{Answer, Service};
@@ -213,7 +213,7 @@ async fn people_compare_trials_of_a_lab_script() {
     let (_folder, service) = service().await;
     let study = service
         .study(|new| {
-            (new.evaluation, new.feedback_mode, new.trial_budget) = (Evaluation::Script, FeedbackMode::Human, 4);
+            (new.evaluation, new.answer_source, new.trial_budget) = (Evaluation::Script, AnswerSource::People, 4);
         })
         .await;
     let ask = format!("/api/v1/studies/{study}/ask");

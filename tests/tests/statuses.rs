@@ -8,7 +8,7 @@
 use axum::body::Body;
 use axum::http::Request;
 use gaitwright_http::openapi;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
@@ -27,7 +27,7 @@ impl Scene {
     async fn set() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Mixed)).await;
+        let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::Both)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let mut trials = service.trials(study).await;
         trials.retain(|trial| trial.state == TrialState::Converged);

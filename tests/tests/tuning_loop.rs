@@ -9,7 +9,7 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::workers::{Attempt, InProcess};
 use gaitwright_store::feedback::{FeedbackContent, Source};
-use gaitwright_store::studies::{FeedbackMode, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, StudyState, WarmStartFrom};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, trials};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
@@ -404,7 +404,7 @@ async fn equal_gaits_are_never_offered_for_comparison() {
         .study(|new| {
             new.search_space = Some(inactive_bound().into());
             new.learner = LearnerSettings { partner: Partner::Previous, buffer: 1, ..LearnerSettings::default() };
-            (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human);
+            (new.trial_budget, new.answer_source) = (3, AnswerSource::People);
         })
         .await;
     service.wait_for(study, &[StudyState::Waiting]).await;

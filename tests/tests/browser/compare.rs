@@ -4,7 +4,7 @@ use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::StudyId;
 use gaitwright_store::feedback::FeedbackRow;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use std::time::Duration;
 const NEEDED: &str = "h1, details.person summary, .motions svg.gait-figure, .motions .answer, .extras summary";
 
 async fn waiting(site: &Site, trials: u32) -> StudyId {
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (trials, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (trials, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     study
 }

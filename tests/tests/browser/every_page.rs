@@ -6,7 +6,7 @@ use crate::site::Site;
 use axum::http::StatusCode;
 use gait_learner::{Dimension, SearchSpace};
 use gait_optimizer::SolveStatus;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId, commit, explanations};
 use gaitwright_tests::analytic::Analytic;
@@ -74,8 +74,8 @@ async fn withdrawn(site: &Site) -> (String, StudyId) {
 async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let study = site.service.study(|new| (new.trial_budget, new.name) = (24, Some(LONG_WORD.to_owned()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let human = (4, FeedbackMode::Human, Some(LONG_NAME.to_owned()));
-    let other = site.service.study(|new| (new.trial_budget, new.feedback_mode, new.name) = human).await;
+    let human = (4, AnswerSource::People, Some(LONG_NAME.to_owned()));
+    let other = site.service.study(|new| (new.trial_budget, new.answer_source, new.name) = human).await;
     site.service.wait_for(other, &[StudyState::Waiting]).await;
     let trials = site.service.trials(study).await;
     let of = |state| trials.iter().find(|trial| trial.state == state).map(|trial| trial.id);

@@ -2,7 +2,7 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
 use gaitwright_tests::users;
@@ -133,7 +133,7 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
 async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over_the_answers() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (12, AnswerSource::People)).await;
     for _ in 0..4 {
         users::answer_once(&site.service, study).await;
     }
@@ -354,7 +354,7 @@ async fn browser_checks_the_new_study_form_during_input() {
 async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
 
     // The home page has the queue.
@@ -491,7 +491,7 @@ async fn browser_shows_the_values_at_the_pointer() {
 async fn browser_reports_lost_and_restored_connection() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     let site = site
@@ -521,7 +521,7 @@ async fn browser_reports_lost_and_restored_connection() {
 async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let at = site.at(&format!("/studies/{study}/compare"));
     let page = browser.open(&at).await;
@@ -554,7 +554,7 @@ async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
 async fn browser_does_not_offer_an_answered_comparison_as_the_next_one() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (4, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let at = site.at(&format!("/studies/{study}/compare"));
     let (one, other) = (browser.open(&at).await, browser.open(&at).await);

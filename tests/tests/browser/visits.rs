@@ -3,7 +3,7 @@
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::StudyId;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{Clearance, without_gaits};
@@ -102,7 +102,7 @@ async fn browser_reaches_a_running_study_and_its_comparison_in_few_presses() {
     visit.ends_at("[data-part=state]", "of 400 trials", 1).await;
     site.service.post(&format!("/api/v1/studies/{running}/stop"), &json!({})).await;
 
-    let asking = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let asking = site.service.study(|new| (new.trial_budget, new.answer_source) = (4, AnswerSource::People)).await;
     site.service.wait_for(asking, &[StudyState::Waiting]).await;
     // Who answers is asked once.
     let mut visit = Visit::begin(&browser, &site, "answer the comparison that waits").await;

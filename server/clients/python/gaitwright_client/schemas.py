@@ -54,9 +54,9 @@ Evaluation = Literal["optimizer", "script"]
 # Identifier of an entry of the feedback of a study.
 FeedbackId = str
 
-# Who answers comparisons: `automatic`, Gait RMSE answers every comparison; `human`, people answer, and the study waits
-# for them; `mixed`, Gait RMSE answers, and people can add answers.
-FeedbackMode = Literal["automatic", "human", "mixed"]
+# Who answers comparisons: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study waits
+# for them; `both`, Gait RMSE answers, and people can add answers.
+AnswerSource = Literal["gait_rmse", "people", "both"]
 
 # The direction of a force: `x` forwards, `z` upwards.
 ForceAxis = Literal["x", "z"]
@@ -2208,7 +2208,7 @@ class NewStudy(_NewStudyRequired, total=False):
     # What evaluates trials.
     evaluation: Evaluation
     # Who answers comparisons.
-    feedback_mode: FeedbackMode
+    answer_source: AnswerSource
     # Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     gait_settings: GaitSettings
     # Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
@@ -3033,7 +3033,7 @@ class _StudyPlanRequired(TypedDict):
     # What evaluates trials.
     evaluation: Evaluation
     # Who answers comparisons.
-    feedback_mode: FeedbackMode
+    answer_source: AnswerSource
     # Settings of the gait problem.
     gait_settings: GaitSettings
     # Settings of the learner.
@@ -3114,7 +3114,7 @@ class StudyClone(TypedDict, total=False):
     """A new study with the set-up of another one. Absent fields are copied."""
 
     # Who answers comparisons.
-    feedback_mode: Optional[FeedbackMode]
+    answer_source: Optional[AnswerSource]
     # Whether to solve with muscles.
     muscles: Optional[bool]
     # Name shown to users.

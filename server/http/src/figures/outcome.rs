@@ -8,7 +8,7 @@ use gaitwright_service::studies::pending_comparison::{Question, awaited_question
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::{last_believed, ranking_to_show};
 use gaitwright_store::TrialId;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 
 /// What a study has found.
 #[derive(Default)]
@@ -45,9 +45,9 @@ impl StudyOutcome {
             let question = snapshot.study.state == StudyState::Waiting;
             return Ok(Self { best, ranking, history, question, ..Self::default() });
         }
-        let open = match snapshot.study.plan.feedback_mode {
-            FeedbackMode::Automatic => Question::None,
-            FeedbackMode::Human | FeedbackMode::Mixed => awaited_question(pool, snapshot)?,
+        let open = match snapshot.study.plan.answer_source {
+            AnswerSource::GaitRmse => Question::None,
+            AnswerSource::People | AnswerSource::Both => awaited_question(pool, snapshot)?,
         };
         let question = open.trials().is_some();
         let question_after = match open {

@@ -5,7 +5,7 @@ use gait_learner::LearnerError;
 use gaitwright_charts::{Chart, Figure, Parallel, ParallelAxis, ParallelLine, PointLink};
 use gaitwright_service::studies::belief::Belief;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::{Trial, TrialState};
 
 /// How many of the newest trials are drawn, so that the page stays light.
@@ -20,9 +20,9 @@ pub(crate) enum TrialMeasure {
 
 impl TrialMeasure {
     pub(crate) fn of(snapshot: &StudySnapshot) -> Self {
-        match snapshot.study.plan.feedback_mode {
-            FeedbackMode::Automatic => Self::GaitRmse,
-            FeedbackMode::Human | FeedbackMode::Mixed => Self::Utility,
+        match snapshot.study.plan.answer_source {
+            AnswerSource::GaitRmse => Self::GaitRmse,
+            AnswerSource::People | AnswerSource::Both => Self::Utility,
         }
     }
 

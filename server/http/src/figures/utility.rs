@@ -6,7 +6,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::studies::belief::Beliefs;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::utility_history::UtilityPoint;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 
 /// The chart of a study in which people answer; `None` before the second answer. Not for a large study, whose snapshot has the
 /// newest trials only.
@@ -18,7 +18,7 @@ pub(crate) fn utility(
     snapshot: &StudySnapshot,
     beliefs: &Beliefs,
 ) -> Result<Option<Figure>, LearnerError> {
-    if snapshot.study.plan.feedback_mode == FeedbackMode::Automatic {
+    if snapshot.study.plan.answer_source == AnswerSource::GaitRmse {
         return Ok(None);
     }
     let points = beliefs.utility_history(pool, snapshot)?;

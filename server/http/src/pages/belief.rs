@@ -23,7 +23,7 @@ use gaitwright_service::studies::belief::{Belief, UnexpectedAnswer};
 use gaitwright_service::studies::gait_beliefs::{GaitBelief, is_distinguishable};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::{FeedbackMode, Study};
+use gaitwright_store::studies::{AnswerSource, Study};
 use gaitwright_store::{StudyId, TrialId, studies};
 use std::cmp::Ordering;
 
@@ -172,7 +172,7 @@ fn gait_row(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Gai
 
 /// What Gait RMSE says of a gait beside the recommended one. `None` if it does not answer the comparisons alone.
 fn worse(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Option<&'static str> {
-    if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
+    if snapshot.study.plan.answer_source != AnswerSource::GaitRmse {
         return None;
     }
     let rmse = |gait: &GaitBelief| snapshot.trial(*gait.trials.first()?)?.gait_rmse_rad;

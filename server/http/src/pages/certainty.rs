@@ -4,7 +4,7 @@ use crate::format::{figure, percent};
 use gaitwright_service::studies::belief::Belief;
 use gaitwright_service::studies::gait_beliefs::is_distinguishable;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::Trial;
 
 /// The sentence about the recommended gait. `None` without a recommendation.
@@ -12,9 +12,9 @@ pub(super) fn certainty(snapshot: &StudySnapshot, belief: &Belief) -> Option<Str
     if snapshot.waits_for_first_answer() {
         return None;
     }
-    match snapshot.study.plan.feedback_mode {
-        FeedbackMode::Automatic => measured(snapshot, belief),
-        FeedbackMode::Human | FeedbackMode::Mixed => believed(snapshot, belief),
+    match snapshot.study.plan.answer_source {
+        AnswerSource::GaitRmse => measured(snapshot, belief),
+        AnswerSource::People | AnswerSource::Both => believed(snapshot, belief),
     }
 }
 

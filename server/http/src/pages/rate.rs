@@ -19,7 +19,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::PairWithSides;
 use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
-use gaitwright_store::studies::{FeedbackMode, StudyFilter};
+use gaitwright_store::studies::{AnswerSource, StudyFilter};
 use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
 
@@ -186,7 +186,7 @@ pub(super) async fn list(
 async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlindAnswer>, Error> {
     let mut newest: Option<BlindPair> = None;
     for study in studies::page(db, caller.reach(), &StudyFilter::newest(SEARCHED)).await? {
-        if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
+        if study.plan.answer_source == AnswerSource::GaitRmse || consents::is_withdrawn(db, study.id).await? {
             continue;
         }
         let own = blind_pairs::of_study(db, study.id).await?.into_iter().filter(|shown| shown.rater == caller.name);

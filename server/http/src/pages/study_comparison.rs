@@ -133,7 +133,7 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
         ("Reference gait".to_owned(), study.reference_gait.clone()),
         ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
         ("Device".to_owned(), study.device.clone()),
-        ("Answered by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
+        ("Source of answers".to_owned(), format::answer_source(plan.answer_source).to_owned()),
         ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
         ("Seed".to_owned(), plan.seed.to_string()),
         ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.trial_budget)),

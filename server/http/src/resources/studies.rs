@@ -3,7 +3,7 @@
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use gaitwright_service::studies::study_plan_schemas;
-use gaitwright_store::studies::{self, Evaluation, FeedbackMode, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{self, AnswerSource, Evaluation, StudyState, WarmStartFrom};
 use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -100,7 +100,7 @@ pub(crate) struct StudyPlan {
     #[schema(value_type = study_plan_schemas::LearnerSettings)]
     learner: LearnerSettings,
     /// Who answers comparisons.
-    feedback_mode: FeedbackMode,
+    answer_source: AnswerSource,
     /// What evaluates trials.
     evaluation: Evaluation,
     /// Number of trials.
@@ -135,7 +135,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             base_bounds,
             search_space,
             learner,
-            feedback_mode,
+            answer_source,
             evaluation,
             trial_budget,
             solve_seconds_budget,
@@ -158,7 +158,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             base_bounds,
             search_space,
             learner,
-            feedback_mode,
+            answer_source,
             evaluation,
             trial_budget,
             solve_seconds_budget,

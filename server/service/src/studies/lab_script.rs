@@ -16,7 +16,7 @@ use crate::printable;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyState};
 use gaitwright_store::trials::{NewTrial, ScriptOutcome, Trial, TrialState};
 use gaitwright_store::{Connection, Store, StudyId, TrialId, Writer, events, studies, trials};
 use serde::{Deserialize, Serialize};
@@ -209,7 +209,7 @@ pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Resul
     let (TrialState::Converged, Some(rmse)) = (outcome.state, outcome.gait_rmse_rad) else {
         return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
     };
-    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
+    if snapshot.study.plan.answer_source == AnswerSource::People {
         return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
     }
     let find = move |pool: &OnPool| {
@@ -240,7 +240,7 @@ fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
         }
         Outcome::NotConverged => TrialState::NotConverged,
     };
-    let answered_by_rmse = study.plan.feedback_mode != FeedbackMode::Human;
+    let answered_by_rmse = study.plan.answer_source != AnswerSource::People;
     if state == TrialState::Converged && answered_by_rmse && tell.gait_rmse_rad.is_none() {
         let allowed = "a number, because Gait RMSE answers the comparisons of this study";
         return Err(Error::invalid("gait_rmse_rad", json!(null), allowed));

@@ -9,7 +9,7 @@ use crate::error::Error;
 use gait_learner::ActionIndex;
 use gaitwright_compute::OnPool;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{FeedbackId, now};
 use std::collections::HashSet;
@@ -27,7 +27,7 @@ pub(super) enum PlanningStep {
 /// Decides the next step from the snapshot alone; `beliefs` is a cache.
 pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<PlanningStep, Error> {
     let study = &snapshot.study;
-    if study.plan.feedback_mode == FeedbackMode::Human {
+    if study.plan.answer_source == AnswerSource::People {
         match (study.state, pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
             (StudyState::Running, Question::Pair(_)) => {
                 return Ok(PlanningStep::Transition(StudyTransition::Ask, "A comparison needs an answer.".into()));

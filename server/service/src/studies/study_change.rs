@@ -6,7 +6,7 @@ use super::study_plan;
 use crate::error::{Error, FieldError};
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{FeedbackMode, Study, StudyLimits, StudyState};
+use gaitwright_store::studies::{AnswerSource, Study, StudyLimits, StudyState};
 use gaitwright_store::{StudyId, Writer, events, members, now, studies};
 use serde::Deserialize;
 use serde_json::json;
@@ -199,7 +199,7 @@ pub struct StudyClone {
     pub muscles: Option<bool>,
     /// Who answers comparisons.
     #[serde(default)]
-    pub feedback_mode: Option<FeedbackMode>,
+    pub answer_source: Option<AnswerSource>,
     /// Whether to start the study immediately.
     #[serde(default)]
     pub start: bool,
@@ -216,7 +216,7 @@ pub async fn clone_study(writer: &mut Writer, actor: &Actor, id: StudyId, clone:
     new.seed = clone.seed.unwrap_or(new.seed);
     new.trial_budget = clone.trial_budget.unwrap_or(new.trial_budget);
     new.muscles = clone.muscles.unwrap_or(new.muscles);
-    new.feedback_mode = clone.feedback_mode.unwrap_or(new.feedback_mode);
+    new.answer_source = clone.answer_source.unwrap_or(new.answer_source);
     new.start = clone.start;
     let made = study_plan::create_from(writer, actor, new, Some(id)).await?;
     // The set-up of a restricted study stays visible to its members only.

@@ -9,7 +9,7 @@ use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
 use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyPlan, StudyState, WarmStartFrom};
 use gaitwright_store::{
     Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
     studies, subjects,
@@ -58,8 +58,8 @@ pub struct NewStudy {
     #[schema(value_type = study_plan_schemas::LearnerSettings)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
-    #[serde(default = "automatic")]
-    pub feedback_mode: FeedbackMode,
+    #[serde(default = "gait_rmse")]
+    pub answer_source: AnswerSource,
     /// What evaluates trials.
     #[serde(default = "optimizer")]
     pub evaluation: Evaluation,
@@ -101,8 +101,8 @@ pub struct NewStudy {
 fn yes() -> bool {
     true
 }
-fn automatic() -> FeedbackMode {
-    FeedbackMode::Automatic
+fn gait_rmse() -> AnswerSource {
+    AnswerSource::GaitRmse
 }
 fn optimizer() -> Evaluation {
     Evaluation::Optimizer
@@ -134,7 +134,7 @@ impl NewStudy {
             base_bounds: TunedBounds::default(),
             search_space: None,
             learner: LearnerSettings::default(),
-            feedback_mode: FeedbackMode::Automatic,
+            answer_source: AnswerSource::GaitRmse,
             evaluation: Evaluation::Optimizer,
             trial_budget: fifteen(),
             solve_seconds_budget: None,
@@ -164,7 +164,7 @@ impl NewStudy {
             base_bounds: plan.base_bounds,
             search_space: Some(plan.search_space.clone().into()),
             learner: plan.learner.clone(),
-            feedback_mode: plan.feedback_mode,
+            answer_source: plan.answer_source,
             evaluation: plan.evaluation,
             trial_budget: plan.trial_budget,
             solve_seconds_budget: plan.solve_seconds_budget,
@@ -319,7 +319,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
         solve_options: new.solve_options,
         base_bounds: new.base_bounds,
         search_space,
-        feedback_mode: new.feedback_mode,
+        answer_source: new.answer_source,
         evaluation: new.evaluation,
         trial_budget: new.trial_budget,
         solve_seconds_budget: new.solve_seconds_budget,

@@ -87,7 +87,7 @@ pub async fn is_named(db: &mut Connection, reach: Reach, name: &str, except: Opt
 pub async fn awaiting_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = reach_values(reach);
     let sql = concat!(
-        "select * from studies where state in ('running', 'waiting') and feedback_mode <> 'automatic' and ",
+        "select * from studies where state in ('running', 'waiting') and answer_source <> 'gait_rmse' and ",
         reached!("id"),
         " order by priority desc, id"
     );

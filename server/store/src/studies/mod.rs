@@ -8,7 +8,7 @@ pub use lists::{
     StudyFilter, active, awaiting_raters, ended_before, is_named, of_subject, of_subject_with_safety_reports, open_of,
     page, tags, waiting_for_people, with_safety_reports,
 };
-pub use plan::{Evaluation, FeedbackMode, StudyPlan, WarmStartFrom};
+pub use plan::{AnswerSource, Evaluation, StudyPlan, WarmStartFrom};
 pub use state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
@@ -58,7 +58,7 @@ pub async fn insert(
     let id = StudyId::fresh();
     sqlx::query(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
-         solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
+         solve_options, base_bounds, search_space, learner, answer_source, trial_budget, parallel_trials, priority, \
          seed, state, evaluation, solve_seconds_budget, unchanged_limit, cloned_from, created_at, updated_at, \
          height_m, body_mass_kg, repeat_results, warm_start_from) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
@@ -73,7 +73,7 @@ pub async fn insert(
     .bind(json_columns::to_text("base bounds", &plan.base_bounds)?)
     .bind(json_columns::to_text("search space", &plan.search_space)?)
     .bind(json_columns::to_text("learner settings", &plan.learner)?)
-    .bind(plan.feedback_mode.as_str())
+    .bind(plan.answer_source.as_str())
     .bind(plan.trial_budget)
     .bind(plan.parallel_trials)
     .bind(plan.priority)
@@ -204,7 +204,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             base_bounds: json_columns::column(row, "base_bounds")?,
             search_space: json_columns::column(row, "search_space")?,
             learner: json_columns::column(row, "learner")?,
-            feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
+            answer_source: row.try_get::<&str, _>("answer_source")?.parse()?,
             evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
             trial_budget: row.try_get("trial_budget")?,
             solve_seconds_budget: row.try_get("solve_seconds_budget")?,

@@ -69,7 +69,7 @@ class StudiesMethods(Transport):
 
         Starts the study, unless `start` is false.
 
-        Fields: subject_id; optionally base_bounds, device_id, evaluation, feedback_mode, gait_settings, learner,
+        Fields: subject_id; optionally base_bounds, device_id, evaluation, answer_source, gait_settings, learner,
         muscles, name, parallel_trials, priority, reference_gait_id, repeat_results, restricted, search_space, seed,
         solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit, warm_start_from.
         """
@@ -127,7 +127,7 @@ class StudiesMethods(Transport):
 
         Creates a study with the same set-up, without the trials.
 
-        Fields: optionally feedback_mode, muscles, name, seed, start, trial_budget.
+        Fields: optionally answer_source, muscles, name, seed, start, trial_budget.
         """
         return cast(
             StudyView,

@@ -27,7 +27,7 @@ use gaitwright_service::studies::safety_reports::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::workers::Track;
-use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::{AnswerSource, Study, StudyState};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
 use gaitwright_store::{Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, jobs, studies, trials};
 use std::sync::Arc;
@@ -344,7 +344,7 @@ fn view(
         certainty,
         walker: RecommendedGait::None,
         unanswered: outcome.unanswered,
-        people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
+        people_answer: snapshot.study.plan.answer_source == AnswerSource::People,
         utility: utility.map(|figure| PageChart::of(&figure, &files, "")),
         chart: course(&[(&snapshot, &outcome)]).map(|chart| PageChart::of(&Figure::chart(COURSE, chart), &files, "")),
         table,

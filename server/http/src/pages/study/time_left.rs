@@ -35,7 +35,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
     }
     let at_most = if study.plan.unchanged_limit.is_some() { "At most about" } else { "About" };
     let trials = if left == 1 { "1 trial".to_owned() } else { format!("{left} trials") };
-    let people = format::also_waits_for(study.plan.feedback_mode);
+    let people = format::also_waits_for(study.plan.answer_source);
     format!(
         "{at_most} {} left for {trials}{people}; half of the solves so far took less than {}.",
         format::duration(seconds),

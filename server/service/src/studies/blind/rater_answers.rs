@@ -16,7 +16,7 @@ use gaitwright_store::allocations::{self, PairWithSides, RandomDraw};
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind, NewBlindPair, NewPairAnswer, OrderedAnswer};
 use gaitwright_store::feedback::{self, Attribution, Source};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::{
     BorrowedWriter, Connection, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
 };
@@ -58,7 +58,7 @@ async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, 
     let study = studies::get(&mut db, study).await?;
     consents::may_be_shown(&mut db, study.id).await?;
     let study_id = study.id;
-    if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
+    if study.plan.answer_source == AnswerSource::GaitRmse || study.state == StudyState::Stopped {
         return Ok(None);
     }
     let snapshot = StudySnapshot::read(&mut db, study).await?;

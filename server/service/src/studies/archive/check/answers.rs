@@ -7,7 +7,7 @@ use crate::printable;
 use crate::studies::pending_comparison::by_gait_rmse;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::lab_sessions::LabSession;
-use gaitwright_store::studies::{FeedbackMode, Study};
+use gaitwright_store::studies::{AnswerSource, Study};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
     Connection, FeedbackId, Instant, SafetyReportId, TrialId, assessments, blind_pairs, feedback, safety_reports,
@@ -135,7 +135,7 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
             match row.source {
                 Source::Convergence => return Err("a preference cannot have the source convergence".to_owned()),
                 Source::GaitRmse => {
-                    if study.plan.feedback_mode == FeedbackMode::Human {
+                    if study.plan.answer_source == AnswerSource::People {
                         return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());
                     }
                     let (Some(one), Some(other)) = (a.gait_rmse_rad, b.gait_rmse_rad) else {
