@@ -123,7 +123,7 @@ create table studies (
     -- What evaluates trials.
     evaluation           text not null default 'optimizer'
                          constraint studies_evaluation check (evaluation in ('optimizer', 'script')),
-    trial_budget         integer not null constraint studies_trial_budget check (trial_budget between 1 and 10000),
+    number_of_trials         integer not null constraint studies_number_of_trials check (number_of_trials between 1 and 10000),
     -- Total solve time after which no new trial starts.
     solve_seconds_budget real
                          constraint studies_solve_seconds

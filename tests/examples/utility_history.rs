@@ -21,7 +21,7 @@ async fn main() {
     for answers in if given.is_empty() { vec![30, 200] } else { given } {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.answer_source) = (390, AnswerSource::People)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (390, AnswerSource::People)).await;
         for _ in 0..answers {
             answer_once(&service, study).await;
         }

@@ -21,7 +21,7 @@ pub async fn filled() -> (TempDir, PathBuf) {
 /// Writes a record with a row in every table.
 pub async fn fill(database: &Path) {
     let service = Service::start(database, Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.answer_source) = (4, AnswerSource::People)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());

@@ -215,7 +215,7 @@ fn form_of(fields: &[(String, String)]) -> String {
 #[tokio::test]
 async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     let (_folder, mut service) = service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 3)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 3)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, _) = user(&service, "R1", Role::Rater).await;
     member(&service, study, MemberKind::User, "R1").await;

@@ -46,7 +46,7 @@ fn is_chance(right: usize, of: usize) -> bool {
 }
 
 async fn finished(service: &Service) -> (StudyId, Vec<Trial>) {
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut trials = service.trials(study).await;
     trials.retain(|trial| trial.state == TrialState::Converged);
@@ -559,7 +559,7 @@ fn without_request(text: &str) -> String {
 async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() {
     let (folder, service) = callers::service().await;
     let (study, trials) = finished(&service).await;
-    let human = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 8)).await;
+    let human = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 8)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let rater = rater_of(&service, &[study, human]).await;
     let callers =
@@ -747,7 +747,7 @@ async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
 #[tokio::test]
 async fn answers_of_a_person_who_fetched_a_controller_file_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 8)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 8)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let program = token(&service, &[Right::Rate, Right::Device]).await;
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
@@ -788,7 +788,7 @@ async fn refused_controller_file_does_not_reveal_which_gait_is_unsafe() {
 #[tokio::test]
 async fn every_motion_for_a_rater_has_different_bytes() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 14)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 14)).await;
     let rater = rater_of(&service, &[study]).await;
     let mut motions: BTreeMap<TrialId, Vec<String>> = BTreeMap::new();
     let mut pictures: BTreeMap<TrialId, Vec<String>> = BTreeMap::new();

@@ -20,7 +20,7 @@ use tempfile::TempDir;
 async fn waiting(trials: u32) -> (TempDir, Service, StudyId) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, trials)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, trials)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     (folder, service, study)
 }
@@ -128,7 +128,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     // One pair in ten is a repeat, by chance: one study in sixty has none.
     let mut with_repeats = None;
     for _ in 0..8 {
-        let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 40)).await;
+        let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 40)).await;
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, "first").await;
         let shown = shown(&service, study).await;
@@ -170,7 +170,7 @@ async fn rater_answer_counts_for_the_gait_shown_on_its_side() {
     let rater = signed_in(&service, Role::Rater).await;
     let mut swapped = std::collections::BTreeSet::new();
     for answer in ["first", "second"] {
-        let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 20)).await;
+        let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 20)).await;
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, answer).await;
         let feedback = service.feedback(study).await;
@@ -213,7 +213,7 @@ impl Evaluate for Tall {
 async fn each_side_shows_the_gait_drawn_for_it() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Tall(Analytic::default()), 1).await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 24)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 24)).await;
     let mut orders = std::collections::BTreeSet::new();
     for _ in 0..4000 {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
@@ -245,7 +245,7 @@ async fn each_side_shows_the_gait_drawn_for_it() {
 #[tokio::test]
 async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 40)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 40)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let script = callers::token(&service, &[Right::Read, Right::Rate]).await;
@@ -278,7 +278,7 @@ async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() 
 #[tokio::test]
 async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.items();
@@ -304,7 +304,7 @@ async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
 #[tokio::test]
 async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let json_of = "application/json";
@@ -363,7 +363,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
 #[tokio::test]
 async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let post = async |who: &As, path: &str, body: Value| {
@@ -434,7 +434,7 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
 #[tokio::test]
 async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let rater = rater_of(&service, &[study]).await;
     let (admin, clinician) =

@@ -49,7 +49,7 @@ async fn get(service: &Service, who: &As, path: &str) -> Answer {
 
 /// A study that asks people, with its first question.
 async fn waiting(service: &Service, trials: u32) -> StudyId {
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, trials)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, trials)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     study
 }
@@ -89,7 +89,7 @@ fn addresses() -> Vec<(Method, String)> {
 #[tokio::test]
 async fn no_address_reveals_rated_gaits_to_a_rater() {
     let (_folder, service) = service().await;
-    let automatic = service.study(|new| (new.name, new.trial_budget) = (Some("stiff ankle".to_owned()), 12)).await;
+    let automatic = service.study(|new| (new.name, new.number_of_trials) = (Some("stiff ankle".to_owned()), 12)).await;
     service.wait_for(automatic, &[StudyState::Finished]).await;
     let study = waiting(&service, 6).await;
     let clinician = signed_in(&service, Role::Clinician).await;

@@ -128,7 +128,7 @@ async fn trial_is_certified_once() {
         .study(|new| {
             new.answer_source = AnswerSource::People;
             new.muscles = false;
-            new.trial_budget = 1;
+            new.number_of_trials = 1;
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
         })
         .await;
@@ -178,7 +178,7 @@ async fn trial_is_certified_once() {
 async fn one_trial(service: &Service) -> (StudyId, Trial) {
     let study = service
         .study(|new| {
-            (new.muscles, new.trial_budget) = (false, 1);
+            (new.muscles, new.number_of_trials) = (false, 1);
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
         })
         .await;
@@ -311,7 +311,7 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
 async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
-    let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 2)).await;
+    let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 2)).await;
     for outcome in
         [json!({"outcome": "converged", "gait_rmse_rad": 0.2}), json!({"outcome": "not_converged", "reason": "r"})]
     {
@@ -379,7 +379,7 @@ async fn command_line_repeats_the_solve_of_a_trial_bit_for_bit() {
     let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
     let study = service
         .study(|new| {
-            (new.muscles, new.trial_budget) = (false, 2);
+            (new.muscles, new.number_of_trials) = (false, 2);
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
         })
         .await;

@@ -42,7 +42,7 @@ const ELSEWHERE: [&str; 21] = [
     "signed_by",
     "to_device",
     "trajectories",
-    "trial_budget",
+    "number_of_trials",
     "trusted",
     "unchecked_rmse",
     "walks",
@@ -65,11 +65,11 @@ struct Scene {
 impl Scene {
     async fn set(folder: &std::path::Path) -> Self {
         let service = Service::start(&folder.join("a.db"), Analytic::slow(Duration::from_millis(10)), 1).await;
-        let finished = service.study(|new| new.trial_budget = 3).await;
+        let finished = service.study(|new| new.number_of_trials = 3).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
-        let draft = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
-        let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 9)).await;
-        let human = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 4)).await;
+        let draft = service.study(|new| (new.number_of_trials, new.start) = (2, false)).await;
+        let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 9)).await;
+        let human = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 4)).await;
         service.wait_for(human, &[StudyState::Waiting]).await;
         Self { service, finished, draft, script, human }
     }
@@ -129,7 +129,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
         scene.one(done, &format!("post /studies/{{id}}/{act}"), &format!("{of_draft}/{act}"), body).await;
     }
     service.wait_for(*draft, &[StudyState::Finished]).await;
-    let more = json!({"trial_budget": 4000});
+    let more = json!({"number_of_trials": 4000});
     scene.one(done, "post /studies/{id}/extend", &format!("{of_draft}/extend"), more).await;
     while !service.trials(*draft).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(5)).await;
@@ -259,7 +259,8 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
     scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;
 
-    let no_gait = service.study(|new| (new.trial_budget, new.search_space) = (1, Some(without_gaits().into()))).await;
+    let no_gait =
+        service.study(|new| (new.number_of_trials, new.search_space) = (1, Some(without_gaits().into()))).await;
     service.wait_for(no_gait, &[StudyState::Finished]).await;
     let explain = format!("{api}/trials/{}/explanation", service.trials(no_gait).await[0].id);
     scene.one(done, "post /trials/{id}/explanation", &explain, json!({})).await;
@@ -304,12 +305,12 @@ fn essence(trials: &[Trial], feedback_rows: &[FeedbackRow]) -> Vec<String> {
 async fn form_rest_and_unattended_run_write_the_same_rows_for_the_same_answers() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let automatic = service.study(|new| new.trial_budget = 12).await;
+    let automatic = service.study(|new| new.number_of_trials = 12).await;
     service.wait_for(automatic, &[StudyState::Finished]).await;
     let feedback_rows = service.feedback(automatic).await;
     let expected = essence(&service.trials(automatic).await, &feedback_rows);
     for by_form in [false, true] {
-        let study = service.study(|new| (new.trial_budget, new.answer_source) = (12, AnswerSource::People)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::People)).await;
         while service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await.state == StudyState::Waiting {
             let trials = service.trials(study).await;
             // Answers as Gait RMSE would: the question is the newest gait against the one the page offers.

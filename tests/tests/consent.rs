@@ -45,17 +45,17 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(20)), 1).await;
     let person = service.subject().await;
-    let finished = service.study(|new| new.trial_budget = 3).await;
+    let finished = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(finished, &[StudyState::Finished]).await;
     let draft = service.study(|new| new.start = false).await;
-    let human = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
+    let human = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{human}/blind-pairs/next"), &json!({})).await.json();
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
-    let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
+    let script = service.study(|new| (new.number_of_trials, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     // One is open at any instant.
-    let running = service.study(|new| (new.trial_budget, new.parallel_trials) = (300, 2)).await;
+    let running = service.study(|new| (new.number_of_trials, new.parallel_trials) = (300, 2)).await;
     while !service.trials(running).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
@@ -106,7 +106,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
     for (path, body) in [
         ("/api/v1/studies".to_owned(), json!({"subject_id": person})),
         (format!("/api/v1/studies/{finished}/clone"), json!({})),
-        (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 310})),
+        (format!("/api/v1/studies/{running}/extend"), json!({"number_of_trials": 310})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
         (format!("/api/v1/studies/{finished}/suggestions"), suggestion),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
@@ -233,7 +233,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
 async fn subject_page_records_and_withdraws_consent() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(20)), 1).await;
-    let running = service.study(|new| new.trial_budget = 50).await;
+    let running = service.study(|new| new.number_of_trials = 50).await;
     let page = format!("/subjects/{}", service.subject().await);
     let list = service.fetch("/subjects").await;
     assert!(list.text.contains(&page) && list.text.contains("not on record"), "{}", list.text);
@@ -277,7 +277,7 @@ async fn studies_of_a_withdrawn_subject_cannot_be_exported_or_imported() {
     let mut archives = Vec::new();
     let mut last = None;
     for seed in [1, 2] {
-        let study = service.study(|new| (new.seed, new.trial_budget) = (seed, 2)).await;
+        let study = service.study(|new| (new.seed, new.number_of_trials) = (seed, 2)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         archives.push(exported(&service.store, study).await);
         last = Some(study);
@@ -309,9 +309,9 @@ async fn studies_of_a_withdrawn_subject_cannot_be_exported_or_imported() {
 async fn saved_responses_of_repeated_requests_are_withheld_after_withdrawal() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let finished = service.study(|new| new.trial_budget = 3).await;
+    let finished = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(finished, &[StudyState::Finished]).await;
-    let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
+    let script = service.study(|new| (new.number_of_trials, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     let trials = service.trials(finished).await;
     let told = (

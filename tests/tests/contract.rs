@@ -35,7 +35,7 @@ async fn documents_keep_their_shape() {
         1,
     )
     .await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     let present = service.wait_for(study, &[StudyState::Finished]).await;
     let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
 

@@ -173,7 +173,7 @@ impl Scene {
     async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.answer_source) = (24, AnswerSource::Both)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (24, AnswerSource::Both)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trials = service.trials(study).await;
         let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
@@ -481,7 +481,7 @@ impl Rated {
     async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
         service.wait_for(study, &[StudyState::Waiting]).await;
         Self { _folder: folder, service, study }
     }

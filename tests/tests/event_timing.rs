@@ -70,7 +70,7 @@ fn right_guesses(figures: &[Duration], truth: &[bool]) -> usize {
 #[tokio::test]
 async fn event_streams_reveal_no_allocation_by_content_or_timing() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut gaits = service.trials(study).await;
     gaits.retain(|trial| trial.state == TrialState::Converged);

@@ -37,7 +37,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let mut studies = Vec::new();
     for muscles in [true, false] {
-        let study = service.study(|new| (new.trial_budget, new.muscles) = (6, muscles)).await;
+        let study = service.study(|new| (new.number_of_trials, new.muscles) = (6, muscles)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         studies.push(study);
     }
@@ -132,7 +132,7 @@ async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
     let one_stride = service.post("/api/v1/reference-gaits", &one_stride).await.json();
     let one_stride = one_stride["id"].as_str().unwrap().parse().unwrap();
     for (reference, band) in [(one_stride, false), (imported, true)] {
-        let study = service.study(|new| (new.trial_budget, new.reference_gait_id) = (2, Some(reference))).await;
+        let study = service.study(|new| (new.number_of_trials, new.reference_gait_id) = (2, Some(reference))).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trial = service.trials(study).await.into_iter().find(|t| t.state == TrialState::Converged).unwrap().id;
         // The page of a gait has one legend for the left and the right leg.
@@ -166,7 +166,7 @@ async fn chart_of_a_running_solve_remains_after_its_end() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(std::time::Duration::from_millis(60));
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     let page = format!("/studies/{study}");
     let mut drawings = Vec::new();
     while drawings.is_empty() {

@@ -31,7 +31,7 @@ async fn finished() -> (TempDir, Service, StudyId, Vec<Trial>) {
 async fn finished_by(solver: impl Evaluate) -> (TempDir, Service, StudyId, Vec<Trial>) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| new.trial_budget = 24).await;
+    let study = service.study(|new| new.number_of_trials = 24).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     (folder, service, study, trials)
@@ -157,7 +157,7 @@ async fn lab_session_reveals_no_gait_before_unblinding() {
 async fn each_walk_gets_the_controller_file_of_its_own_gait() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), WellFormed::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 24).await;
+    let study = service.study(|new| new.number_of_trials = 24).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let gaits = converged(&trials);
@@ -303,7 +303,7 @@ async fn unsafe_walk_excludes_both_gaits_until_unblinding() {
 async fn lab_session_requires_two_converged_gaits_of_its_study() {
     let (_folder, service, study, trials) = finished().await;
     let gaits = converged(&trials);
-    let other = service.study(|new| new.trial_budget = 1).await;
+    let other = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(other, &[StudyState::Finished]).await;
     let foreign = service.trials(other).await[0].id;
     let no_gait = trials.iter().find(|trial| trial.state != TrialState::Converged).unwrap().id;
@@ -355,7 +355,7 @@ async fn lab_session_form_offers_each_motion_once_and_no_unsafe_gait() {
     let study = service
         .study(|new| {
             new.search_space = Some(inactive_bound().into());
-            new.trial_budget = 3;
+            new.number_of_trials = 3;
         })
         .await;
     service.wait_for(study, &[StudyState::Finished]).await;

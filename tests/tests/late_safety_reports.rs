@@ -45,7 +45,7 @@ async fn clear(service: &Service, gait: &str) {
 
 /// A study that waits for the answer to a pair, and the address of the pair.
 async fn pair(service: &Service) -> (StudyId, String) {
-    let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     (study, pair["pair"]["token"].as_str().unwrap().to_owned())
@@ -118,7 +118,7 @@ async fn repeated_report_counts_once_until_staff_clear_the_gait() {
 #[tokio::test]
 async fn comparison_form_reports_a_gait_after_another_answer() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let trials = converged(&service, study).await;
     let [a, b] = [trials[0].id, trials[1].id];
@@ -151,7 +151,7 @@ struct Lab {
 
 impl Lab {
     async fn planned(service: &Service) -> Self {
-        let study = service.study(|new| new.trial_budget = 12).await;
+        let study = service.study(|new| new.number_of_trials = 12).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trials = converged(service, study).await;
         let gaits = [trials[0].id, trials[1].id];

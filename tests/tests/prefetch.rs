@@ -18,7 +18,7 @@ use std::time::Duration;
 async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(4)), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.answer_source) = (7, AnswerSource::People)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (7, AnswerSource::People)).await;
     loop {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
         if present.state == StudyState::Finished {
@@ -66,7 +66,7 @@ async fn prefetched_solve_gives_way_within_one_iteration() {
     let solver = Analytic::slow(Duration::from_millis(40));
     let made = Arc::clone(&solver.made);
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let human = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::People)).await;
+    let human = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let known: HashSet<_> = service.trials(human).await.iter().map(|trial| trial.id).collect();
     let begun = made.lock().unwrap().len();
@@ -75,7 +75,7 @@ async fn prefetched_solve_gives_way_within_one_iteration() {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
 
-    let wanted = service.study(|new| new.trial_budget = 1).await;
+    let wanted = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(wanted, &[StudyState::Finished]).await;
     let wanted = service.trials(wanted).await[0].id;
     let made = made.lock().unwrap().clone();

@@ -47,7 +47,7 @@ impl Scene {
     async fn set() -> (TempDir, Self) {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let finished = service.study(|new| (new.trial_budget, new.answer_source) = (18, AnswerSource::Both)).await;
+        let finished = service.study(|new| (new.number_of_trials, new.answer_source) = (18, AnswerSource::Both)).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
         // Another subject, so that safety reports there do not affect gaits here.
         let own = service.subject().await;
@@ -55,11 +55,11 @@ impl Scene {
         let ids = subjects.as_array().unwrap().iter().map(|subject| subject["id"].as_str().unwrap().parse().unwrap());
         let other: SubjectId = ids.into_iter().find(|id| *id != own).unwrap();
         let of_another = |new: &mut NewStudy| {
-            (new.subject_id, new.trial_budget, new.answer_source) = (other, 40, AnswerSource::People);
+            (new.subject_id, new.number_of_trials, new.answer_source) = (other, 40, AnswerSource::People);
         };
         let human = service.study(of_another).await;
         service.wait_for(human, &[StudyState::Waiting]).await;
-        let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 5000)).await;
+        let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 5000)).await;
         let converged = service.trials(finished).await.into_iter().filter(|trial| trial.gait_rmse_rad.is_some());
         let trials = converged.map(|trial| trial.id).collect();
         let router = service.router();

@@ -312,7 +312,7 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
     let mut writer = store.write().await.unwrap();
     built_in_entries::ensure(&mut writer).await.unwrap();
     let subject = subjects::by_pseudonym(&mut writer, "paper-1").await.unwrap().unwrap();
-    let mut new = NewStudy { muscles: false, trial_budget: 2, ..NewStudy::of(subject.id) };
+    let mut new = NewStudy { muscles: false, number_of_trials: 2, ..NewStudy::of(subject.id) };
     change(&mut new);
     let study = study_plan::create(&mut writer, &gaitwright_store::audit::Actor::program(), new).await.unwrap();
     commit(writer).await.unwrap();
@@ -379,7 +379,7 @@ async fn failed_trial_sets_the_exit_code() {
     let database = folder.path().join("gaitwright.db");
     let solver = Analytic { panics: vec![1], ..Analytic::slow(Duration::from_millis(300)) };
     let service = Service::start(&database, solver, 1).await;
-    let study = service.study(|new| (new.muscles, new.trial_budget) = (false, 2)).await;
+    let study = service.study(|new| (new.muscles, new.number_of_trials) = (false, 2)).await;
     until("a second trial", async || service.trials(study).await.len() == 2).await;
     assert_eq!(service.trials(study).await[0].state, TrialState::Failed);
     service.stop().await;

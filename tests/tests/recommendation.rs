@@ -46,7 +46,7 @@ async fn study_without_a_gait_has_no_recommendation() {
     let space = json!({"dimensions": [{"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0}]});
     let space: SearchSpace = serde_json::from_value(space).unwrap();
     let plan = |new: &mut NewStudy| {
-        (new.base_bounds, new.search_space, new.trial_budget) = (without_gait, Some(space.clone().into()), 2);
+        (new.base_bounds, new.search_space, new.number_of_trials) = (without_gait, Some(space.clone().into()), 2);
     };
     let study = service.study(plan).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -77,7 +77,7 @@ async fn study_without_a_gait_has_no_recommendation() {
 async fn recommendation_states_a_failed_certificate() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let page = format!("/studies/{study}");
 
@@ -119,7 +119,7 @@ async fn recommendation_states_a_failed_certificate() {
 async fn recommendation_states_a_passed_certificate() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let best = ranked(&service, study).await[0];
     certified(&service, best, true).await;
@@ -165,7 +165,7 @@ async fn certified_by_service(service: &Service) -> Vec<String> {
 async fn ended_study_certifies_its_ten_best_gaits_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_certifying(&folder.path().join("a.db"), Analytic::default(), only(None)).await;
-    let study = service.study(|new| new.trial_budget = 20).await;
+    let study = service.study(|new| new.number_of_trials = 20).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let early = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     assert!(early.status == StatusCode::CONFLICT && early.text.contains("being certified"), "{}", early.text);
@@ -185,7 +185,7 @@ async fn studies_that_ended_before_a_restart_are_certified_until_one_gait_passes
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_without_certificates(&database, Analytic::default()).await;
-    let study = service.study(|new| new.trial_budget = 12).await;
+    let study = service.study(|new| new.number_of_trials = 12).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let best = ranked(&service, study).await;
     let third = service.trials(study).await.into_iter().find(|trial| trial.id == best[2]).unwrap();
@@ -216,7 +216,7 @@ async fn requested_recommendation_of_a_running_study_is_certified_during_its_sol
     let solver = Analytic::slow(Duration::from_millis(20));
     let passes = Verdicts { pause: Duration::from_millis(20), passes: |_: &Gait| true };
     let service = Service::start_certifying(&folder.path().join("a.db"), solver, passes).await;
-    let study = service.study(|new| new.trial_budget = 500).await;
+    let study = service.study(|new| new.number_of_trials = 500).await;
     service.wait_for_trials(study, 3).await;
     assert!(certified_by_service(&service).await.is_empty(), "nobody asked");
     service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
@@ -246,7 +246,7 @@ async fn utility_history(service: &Service, study: StudyId, beliefs: &Arc<Belief
 async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.answer_source) = (12, AnswerSource::People)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::People)).await;
     let beliefs = Arc::new(Beliefs::default());
     for answers in 0..5 {
         users::asked(&service, study).await;
@@ -288,7 +288,7 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let plan = |new: &mut NewStudy| {
-        (new.trial_budget, new.answer_source, new.repeat_results) = (6, AnswerSource::Both, Some(true));
+        (new.number_of_trials, new.answer_source, new.repeat_results) = (6, AnswerSource::Both, Some(true));
         new.search_space = Some(inactive_bound().into());
     };
     let study = service.study(plan).await;

@@ -15,10 +15,10 @@ use serde_json::{Value, json};
 use sqlx::SqlitePool;
 use sqlx::sqlite::SqliteConnectOptions;
 
-async fn started(source: AnswerSource, budget: u32) -> (tempfile::TempDir, Service, StudyId) {
+async fn started(source: AnswerSource, trials: u32) -> (tempfile::TempDir, Service, StudyId) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.answer_source) = (budget, source)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (trials, source)).await;
     service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
     (folder, service, study)
 }

@@ -27,7 +27,7 @@ impl Scene {
     async fn set() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.answer_source) = (6, AnswerSource::Both)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::Both)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let mut trials = service.trials(study).await;
         trials.retain(|trial| trial.state == TrialState::Converged);

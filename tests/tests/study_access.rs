@@ -54,7 +54,7 @@ impl Closed {
         let (folder, service) = service().await;
         let admin = signed_in(&service, Role::Administrator).await;
         let set_up = |new: &mut gaitwright_service::studies::study_plan::NewStudy| {
-            (new.name, new.answer_source, new.trial_budget) = (Some(NAME.to_owned()), AnswerSource::Both, 30);
+            (new.name, new.answer_source, new.number_of_trials) = (Some(NAME.to_owned()), AnswerSource::Both, 30);
         };
         let study = service.study(set_up).await;
         service.wait_for(study, &[StudyState::Finished]).await;
@@ -256,7 +256,7 @@ async fn members_are_removed_on_the_page_of_a_study_whose_subject_withdrew() {
 async fn lists_show_a_restricted_study_to_members_only() {
     let closed = Closed::new().await;
     let service = &closed.service;
-    let open = service.study(|new| new.trial_budget = 2).await;
+    let open = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(open, &[StudyState::Finished]).await;
     let outsiders = closed.outsiders().await;
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
@@ -315,7 +315,7 @@ async fn lists_show_a_restricted_study_to_members_only() {
 /// A study that asks people, and a rater who is not assigned to it.
 async fn asking() -> (TempDir, Service, StudyId, As) {
     let (folder, service) = service().await;
-    let study = service.study(|new| (new.answer_source, new.trial_budget) = (AnswerSource::People, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let rater = signed_in(&service, Role::Rater).await;
     (folder, service, study, rater)
@@ -478,7 +478,7 @@ async fn study_created_as_restricted_is_never_open() {
     let body = json!({"subject_id": subject, "start": false, "restricted": true});
     let made = post(&service, &clinician, "/api/v1/studies", &body).await;
     let form = format!(
-        "muscles=on&answer_source=gait_rmse&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=&restricted=on\
+        "muscles=on&answer_source=gait_rmse&number_of_trials=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=&restricted=on\
          &subject={subject}"
     );
     let sent = send(&service, &clinician, &Method::POST, "/studies/new", FORM, &form).await;
@@ -497,7 +497,7 @@ async fn study_created_as_restricted_is_never_open() {
 /// A finished study in which people may answer, and its first three gaits.
 async fn answered_by_people(service: &Service) -> (StudyId, Vec<String>) {
     let mixed = |new: &mut gaitwright_service::studies::study_plan::NewStudy| {
-        (new.answer_source, new.trial_budget) = (AnswerSource::Both, 30);
+        (new.answer_source, new.number_of_trials) = (AnswerSource::Both, 30);
     };
     let study = service.study(mixed).await;
     service.wait_for(study, &[StudyState::Finished]).await;

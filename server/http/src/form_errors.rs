@@ -38,7 +38,7 @@ const LABELS: &[(&str, &str)] = &[
     ("order", "Filter order"),
     ("walks", "Number of walks on each ground"),
     ("seed", "Seed"),
-    ("trial_budget", "Total number of trials"),
+    ("number_of_trials", "Number of trials"),
     ("form", "Signed consent form"),
     ("rater", "Rater"),
 ];

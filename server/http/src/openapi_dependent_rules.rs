@@ -47,7 +47,7 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewStudy", "search_space", SPACE),
     ("NewStudy", "gait_settings", LIMITS),
     ("NewStudy", "learner", LEARNER),
-    ("Extend", "trial_budget", "More than the current budget."),
+    ("Extend", "number_of_trials", "More than the current number of trials."),
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
     ("Invitation", "name", "The name of a rater, or one that is not taken."),
     ("Unblind", "rater", "A rater who was shown a pair of this study."),

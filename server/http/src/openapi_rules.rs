@@ -136,7 +136,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         }
         for component in ["NewStudy", "StudyClone"] {
             schemas.add(component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
-            schemas.add(component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
+            schemas.add(component, "number_of_trials", &json!({ "minimum": 1, "maximum": 10_000 }));
         }
         schemas.add("NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
         schemas.add("NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));

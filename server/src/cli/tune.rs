@@ -77,7 +77,7 @@ impl Tune {
             gait_settings: Box::new(gait_settings),
             solve_options,
             muscles: self.muscles.is_on(),
-            trial_budget: self.trials,
+            number_of_trials: self.trials,
             parallel_trials: u32::try_from(workers).unwrap_or(1),
             seed: self.seed,
             repeat_results: Some(self.repeat_results),

@@ -59,7 +59,7 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
     let study = if let Some(study) = unfinished {
         let done = trial_rows::counts(&mut writer, study.id).await?;
         let ended = done.total - done.open;
-        tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.trial_budget));
+        tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.number_of_trials));
         study
     } else {
         study_plan::create(&mut writer, &Actor::terminal(), new).await?
@@ -120,7 +120,7 @@ pub(super) async fn certified(
 
 /// Shows progress until the study ends.
 async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<(), Error> {
-    let bar = ProgressBar::new(u64::from(study.plan.trial_budget));
+    let bar = ProgressBar::new(u64::from(study.plan.number_of_trials));
     let style = "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}";
     if let Ok(style) = ProgressStyle::with_template(style) {
         bar.set_style(style.progress_chars("=> "));

@@ -12,7 +12,8 @@ use std::time::Duration;
 const NEEDED: &str = "h1, details.person summary, .motions svg.gait-figure, .motions .answer, .extras summary";
 
 async fn waiting(site: &Site, trials: u32) -> StudyId {
-    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (trials, AnswerSource::People)).await;
+    let study =
+        site.service.study(|new| (new.number_of_trials, new.answer_source) = (trials, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     study
 }

@@ -106,7 +106,7 @@ async fn browser_administrator_adds_a_rater_and_a_token_and_reads_the_audit_trai
 async fn browser_sends_an_answer_after_the_session_ended() {
     let Some(browser) = Chromium::launch().await else { return };
     let (site, _) = guarded().await;
-    let study = site.service.study(|new| (new.trial_budget, new.answer_source) = (3, AnswerSource::People)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let mut writer = site.service.store.write().await.unwrap();
     let new = NewUser { name: "R1".to_owned(), role: Role::Rater };

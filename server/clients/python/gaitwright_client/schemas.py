@@ -169,7 +169,7 @@ Strikes = Literal["force", "kinematics", "ends"]
 StudyId = str
 
 # State of a study: `not_started`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer
-# from a person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied;
+# from a person; `paused`, by a user or a program; `finished`, all trials are made or a stopping rule applied;
 # `stopped`, by a user or a program.
 StudyState = Literal["not_started", "running", "waiting", "paused", "finished", "stopped"]
 
@@ -443,7 +443,7 @@ AuditDetail = TypedDict(
         # Trial of gait B, as `trial_a`.
         "trial_b": "TrialId",
         # `trial.relax`: number of trials of the study.
-        "trial_budget": "int",
+        "number_of_trials": "int",
         # `study.import`: whether the key of the signature is trusted.
         "trusted": "bool",
         # `study.import`: number of gaits whose Gait RMSE could not be computed again.
@@ -1177,8 +1177,8 @@ class ExecutionReport(_ExecutionReportRequired, total=False):
 class Extend(TypedDict):
     """A larger number of trials."""
 
-    # Total number of trials. Must exceed the current budget.
-    trial_budget: int
+    # Total number of trials. Must exceed the current number.
+    number_of_trials: int
 
 
 class StickFigure(TypedDict):
@@ -2240,7 +2240,7 @@ class NewStudy(_NewStudyRequired, total=False):
     # Whether to start the study immediately.
     start: bool
     # Number of trials.
-    trial_budget: int
+    number_of_trials: int
     # The study finishes when the best action has not changed over this many results.
     unchanged_limit: Optional[int]
     # The gait from which trials are warm-started.
@@ -3060,7 +3060,7 @@ class _StudyPlanRequired(TypedDict):
     # Identifier of the subject.
     subject_id: SubjectId
     # Number of trials.
-    trial_budget: int
+    number_of_trials: int
     # The gait from which trials are warm-started.
     warm_start_from: WarmStartFrom
 
@@ -3124,7 +3124,7 @@ class StudyClone(TypedDict, total=False):
     # Whether to start the study immediately.
     start: bool
     # Number of trials.
-    trial_budget: Optional[int]
+    number_of_trials: Optional[int]
 
 
 class _StudyComparisonRequired(TypedDict):

@@ -136,7 +136,7 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
         ("Source of answers".to_owned(), format::answer_source(plan.answer_source).to_owned()),
         ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
         ("Seed".to_owned(), plan.seed.to_string()),
-        ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.trial_budget)),
+        ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.number_of_trials)),
         ("Converged".to_owned(), study.counts.converged.to_string()),
         ("Total solve time, s".to_owned(), format!("{seconds:.0}")),
         ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),

@@ -104,7 +104,7 @@ pub(crate) struct StudyPlan {
     /// What evaluates trials.
     evaluation: Evaluation,
     /// Number of trials.
-    trial_budget: u32,
+    number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.
@@ -137,7 +137,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             learner,
             answer_source,
             evaluation,
-            trial_budget,
+            number_of_trials,
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,
@@ -160,7 +160,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             learner,
             answer_source,
             evaluation,
-            trial_budget,
+            number_of_trials,
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,

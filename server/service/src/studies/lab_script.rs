@@ -73,8 +73,8 @@ pub async fn suggest(
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let plan = &snapshot.study.plan;
-    if snapshot.trials.len() >= plan.trial_budget as usize {
-        return Err(Error::conflict(match plan.trial_budget {
+    if snapshot.trials.len() >= plan.number_of_trials as usize {
+        return Err(Error::conflict(match plan.number_of_trials {
             1 => "The only trial of the study has been handed out.".to_owned(),
             all => format!("All {all} trials of the study have been handed out."),
         }));

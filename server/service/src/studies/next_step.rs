@@ -52,8 +52,8 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     }
     let open = snapshot.open();
     let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
-    if tried >= study.plan.trial_budget {
-        let reason = match study.plan.trial_budget {
+    if tried >= study.plan.number_of_trials {
+        let reason = match study.plan.number_of_trials {
             1 => "The only trial is done.".to_owned(),
             all => format!("All {all} trials are done."),
         };

@@ -66,7 +66,7 @@ pub struct NewStudy {
     /// Number of trials.
     #[serde(default = "fifteen")]
     #[schema(minimum = 1, maximum = 10000)]
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     #[serde(default)]
     pub solve_seconds_budget: Option<f64>,
@@ -136,7 +136,7 @@ impl NewStudy {
             learner: LearnerSettings::default(),
             answer_source: AnswerSource::GaitRmse,
             evaluation: Evaluation::Optimizer,
-            trial_budget: fifteen(),
+            number_of_trials: fifteen(),
             solve_seconds_budget: None,
             unchanged_limit: None,
             repeat_results: None,
@@ -166,7 +166,7 @@ impl NewStudy {
             learner: plan.learner.clone(),
             answer_source: plan.answer_source,
             evaluation: plan.evaluation,
-            trial_budget: plan.trial_budget,
+            number_of_trials: plan.number_of_trials,
             solve_seconds_budget: plan.solve_seconds_budget,
             unchanged_limit: plan.unchanged_limit,
             repeat_results: Some(plan.repeat_results),
@@ -321,7 +321,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
         search_space,
         answer_source: new.answer_source,
         evaluation: new.evaluation,
-        trial_budget: new.trial_budget,
+        number_of_trials: new.number_of_trials,
         solve_seconds_budget: new.solve_seconds_budget,
         unchanged_limit: new.unchanged_limit,
         repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
@@ -341,7 +341,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     printable::name("name", &plan.name, LONGEST_NAME)?;
-    check_range("trial_budget", i64::from(plan.trial_budget), 1, 10_000)?;
+    check_range("number_of_trials", i64::from(plan.number_of_trials), 1, 10_000)?;
     check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(plan.priority), -10, 10)?;
     if plan.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {

@@ -167,7 +167,7 @@ impl Reproduce {
         let person = built_in_entries::subject_with(&mut writer, Subject::builtin(subject)?).await?;
         let new = NewStudy {
             muscles,
-            trial_budget: self.trials,
+            number_of_trials: self.trials,
             seed,
             parallel_trials: 1,
             repeat_results: Some(true),

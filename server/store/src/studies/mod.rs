@@ -58,7 +58,7 @@ pub async fn insert(
     let id = StudyId::fresh();
     sqlx::query(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
-         solve_options, base_bounds, search_space, learner, answer_source, trial_budget, parallel_trials, priority, \
+         solve_options, base_bounds, search_space, learner, answer_source, number_of_trials, parallel_trials, priority, \
          seed, state, evaluation, solve_seconds_budget, unchanged_limit, cloned_from, created_at, updated_at, \
          height_m, body_mass_kg, repeat_results, warm_start_from) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
@@ -74,7 +74,7 @@ pub async fn insert(
     .bind(json_columns::to_text("search space", &plan.search_space)?)
     .bind(json_columns::to_text("learner settings", &plan.learner)?)
     .bind(plan.answer_source.as_str())
-    .bind(plan.trial_budget)
+    .bind(plan.number_of_trials)
     .bind(plan.parallel_trials)
     .bind(plan.priority)
     .bind(i64::try_from(plan.seed).unwrap_or(i64::MAX))
@@ -125,7 +125,7 @@ pub struct StudyLimits {
     /// Number of trials that run in parallel.
     pub parallel_trials: u32,
     /// Number of trials.
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
 }
 
 /// Updates the changeable fields.
@@ -134,13 +134,13 @@ pub struct StudyLimits {
 /// A violated constraint; errors of the database.
 pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &StudyLimits) -> StoreResult<()> {
     sqlx::query(
-        "update studies set name = ?, priority = ?, parallel_trials = ?, trial_budget = ?, revision = revision + 1, \
+        "update studies set name = ?, priority = ?, parallel_trials = ?, number_of_trials = ?, revision = revision + 1, \
          updated_at = ? where id = ?",
     )
     .bind(&limits.name)
     .bind(limits.priority)
     .bind(limits.parallel_trials)
-    .bind(limits.trial_budget)
+    .bind(limits.number_of_trials)
     .bind(now())
     .bind(id)
     .execute(db)
@@ -206,7 +206,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             learner: json_columns::column(row, "learner")?,
             answer_source: row.try_get::<&str, _>("answer_source")?.parse()?,
             evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
-            trial_budget: row.try_get("trial_budget")?,
+            number_of_trials: row.try_get("number_of_trials")?,
             solve_seconds_budget: row.try_get("solve_seconds_budget")?,
             unchanged_limit: row.try_get("unchanged_limit")?,
             repeat_results: row.try_get("repeat_results")?,

@@ -133,7 +133,7 @@ pub struct StudyPlan {
     /// What evaluates trials.
     pub evaluation: Evaluation,
     /// Number of trials.
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     pub solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.

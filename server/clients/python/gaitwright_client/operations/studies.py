@@ -71,7 +71,7 @@ class StudiesMethods(Transport):
 
         Fields: subject_id; optionally base_bounds, device_id, evaluation, answer_source, gait_settings, learner,
         muscles, name, parallel_trials, priority, reference_gait_id, repeat_results, restricted, search_space, seed,
-        solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit, warm_start_from.
+        solve_options, solve_seconds_budget, start, number_of_trials, unchanged_limit, warm_start_from.
         """
         return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 
@@ -127,7 +127,7 @@ class StudiesMethods(Transport):
 
         Creates a study with the same set-up, without the trials.
 
-        Fields: optionally answer_source, muscles, name, seed, start, trial_budget.
+        Fields: optionally answer_source, muscles, name, seed, start, number_of_trials.
         """
         return cast(
             StudyView,
@@ -163,7 +163,7 @@ class StudiesMethods(Transport):
 
         If the study has ended, it resumes.
 
-        Fields: trial_budget.
+        Fields: number_of_trials.
         """
         return cast(
             StudyView,

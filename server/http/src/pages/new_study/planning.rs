@@ -154,7 +154,7 @@ fn study_of(
             None if like.is_some() && fields.learner == KEPT => base.learner,
             None => return Err(Error::invalid("learner", fields.learner.as_str(), &learners)),
         },
-        trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
+        number_of_trials: number("number_of_trials", &fields.number_of_trials, "1 to 10000")?,
         unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or empty")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
         seed: number("seed", &fields.seed, &format!("0 to {}", study_plan::LARGEST_SEED))?,

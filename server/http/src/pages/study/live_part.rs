@@ -337,7 +337,7 @@ fn view(
         queued: String::new(),
         without_gait,
         never_active: String::new(),
-        progress: [counts.results(), snapshot.study.plan.trial_budget].map(format::count),
+        progress: [counts.results(), snapshot.study.plan.number_of_trials].map(format::count),
         counts,
         running,
         best,

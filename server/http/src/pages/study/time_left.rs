@@ -18,7 +18,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
         return "The time left depends on the script that evaluates the trials.".to_owned();
     }
     let solves: Vec<f64> = snapshot.trials.iter().filter_map(|trial| trial.seconds_total).collect();
-    let left = study.plan.trial_budget.saturating_sub(results);
+    let left = study.plan.number_of_trials.saturating_sub(results);
     let Some(median) = median(&solves) else {
         let missing = FEWEST_SOLVES - solves.len();
         if left as usize <= missing {

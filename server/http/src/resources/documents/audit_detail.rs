@@ -207,7 +207,7 @@ pub(crate) struct AuditDetail {
     trial_b: TrialId,
     /// `trial.relax`: number of trials of the study.
     #[schema(required = false)]
-    trial_budget: u32,
+    number_of_trials: u32,
     /// `study.import`: whether the key of the signature is trusted.
     #[schema(required = false)]
     trusted: bool,
