@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::StudyId;
 use gaitwright_store::studies::AnswerSource;
@@ -25,20 +25,20 @@ async fn main() {
         for _ in 0..answers {
             answer_once(&service, study).await;
         }
-        let beliefs = Arc::new(Beliefs::default());
-        let (all, points) = history(&service, study, &beliefs).await;
+        let analyses = Arc::new(Analyses::default());
+        let (all, points) = history(&service, study, &analyses).await;
         answer_once(&service, study).await;
-        let (again, _) = history(&service, study, &beliefs).await;
+        let (again, _) = history(&service, study, &analyses).await;
         println!("{answers} answers: {points} points in {all:.2?}, after one more answer in {again:.2?}");
         service.stop().await;
     }
 }
 
-async fn history(service: &Service, study: StudyId, beliefs: &Arc<Beliefs>) -> (Duration, usize) {
+async fn history(service: &Service, study: StudyId, analyses: &Arc<Analyses>) -> (Duration, usize) {
     let study = service.get(study).await;
     let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-    let beliefs = Arc::clone(beliefs);
+    let analyses = Arc::clone(analyses);
     let begun = Instant::now();
-    let points = service.store.clone().compute(move |pool| beliefs.utility_history(pool, &snapshot)).await;
+    let points = service.store.clone().compute(move |pool| analyses.utility_history(pool, &snapshot)).await;
     (begun.elapsed(), points.unwrap().unwrap().len())
 }

@@ -111,7 +111,7 @@ pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(St
         format!("/studies/{study}"),
         format!("/studies/{study}/live"),
         format!("/studies/{study}?sort=a5&order=ascending&state=converged&text=drawn&page=3"),
-        format!("/studies/{study}/belief"),
+        format!("/studies/{study}/analysis"),
         "/system".to_owned(),
         format!("/studies/{study}/compare"),
         format!("/trials/{trial}"),

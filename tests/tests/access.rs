@@ -86,7 +86,7 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("get /studies/compare", Some(Right::Read)),
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),
-    ("get /studies/{id}/belief", Some(Right::Read)),
+    ("get /studies/{id}/analysis", Some(Right::Read)),
     ("get /studies/{id}/figures", Some(Right::Read)),
     ("post /studies/{id}/do", Some(Right::Run)),
     ("get /studies/{id}/compare", Some(Right::Read)),

@@ -31,8 +31,8 @@ async fn posterior(service: &Service, study: gaitwright_store::StudyId) -> Vec<(
     let study = studies::get(&mut reader, study).await.unwrap();
     let snapshot = StudySnapshot::read(&mut reader, study).await.unwrap();
     let plan = &snapshot.study.plan;
-    let belief = gait_learner::posterior(&plan.search_space, &snapshot.log(), &plan.learner).unwrap();
-    let mean = |trial: &gaitwright_store::trials::Trial| belief.mean(trial.action_index).unwrap().to_bits();
+    let posterior = gait_learner::posterior(&plan.search_space, &snapshot.log(), &plan.learner).unwrap();
+    let mean = |trial: &gaitwright_store::trials::Trial| posterior.mean(trial.action_index).unwrap().to_bits();
     snapshot.trials.iter().map(|trial| (trial.action_index.0, mean(trial))).collect()
 }
 

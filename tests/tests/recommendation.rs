@@ -5,7 +5,7 @@
 use axum::http::StatusCode;
 use gait_learner::{Agreement, SearchSpace, posterior};
 use gait_optimizer::{Gait, TunedBounds};
-use gaitwright_service::studies::belief::{Belief, Beliefs};
+use gaitwright_service::studies::analysis::{Analyses, Analysis};
 use gaitwright_service::studies::pruning::prune;
 use gaitwright_service::studies::same_motion::is_same_gait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -150,7 +150,7 @@ async fn settled(service: &Service, study: StudyId) -> Value {
 async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
     let study = service.get(study).await;
     let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &snapshot, &Beliefs::default())).await;
+    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &snapshot, &Analyses::default())).await;
     rank.unwrap().unwrap()
 }
 
@@ -237,9 +237,9 @@ async fn snapshot(service: &Service, study: StudyId) -> StudySnapshot {
     StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap()
 }
 
-async fn utility_history(service: &Service, study: StudyId, beliefs: &Arc<Beliefs>) -> Vec<UtilityPoint> {
-    let (snapshot, beliefs) = (snapshot(service, study).await, Arc::clone(beliefs));
-    service.store.clone().compute(move |pool| beliefs.utility_history(pool, &snapshot)).await.unwrap().unwrap()
+async fn utility_history(service: &Service, study: StudyId, analyses: &Arc<Analyses>) -> Vec<UtilityPoint> {
+    let (snapshot, analyses) = (snapshot(service, study).await, Arc::clone(analyses));
+    service.store.clone().compute(move |pool| analyses.utility_history(pool, &snapshot)).await.unwrap().unwrap()
 }
 
 #[tokio::test]
@@ -247,14 +247,14 @@ async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::People)).await;
-    let beliefs = Arc::new(Beliefs::default());
+    let analyses = Arc::new(Analyses::default());
     for answers in 0..5 {
         users::asked(&service, study).await;
-        assert_eq!(utility_history(&service, study, &beliefs).await.len(), answers);
+        assert_eq!(utility_history(&service, study, &analyses).await.len(), answers);
         users::answer_once(&service, study).await;
     }
     users::asked(&service, study).await;
-    let points = utility_history(&service, study, &beliefs).await;
+    let points = utility_history(&service, study, &analyses).await;
     assert_eq!(points.iter().map(|point| point.answers).collect::<Vec<_>>(), [1, 2, 3, 4, 5]);
     // The points that were kept are those that a new cache computes.
     assert_eq!(points, utility_history(&service, study, &Arc::default()).await);
@@ -277,7 +277,7 @@ async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
     let first = now.feedback.iter().find(|row| row.source == Source::Clinician).unwrap().id;
     let retracted = service.post(&format!("/api/v1/preferences/{first}/retract"), &json!({"reason": "a slip"})).await;
     assert!(retracted.status.is_success(), "{}", retracted.text);
-    let fewer = utility_history(&service, study, &beliefs).await;
+    let fewer = utility_history(&service, study, &analyses).await;
     assert_eq!(fewer.len(), 4);
     assert_eq!(fewer, utility_history(&service, study, &Arc::default()).await);
     service.stop().await;
@@ -293,11 +293,11 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
     };
     let study = service.study(plan).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let belief = async || {
-        let (snapshot, beliefs) = (snapshot(&service, study).await, Beliefs::default());
-        service.store.clone().compute(move |pool| beliefs.of(pool, &snapshot)).await.unwrap().unwrap()
+    let analysis = async || {
+        let (snapshot, analyses) = (snapshot(&service, study).await, Analyses::default());
+        service.store.clone().compute(move |pool| analyses.of(pool, &snapshot)).await.unwrap().unwrap()
     };
-    let before = belief().await;
+    let before = analysis().await;
     let trials = service.trials(study).await;
     let pooled: Vec<TrialId> = before.gaits.iter().flat_map(|gait| gait.trials.clone()).collect();
     assert_eq!(pooled.len(), trials.len(), "each trial is in one row");
@@ -309,8 +309,8 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
     }
     assert!(before.gaits.windows(2).all(|pair| pair[0].utility.mean >= pair[1].utility.mean));
     assert!(before.unexpected_answers.iter().all(|unexpected| unexpected.probability.is_none_or(|p| p < 0.5)));
-    let doubted = |belief: &Belief| {
-        let Agreement { comparisons, comparisons_agreeing, ties, ties_agreeing, .. } = belief.agreement;
+    let doubted = |analysis: &Analysis| {
+        let Agreement { comparisons, comparisons_agreeing, ties, ties_agreeing, .. } = analysis.agreement;
         comparisons - comparisons_agreeing + ties - ties_agreeing
     };
     assert_eq!(before.unexpected_answers.len(), doubted(&before));

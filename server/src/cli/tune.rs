@@ -89,8 +89,8 @@ impl Tune {
         let ran = Box::pin(unattended::run_and_certify(&mut store, &study, workers, lines)).await;
         store.close().await;
         let (ran, certification) = ran?;
-        let (snapshot, beliefs) = (ran.snapshot.clone(), Arc::clone(&ran.beliefs));
-        let choose = move |pool: &OnPool| best_trial(&snapshot, &*beliefs.posterior(pool, &snapshot)?);
+        let (snapshot, analyses) = (ran.snapshot.clone(), Arc::clone(&ran.analyses));
+        let choose = move |pool: &OnPool| best_trial(&snapshot, &*analyses.posterior(pool, &snapshot)?);
         let best = store.compute(choose).await?.map_err(Error::Learner)?;
         self.print(&summary::of(&ran.snapshot, best, certification))?;
         if !self.json {

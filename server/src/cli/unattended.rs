@@ -4,7 +4,7 @@ use super::interruption::interrupted;
 use super::output::{data, tell};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::certified_best::{self, BestCertification};
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -36,7 +36,7 @@ pub(super) struct Run {
     /// Whether a person stopped it.
     pub(super) interrupted: bool,
     /// The cached posteriors.
-    pub(super) beliefs: Arc<Beliefs>,
+    pub(super) analyses: Arc<Analyses>,
 }
 
 /// The engineering failures of a study. A trial without a gait is a result, not a failure.
@@ -89,7 +89,7 @@ pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lin
     if let Some(ended) = ended {
         ended?;
     }
-    Ok(Run { snapshot, interrupted, beliefs: Arc::clone(scheduler.beliefs()) })
+    Ok(Run { snapshot, interrupted, analyses: Arc::clone(scheduler.analyses()) })
 }
 
 /// Runs a study and certifies its best gaits, unless a person stops it.
@@ -103,7 +103,7 @@ pub(super) async fn run_and_certify(
     let certification = if ran.interrupted {
         BestCertification::default()
     } else {
-        certified(store, &ran.snapshot, &ran.beliefs).await?
+        certified(store, &ran.snapshot, &ran.analyses).await?
     };
     Ok((ran, certification))
 }
@@ -112,10 +112,10 @@ pub(super) async fn run_and_certify(
 pub(super) async fn certified(
     store: &mut Store,
     snapshot: &StudySnapshot,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
 ) -> Result<BestCertification, Error> {
     tell("certifying the best gait");
-    certified_best::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(beliefs)).await
+    certified_best::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(analyses)).await
 }
 
 /// Shows progress until the study ends.

@@ -157,7 +157,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("reference", format!("/reference-gaits/{}", site.service.reference().await)),
         ("new-study", "/studies/new".to_owned()),
         ("study", format!("/studies/{study}")),
-        ("belief", format!("/studies/{study}/belief?x=a5&y=a6")),
+        ("analysis", format!("/studies/{study}/analysis?x=a5&y=a6")),
         ("side-by-side", format!("/studies/compare?a={study}&b={other}")),
         ("compare", format!("/studies/{other}/compare")),
         ("gait", format!("/trials/{gait}")),

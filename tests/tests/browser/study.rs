@@ -158,7 +158,7 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
         page.text("[data-part=best]").await.contains("After 4 comparisons, the learner is")
             || page.text("[data-part=best]").await.contains("after 4 comparisons, the learner is only")
     );
-    let analysis = browser.open(&site.at(&format!("/studies/{study}/belief"))).await;
+    let analysis = browser.open(&site.at(&format!("/studies/{study}/analysis"))).await;
     assert!(analysis.text("#best tbody tr:nth-child(2)").await.contains(&sure), "{sure}");
     // A new answer adds a point without a reload.
     users::answer_once(&site.service, study).await;
@@ -262,7 +262,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.number_of_trials = 8).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let page = browser.open(&site.at(&format!("/studies/{study}/belief?x=a5&y=a6"))).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}/analysis?x=a5&y=a6"))).await;
     assert_eq!(page.count("#marginals svg.chart .band").await, 8);
     // Four clearances by six leans, twice.
     assert_eq!(page.count("#maps svg.map .cell").await, 48);
@@ -273,7 +273,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     assert!(page.text("#best tr.best").await.contains("recommended"));
     let means = "[...document.querySelectorAll('#best tbody tr')].map(r => Number(r.cells[2].textContent.split(' ')[0].replace('\u{2212}', '-')))";
     assert_eq!(page.value(&format!("{means}.every((mean, i, all) => i === 0 || mean <= all[i - 1])")).await, "true");
-    // Where Gait RMSE answers, it decides, and not the belief beside it.
+    // Where Gait RMSE answers, it decides, and not the analysis beside it.
     let by_rmse = "[...document.querySelectorAll('#best tbody tr')].slice(1).every((row, i, all) => \
         row.cells[3].textContent === (Number(row.cells[1].textContent) > Number(document.querySelector('#best tr.best').cells[1].textContent) \
         ? 'yes, by Gait RMSE' : 'no, by Gait RMSE'))";
@@ -299,7 +299,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     let doubted = "[...document.querySelectorAll('#answers tbody td:last-child')].every(cell => parseInt(cell.textContent) <= 50)";
     assert_eq!(page.value(doubted).await, "true");
     page.is_clean(&site.origin).await;
-    let wrong = site.service.fetch(&format!("/studies/{study}/belief?x=a5&y=a5")).await;
+    let wrong = site.service.fetch(&format!("/studies/{study}/analysis?x=a5&y=a5")).await;
     assert!(wrong.status.is_client_error(), "{}", wrong.status);
     page.click("#dot circle").await;
     page.wait_until(&format!("location.pathname === {trial:?}")).await;

@@ -103,7 +103,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(figures::of_study))
         .routes(routes!(figures::of_trial))
         .routes(routes!(figures::of_session))
-        .routes(routes!(figures::of_belief))
+        .routes(routes!(figures::of_analysis))
         .routes(routes!(figures::of_reference))
         // scripts of the lab
         .routes(routes!(ask_tell::ask))

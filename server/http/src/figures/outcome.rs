@@ -2,11 +2,11 @@
 
 use gait_learner::LearnerError;
 use gaitwright_compute::OnPool;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::history::{self, Milestone};
 use gaitwright_service::studies::pending_comparison::{Question, awaited_question};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::{last_believed, ranking_to_show};
+use gaitwright_service::studies::trial_choice::{last_known_best, ranking_to_show};
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::{AnswerSource, StudyState};
 
@@ -36,11 +36,11 @@ impl StudyOutcome {
         pool: &OnPool,
         snapshot: &StudySnapshot,
         large: bool,
-        beliefs: &Beliefs,
+        analyses: &Analyses,
     ) -> Result<Self, LearnerError> {
         if large {
             // A large study is not read completely, so the learner's last best action is used instead of the posterior.
-            let best = last_believed(snapshot);
+            let best = last_known_best(snapshot);
             let (ranking, history) = (best.into_iter().collect(), history::known(snapshot));
             let question = snapshot.study.state == StudyState::Waiting;
             return Ok(Self { best, ranking, history, question, ..Self::default() });
@@ -57,7 +57,7 @@ impl StudyOutcome {
         if snapshot.waits_for_first_answer() {
             return Ok(Self { unanswered: true, question, question_after, ..Self::default() });
         }
-        let ranking = ranking_to_show(pool, snapshot, beliefs)?;
+        let ranking = ranking_to_show(pool, snapshot, analyses)?;
         let best = ranking.first().copied();
         let history = history::of(snapshot, best);
         Ok(Self { best, ranking, history, question, question_after, ..Self::default() })

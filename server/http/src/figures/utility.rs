@@ -3,7 +3,7 @@
 use gait_learner::LearnerError;
 use gaitwright_charts::{Chart, Figure, Stroke};
 use gaitwright_compute::OnPool;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::utility_history::UtilityPoint;
 use gaitwright_store::studies::AnswerSource;
@@ -16,12 +16,12 @@ use gaitwright_store::studies::AnswerSource;
 pub(crate) fn utility(
     pool: &OnPool,
     snapshot: &StudySnapshot,
-    beliefs: &Beliefs,
+    analyses: &Analyses,
 ) -> Result<Option<Figure>, LearnerError> {
     if snapshot.study.plan.answer_source == AnswerSource::GaitRmse {
         return Ok(None);
     }
-    let points = beliefs.utility_history(pool, snapshot)?;
+    let points = analyses.utility_history(pool, snapshot)?;
     Ok((points.len() > 1).then(|| Figure::chart("", chart(&points))))
 }
 

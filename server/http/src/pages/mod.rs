@@ -1,9 +1,9 @@
 //! HTML pages, rendered on the server and usable without scripts.
 
 mod access_log;
+mod analysis;
 mod api_reference;
 mod audit;
-mod belief;
 mod certainty;
 mod certificate;
 mod compare;
@@ -62,7 +62,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/compare", get(study_comparison::get))
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
-        .route("/studies/{id}/belief", get(belief::get))
+        .route("/studies/{id}/analysis", get(analysis::get))
         .route("/studies/{id}/figures", get(figures::get))
         .route("/studies/{id}/details", get(study_details::get).post(study_details::post))
         .route("/studies/{id}/do", post(study::post))

@@ -16,7 +16,7 @@ use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_store::studies::{Study, StudyFilter};
 use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
@@ -83,8 +83,8 @@ pub(super) async fn get(
         (Some(a), Some(b)) => {
             let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
             drop(reader);
-            let beliefs = Arc::clone(&app.beliefs);
-            let compared = app.compute(move |pool| compare(pool, a, b, &beliefs)).await.map_err(Error::from)??;
+            let analyses = Arc::clone(&app.analyses);
+            let compared = app.compute(move |pool| compare(pool, a, b, &analyses)).await.map_err(Error::from)??;
             Some(with_best_gaits(&mut app, compared).await?)
         }
         _ => {
@@ -159,9 +159,9 @@ fn compare(
     pool: &OnPool,
     a: StudyResults,
     b: StudyResults,
-    beliefs: &Beliefs,
+    analyses: &Analyses,
 ) -> Result<(Compared, [Option<TrialId>; 2]), Error> {
-    let (of_a, of_b) = (a.outcome(pool, beliefs)?, b.outcome(pool, beliefs)?);
+    let (of_a, of_b) = (a.outcome(pool, analyses)?, b.outcome(pool, analyses)?);
     let comparable = have_one_reference_gait(&[&a.snapshot, &b.snapshot]);
     let both = [(&a.snapshot, &of_a), (&b.snapshot, &of_b)];
     let chart = if comparable { course(&both) } else { None };

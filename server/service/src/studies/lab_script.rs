@@ -3,7 +3,7 @@
 //! Asking again before the report returns the same trial. Proposals are computed before the transaction, and written
 //! only if the study has not changed.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::lifecycle;
 use super::pending_comparison::{by_gait_rmse, partners};
 use super::preference;
@@ -51,9 +51,9 @@ pub async fn suggest(
     store: &mut Store,
     study: StudyId,
     script: &str,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
 ) -> Result<SuggestedTrial, Error> {
-    let beliefs = Arc::clone(beliefs);
+    let analyses = Arc::clone(analyses);
     let script = printable::name("script", script, 80)?;
     let mut db = store.read().await?;
     let study = studies::get(&mut db, study).await?;
@@ -86,8 +86,8 @@ pub async fn suggest(
         }));
     }
     let choose = move |pool: &OnPool| {
-        let believed = beliefs.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
-        let chosen = believed.and_then(|belief| trial_choice::next_trial(pool, &snapshot, &belief));
+        let posterior = analyses.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
+        let chosen = posterior.and_then(|posterior| trial_choice::next_trial(pool, &snapshot, &posterior));
         (snapshot, chosen)
     };
     let (snapshot, chosen) = store.compute(choose).await?;

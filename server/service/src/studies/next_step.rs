@@ -1,6 +1,6 @@
 //! Decides what a study needs next (a trial, a question, the end), as a pure function of its snapshot.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::lifecycle::StudyTransition;
 use super::pending_comparison::{self, Question};
 use super::snapshot::StudySnapshot;
@@ -24,8 +24,8 @@ pub(super) enum PlanningStep {
     Try(NewTrial),
 }
 
-/// Decides the next step from the snapshot alone; `beliefs` is a cache.
-pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<PlanningStep, Error> {
+/// Decides the next step from the snapshot alone; `analyses` is a cache.
+pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Analyses) -> Result<PlanningStep, Error> {
     let study = &snapshot.study;
     if study.plan.answer_source == AnswerSource::People {
         match (study.state, pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
@@ -71,8 +71,8 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     if is_full || study.plan.evaluation == Evaluation::Script || trial_choice::awaits_root(snapshot) {
         return Ok(PlanningStep::Nothing);
     }
-    let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;
-    match trial_choice::next_trial(pool, snapshot, &belief) {
+    let posterior = analyses.posterior(pool, snapshot).map_err(Error::Learner)?;
+    match trial_choice::next_trial(pool, snapshot, &posterior) {
         Ok(new) => Ok(PlanningStep::Try(new)),
         Err(e) if e.is_exhausted() && open == 0 => {
             Ok(PlanningStep::Transition(StudyTransition::Finish, all_known(snapshot)))
@@ -119,7 +119,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             retraction: None,
         });
         // Posteriors of hypothetical answers must not enter the cache.
-        if let PlanningStep::Try(new) = next_step(pool, &then, &Beliefs::default())?
+        if let PlanningStep::Try(new) = next_step(pool, &then, &Analyses::default())?
             && !likely
                 .iter()
                 .any(|other| (other.action_index, other.warm_started_from) == (new.action_index, new.warm_started_from))

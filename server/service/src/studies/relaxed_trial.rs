@@ -3,7 +3,7 @@
 //! The action is the nearest one of the search space whose relaxed bounds are at least as loose as the explanation needs, so
 //! the gait that the explanation found is a solution of it.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::lifecycle::{self, StudyTransition};
 use super::search_space;
 use super::snapshot::StudySnapshot;
@@ -169,7 +169,7 @@ pub async fn choose(
     store: &mut Store,
     id: TrialId,
     place: usize,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
 ) -> Result<ChosenTrial, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
@@ -182,11 +182,11 @@ pub async fn choose(
     let RelaxedTrial { bounds, action, .. } = of(&mut db, &study, &trial, relaxation).await??;
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let beliefs = Arc::clone(beliefs);
+    let analyses = Arc::clone(analyses);
     let rank = move |pool: &OnPool| {
-        let belief = beliefs.posterior(pool, &snapshot);
-        let ranked = belief.and_then(|belief| {
-            Ok::<_, LearnerError>((best_trial(&snapshot, &belief)?, warm_start_of_next(&snapshot, &belief)?))
+        let posterior = analyses.posterior(pool, &snapshot);
+        let ranked = posterior.and_then(|posterior| {
+            Ok::<_, LearnerError>((best_trial(&snapshot, &posterior)?, warm_start_of_next(&snapshot, &posterior)?))
         });
         (snapshot, ranked)
     };

@@ -227,7 +227,7 @@ class StudiesMethods(Transport):
     def get_recommendation(self, study_id: StudyId) -> Recommendation:
         """Get the recommendation of a study.
 
-        Of the actions tried, the one that the learner believes to be the best.
+        Of the actions tried, the one with the highest utility.
         """
         return cast(Recommendation, self.request_json("GET", "/api/v1/studies/{id}/recommendation", {"id": study_id}))
 

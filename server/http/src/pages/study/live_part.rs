@@ -18,7 +18,7 @@ use gaitwright_charts::gait_charts;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Caller, Permission, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
+use gaitwright_service::studies::analysis::{Analyses, MOST_ANSWERS};
 use gaitwright_service::studies::certified_best::{self, BestCertification, CertificateState};
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
@@ -189,9 +189,9 @@ pub(super) async fn read_live(
     let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
     let assessments = assessments::of_study(&mut reader, id).await?;
     drop(reader);
-    let beliefs = Arc::clone(&app.beliefs);
+    let analyses = Arc::clone(&app.analyses);
     let draw = move |pool: &OnPool| {
-        let outcome = learned(pool, &snapshot, large, &beliefs);
+        let outcome = learned(pool, &snapshot, large, &analyses);
         (snapshot, outcome)
     };
     let (snapshot, learned) = app.compute(draw).await?;
@@ -242,13 +242,13 @@ struct Learned {
     utility: Option<Figure>,
 }
 
-fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, beliefs: &Beliefs) -> Result<Learned, LearnerError> {
-    let outcome = StudyOutcome::of(pool, snapshot, large, beliefs)?;
+fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, analyses: &Analyses) -> Result<Learned, LearnerError> {
+    let outcome = StudyOutcome::of(pool, snapshot, large, analyses)?;
     if large || outcome.best.is_none() {
         return Ok(Learned { outcome, certainty: None, utility: None });
     }
-    let certainty = certainty(snapshot, &*beliefs.of(pool, snapshot)?);
-    Ok(Learned { outcome, certainty, utility: utility(pool, snapshot, beliefs)? })
+    let certainty = certainty(snapshot, &*analyses.of(pool, snapshot)?);
+    Ok(Learned { outcome, certainty, utility: utility(pool, snapshot, analyses)? })
 }
 
 pub(super) fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {

@@ -101,9 +101,9 @@ impl Scheduler {
             let snapshot = StudySnapshot::read(&mut reader, study.clone()).await?;
             drop(reader);
             self.certify_for_people(&snapshot);
-            let beliefs = Arc::clone(&self.0.beliefs);
+            let analyses = Arc::clone(&self.0.analyses);
             let decide = move |pool: &OnPool| {
-                let step = next_step(pool, &snapshot, &beliefs);
+                let step = next_step(pool, &snapshot, &analyses);
                 (snapshot, step)
             };
             let (snapshot, step) = store.compute(decide).await?;
