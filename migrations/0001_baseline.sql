@@ -1010,20 +1010,20 @@ create table idempotency_keys (
 
 -- One row for each change by a user or a program, written in the transaction of the change.
 create table audit (
-    seq      integer primary key autoincrement,
-    at       text not null,
-    actor    text not null constraint audit_actor_length check (length(actor) between 1 and 120),
-    action   text not null constraint audit_action_length check (length(action) between 1 and 60),
+    seq        integer primary key autoincrement,
+    created_at text not null,
+    actor      text not null constraint audit_actor_length check (length(actor) between 1 and 120),
+    change     text not null constraint audit_change_length check (length(change) between 1 and 60),
     -- Kind and identifier of the changed object: `study 0190...`.
-    object   text not null,
-    detail   text not null constraint audit_detail_json check (json_valid(detail)),
+    object     text not null,
+    detail     text not null constraint audit_detail_json check (json_valid(detail)),
     -- The hash of the previous row, and the SHA-256 of this row together with it.
-    previous text not null constraint audit_previous_length check (length(previous) = 64),
-    hash     text not null constraint audit_hash_unique unique constraint audit_hash_length check (length(hash) = 64)
+    previous   text not null constraint audit_previous_length check (length(previous) = 64),
+    hash       text not null constraint audit_hash_unique unique constraint audit_hash_length check (length(hash) = 64)
 ) strict;
 
 -- Raters who were allowed to read earlier are not blind, so each of their answers looks up their former roles.
-create index audit_role_changes on audit (object) where action = 'user.role';
+create index audit_role_changes on audit (object) where change = 'user.role';
 
 create trigger audit_no_update before update on audit
 begin select raise(abort, 'the audit trail is append-only'); end;

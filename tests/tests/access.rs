@@ -383,7 +383,7 @@ async fn wrong_passwords_wait_longer_each_time_and_are_audited() {
     let waits = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, right).await;
     assert_eq!(waits.status, StatusCode::TOO_MANY_REQUESTS, "even the right one");
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 100).await.unwrap();
-    let count = |action: &str| rows.iter().filter(|row| row.action == action).count();
+    let count = |change: &str| rows.iter().filter(|row| row.change == change).count();
     assert_eq!((count("session.refuse"), count("session.wait")), (4, 1));
     assert_eq!(rows[0].detail["failed_attempts_of_network"], 5);
     service.stop().await;

@@ -210,7 +210,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let invited = service.post(&format!("{of_finished}/invitations"), &json!({"name": "R7"})).await;
     assert!(invited.status.is_success(), "{}", invited.text);
     let newest = audit::page(&mut service.store.read().await.unwrap(), "", None, 3).await.unwrap();
-    let acts: Vec<_> = newest.iter().map(|row| row.action.as_str()).collect();
+    let acts: Vec<_> = newest.iter().map(|row| row.change.as_str()).collect();
     assert_eq!(acts, ["study.member_add", "user.link", "user.add"]);
     done.insert("post /studies/{id}/invitations".to_owned());
     let token =

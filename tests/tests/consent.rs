@@ -86,7 +86,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let withdrawn = service.post(&format!("{of_subject}/withdraw"), &withdraw).await;
     assert_eq!(withdrawn.status, StatusCode::OK, "{}", withdrawn.text);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    assert_eq!((trail.len(), trail[0].action.as_str()), (before + 1, "subject.withdraw"));
+    assert_eq!((trail.len(), trail[0].change.as_str()), (before + 1, "subject.withdraw"));
     assert_eq!(trail[0].detail["stopped"].as_array().unwrap().len(), 4);
     assert_eq!(service.post(&format!("{of_subject}/withdraw"), &withdraw).await.status, StatusCode::CONFLICT);
     for study in [draft, human, script, running] {
@@ -264,7 +264,7 @@ async fn subject_page_records_and_withdraws_consent() {
     assert!(!shown.contains("/withdraw\""), "it cannot be done twice");
     assert_eq!(send("withdraw", "reason=again&confirmed=yes").await.status, StatusCode::CONFLICT);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 10).await.unwrap();
-    let acts: Vec<_> = trail.iter().map(|row| row.action.as_str()).take(2).collect();
+    let acts: Vec<_> = trail.iter().map(|row| row.change.as_str()).take(2).collect();
     assert_eq!(acts, ["subject.withdraw", "subject.consent"]);
     service.stop().await;
 }

@@ -57,7 +57,7 @@ async fn explained(service: &Service, trial: TrialId) -> Value {
 /// The trials that the service explained, in order.
 async fn explained_in_order(service: &Service) -> Vec<String> {
     let mut trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    trail.retain(|row| row.action == "trial.explain" && row.actor == Actor::program().as_str());
+    trail.retain(|row| row.change == "trial.explain" && row.actor == Actor::program().as_str());
     trail.iter().rev().map(|row| row.object.clone()).collect()
 }
 
@@ -132,7 +132,7 @@ async fn repeated_requests_give_one_explanation() {
     assert_eq!(keyed().await.status, StatusCode::ACCEPTED, "the same request has the same answer");
     assert_eq!(counts.begun.load(Ordering::SeqCst), 1);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    assert_eq!(trail.iter().filter(|row| row.action == "trial.ask_explanation").count(), 1);
+    assert_eq!(trail.iter().filter(|row| row.change == "trial.ask_explanation").count(), 1);
     let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     let told: Vec<_> = told.iter().filter(|event| event.kind == "trial_explained").collect();
     assert_eq!((told.len(), &told[0].payload["relaxed_bound"]), (1, &json!("a5")));
@@ -285,7 +285,7 @@ async fn relaxation_within_the_search_space_is_tried_in_the_same_study() {
     assert_eq!((relaxed.action, relaxed.state), (expected, TrialState::Converged));
     assert_eq!(relaxed.reason, format!("requested by a person: trial {} with a5 relaxed", trial.number));
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    let rows: Vec<_> = trail.iter().filter(|row| row.action == "trial.relax").collect();
+    let rows: Vec<_> = trail.iter().filter(|row| row.change == "trial.relax").collect();
     assert_eq!(rows.iter().map(|row| row.object.clone()).collect::<Vec<_>>(), [format!("trial {}", relaxed.id)]);
 
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;

@@ -97,7 +97,7 @@ async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     assert_eq!(service.post(&format!("{api}/close"), &json!({})).await.status, StatusCode::CONFLICT);
     assert!(service.fetch(&format!("{api}/next-walk")).await.json()["walk"].is_null());
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 6).await.unwrap();
-    let acts: Vec<_> = trail.iter().map(|row| row.action.trim_start_matches("lab_session.")).collect();
+    let acts: Vec<_> = trail.iter().map(|row| row.change.trim_start_matches("lab_session.")).collect();
     assert_eq!(acts, ["close", "walk", "unblind", "walk", "walk", "plan"]);
     service.stop().await;
 }

@@ -157,7 +157,7 @@ async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
 /// The trials whose gaits the service certified by itself, in order.
 async fn certified_by_service(service: &Service) -> Vec<String> {
     let mut trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    trail.retain(|row| row.action == "trial.certify" && row.actor == Actor::program().as_str());
+    trail.retain(|row| row.change == "trial.certify" && row.actor == Actor::program().as_str());
     trail.iter().rev().map(|row| row.object.clone()).collect()
 }
 

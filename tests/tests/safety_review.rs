@@ -85,7 +85,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert_eq!(called_unsafe, Some(vec![gait.parse().unwrap()]));
     let trail = audit::page(&mut reader, "", None, 100).await.unwrap();
     drop(reader);
-    let reviews: Vec<_> = trail.iter().filter(|row| row.action == "gait.review").collect();
+    let reviews: Vec<_> = trail.iter().filter(|row| row.change == "gait.review").collect();
     assert_eq!(reviews.len(), 2);
     assert!(reviews.iter().any(|row| row.detail.to_string().contains("the video was cut")));
     let feedback = service.feedback(study).await;

@@ -63,9 +63,9 @@ async fn start_anew(database: &Path) -> Service {
     Service::start(database, Analytic::default(), 1).await
 }
 
-async fn trail(service: &Service, action: &str) -> Vec<AuditRow> {
+async fn trail(service: &Service, change: &str) -> Vec<AuditRow> {
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    rows.into_iter().filter(|row| row.action == action).collect()
+    rows.into_iter().filter(|row| row.change == change).collect()
 }
 
 /// Attempts that were started and never finished, as when the client disconnects.

@@ -151,7 +151,7 @@ async fn call(service: &Service, who: &As, method: &Method, path: &str, id: &str
 /// The newest row of the audit trail.
 async fn newest_act(service: &Service) -> String {
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
-    format!("{} {}", rows[0].seq, rows[0].action)
+    format!("{} {}", rows[0].seq, rows[0].change)
 }
 
 #[tokio::test]

@@ -10,9 +10,9 @@ use sqlx::Row;
 
 /// Kind of the event with a report.
 pub const SIMULATED: &str = "gait_simulated";
-/// The action in the audit trail that requests a report.
+/// The change in the audit trail that requests a report.
 pub const REQUESTED: &str = "trial.ask_execution_report";
-/// The action in the audit trail that stores a report.
+/// The change in the audit trail that stores a report.
 pub const STORED: &str = "trial.simulate";
 
 /// Payload of the event with a report.
@@ -70,8 +70,8 @@ pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<S
 pub async fn requested(db: &mut Connection) -> StoreResult<Vec<(TrialId, u32, u64)>> {
     let rows = sqlx::query(
         "select t.id, json_extract(a.detail, '$.walks') as walks, json_extract(a.detail, '$.seed') as seed \
-         from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) where a.action = ?1 \
-         and not exists (select 1 from audit c where c.seq > a.seq and c.object = a.object and c.action in (?1, ?2)) \
+         from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) where a.change = ?1 \
+         and not exists (select 1 from audit c where c.seq > a.seq and c.object = a.object and c.change in (?1, ?2)) \
          order by a.seq",
     )
     .bind(REQUESTED)
