@@ -123,7 +123,7 @@ create table studies (
     -- What evaluates trials.
     evaluation           text not null default 'optimizer'
                          constraint studies_evaluation check (evaluation in ('optimizer', 'script')),
-    number_of_trials         integer not null constraint studies_number_of_trials check (number_of_trials between 1 and 10000),
+    number_of_trials     integer not null constraint studies_number_of_trials check (number_of_trials between 1 and 10000),
     -- Total solve time after which no new trial starts.
     solve_seconds_budget real
                          constraint studies_solve_seconds
@@ -730,12 +730,12 @@ begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Which gait walk 2 uses, drawn by the operating system. Only store/src/allocations reads this table.
 create table lab_allocations (
-    session_id   text primary key not null references lab_sessions (id),
+    lab_session_id text primary key not null references lab_sessions (id),
     -- Whether walk 2 uses gait A.
-    gait_a_first integer not null constraint lab_allocations_order check (gait_a_first in (0, 1)),
+    gait_a_first   integer not null constraint lab_allocations_order check (gait_a_first in (0, 1)),
     -- Random, so that the hash in the seal of the row does not reveal the allocation.
-    nonce        text not null constraint lab_allocations_nonce check (length(nonce) = 64),
-    created_at   text not null
+    nonce          text not null constraint lab_allocations_nonce check (length(nonce) = 64),
+    created_at     text not null
 ) strict;
 
 create trigger lab_allocations_no_update before update on lab_allocations
@@ -745,14 +745,14 @@ begin select raise(abort, 'allocations are append-only'); end;
 
 -- Completed steps of a session. Each step happens at most once.
 create table lab_session_steps (
-    session_id text not null references lab_sessions (id),
-    step       text not null
-               constraint lab_session_steps_step
-               check (step in ('walk_1', 'walk_2', 'walk_3', 'unblinded', 'closed')),
-    note       text not null default '' constraint lab_session_steps_note check (length(note) <= 2000),
-    actor      text not null,
-    created_at text not null,
-    primary key (session_id, step)
+    lab_session_id text not null references lab_sessions (id),
+    step           text not null
+                   constraint lab_session_steps_step
+                   check (step in ('walk_1', 'walk_2', 'walk_3', 'unblinded', 'closed')),
+    note           text not null default '' constraint lab_session_steps_note check (length(note) <= 2000),
+    actor          text not null,
+    created_at     text not null,
+    primary key (lab_session_id, step)
 ) strict;
 
 create trigger lab_session_steps_no_update before update on lab_session_steps
@@ -760,46 +760,46 @@ begin select raise(abort, 'steps of lab sessions are append-only'); end;
 create trigger lab_session_steps_no_delete before delete on lab_session_steps
 begin select raise(abort, 'steps of lab sessions are append-only'); end;
 create trigger lab_session_steps_need_consent before insert on lab_session_steps
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Downloads of the controller files of walks. A controller file reveals the gait of its walk to a person who reads it.
 create table controller_file_downloads (
-    id         text primary key not null,
-    session_id text not null references lab_sessions (id),
-    walk       integer not null constraint controller_file_downloads_walk check (walk in (2, 3)),
+    id             text primary key not null,
+    lab_session_id text not null references lab_sessions (id),
+    walk           integer not null constraint controller_file_downloads_walk check (walk in (2, 3)),
     -- Whether the device itself fetched the file, with a token that has no other right.
-    to_device  integer not null constraint controller_file_downloads_to_device check (to_device in (0, 1)),
-    actor      text not null,
-    created_at text not null
+    to_device      integer not null constraint controller_file_downloads_to_device check (to_device in (0, 1)),
+    actor          text not null,
+    created_at     text not null
 ) strict;
 
-create index controller_file_downloads_by_session on controller_file_downloads (session_id);
+create index controller_file_downloads_by_session on controller_file_downloads (lab_session_id);
 
 create trigger controller_file_downloads_no_update before update on controller_file_downloads
 begin select raise(abort, 'downloads of controller files are append-only'); end;
 create trigger controller_file_downloads_no_delete before delete on controller_file_downloads
 begin select raise(abort, 'downloads of controller files are append-only'); end;
 create trigger controller_file_downloads_need_consent before insert on controller_file_downloads
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Answers of the subject about the two walks with the device: first is walk 2. The learner receives a preference only when the
 -- session is unblinded, because feedback is visible and would reveal the allocation.
 create table lab_answers (
-    session_id text not null references lab_sessions (id),
+    lab_session_id text not null references lab_sessions (id),
     -- From 1; an answer after a retraction has the next number.
-    number     integer not null constraint lab_answers_number check (number >= 1),
-    answer     text not null
-               constraint lab_answers_answer
-               check (answer in ('first', 'second', 'no_difference', 'cannot_tell', 'unsafe_first', 'unsafe_second',
-                                 'unsafe_both')),
-    note       text not null default '' constraint lab_answers_note check (length(note) <= 2000),
-    actor      text not null,
-    created_at text not null,
-    primary key (session_id, number)
+    number         integer not null constraint lab_answers_number check (number >= 1),
+    answer         text not null
+                   constraint lab_answers_answer
+                   check (answer in ('first', 'second', 'no_difference', 'cannot_tell', 'unsafe_first', 'unsafe_second',
+                                     'unsafe_both')),
+    note           text not null default '' constraint lab_answers_note check (length(note) <= 2000),
+    actor          text not null,
+    created_at     text not null,
+    primary key (lab_session_id, number)
 ) strict;
 
 create trigger lab_answers_no_update before update on lab_answers
@@ -807,17 +807,17 @@ begin select raise(abort, 'answers in lab sessions are append-only'); end;
 create trigger lab_answers_no_delete before delete on lab_answers
 begin select raise(abort, 'answers in lab sessions are append-only'); end;
 create trigger lab_answers_need_consent before insert on lab_answers
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 create table lab_answer_retractions (
-    session_id text not null,
-    number     integer not null,
-    actor      text not null,
-    created_at text not null,
-    primary key (session_id, number),
-    foreign key (session_id, number) references lab_answers (session_id, number)
+    lab_session_id text not null,
+    number         integer not null,
+    actor          text not null,
+    created_at     text not null,
+    primary key (lab_session_id, number),
+    foreign key (lab_session_id, number) references lab_answers (lab_session_id, number)
 ) strict;
 
 create trigger lab_answer_retractions_no_update before update on lab_answer_retractions
@@ -828,47 +828,47 @@ begin select raise(abort, 'retractions are append-only'); end;
 -- Measurement files of walks. The newest file of a walk and kind is used. All of them are kept, so that they can be processed
 -- again with other settings.
 create table measurement_files (
-    id         text primary key not null,
-    session_id text not null references lab_sessions (id),
-    walk       integer not null constraint measurement_files_walk check (walk in (1, 2, 3)),
-    kind       text not null constraint measurement_files_kind check (kind in ('emg', 'motion')),
+    id             text primary key not null,
+    lab_session_id text not null references lab_sessions (id),
+    walk           integer not null constraint measurement_files_walk check (walk in (1, 2, 3)),
+    kind           text not null constraint measurement_files_kind check (kind in ('emg', 'motion')),
     -- How to read the file, as JSON.
-    reading    text not null constraint measurement_files_reading check (json_valid(reading)),
+    reading        text not null constraint measurement_files_reading check (json_valid(reading)),
     -- The file, compressed with zstd.
-    raw        blob not null,
-    raw_sha256 text not null,
-    actor      text not null,
-    created_at text not null
+    raw            blob not null,
+    raw_sha256     text not null,
+    actor          text not null,
+    created_at     text not null
 ) strict;
 
-create index measurement_files_by_session on measurement_files (session_id, kind, walk);
+create index measurement_files_by_session on measurement_files (lab_session_id, kind, walk);
 
 create trigger measurement_files_no_update before update on measurement_files
 begin select raise(abort, 'measurement files are append-only'); end;
 create trigger measurement_files_no_delete before delete on measurement_files
 begin select raise(abort, 'measurement files are append-only'); end;
 create trigger measurement_files_need_consent before insert on measurement_files
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Results of EMG processing: settings and curves as JSON.
 create table emg_results (
-    id         text primary key not null,
-    session_id text not null references lab_sessions (id),
-    document   text not null constraint emg_results_document check (json_valid(document)),
-    actor      text not null,
-    created_at text not null
+    id             text primary key not null,
+    lab_session_id text not null references lab_sessions (id),
+    document       text not null constraint emg_results_document check (json_valid(document)),
+    actor          text not null,
+    created_at     text not null
 ) strict;
 
-create index emg_results_by_session on emg_results (session_id);
+create index emg_results_by_session on emg_results (lab_session_id);
 
 create trigger emg_results_no_update before update on emg_results
 begin select raise(abort, 'EMG results are append-only'); end;
 create trigger emg_results_no_delete before delete on emg_results
 begin select raise(abort, 'EMG results are append-only'); end;
 create trigger emg_results_need_consent before insert on emg_results
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 

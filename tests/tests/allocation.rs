@@ -404,7 +404,7 @@ fn by_hash(sha256: &str, session: &str, created_at: &str) -> Option<bool> {
         };
         column("created_at", "TEXT", created_at.as_bytes());
         column("gait_a_first", "INTEGER", &i64::from(first).to_be_bytes());
-        column("session_id", "TEXT", session.as_bytes());
+        column("lab_session_id", "TEXT", session.as_bytes());
         if hex::encode(hash.finalize()) == sha256 {
             return Some(first);
         }

@@ -62,7 +62,7 @@ of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
     StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
 });
 of_study!(MeasurementFileId, "measurement file", async |db: &mut Connection, id| {
-    let session = measurement_files::get(db, id).await?.session_id;
+    let session = measurement_files::get(db, id).await?.lab_session_id;
     StoreResult::Ok(lab_sessions::get(db, session).await?.study_id)
 });
 

@@ -43,12 +43,12 @@ const TABLES: [(&str, &str); 31] = [
     ),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_allocations", archived_allocations::LAB),
-    ("controller_file_downloads", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
-    ("lab_session_steps", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
-    ("lab_answers", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
-    ("lab_answer_retractions", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
-    ("measurement_files", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
-    ("emg_results", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("controller_file_downloads", "lab_session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("lab_session_steps", "lab_session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("lab_answers", "lab_session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("lab_answer_retractions", "lab_session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("measurement_files", "lab_session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("emg_results", "lab_session_id in (select id from lab_sessions where study_id = ?) order by id"),
     ("imports", "study_id = ? order by seq"),
 ];
 

@@ -1536,7 +1536,7 @@ class _LabSessionProgressRequired(TypedDict):
     # Whether the session is closed.
     closed: bool
     # Identifier of the session.
-    session: LabSessionId
+    lab_session_id: LabSessionId
     # Number of walks.
     walks: int
 
@@ -1730,7 +1730,7 @@ class _MeasurementFileRequired(TypedDict):
     # SHA-256 of the file.
     raw_sha256: str
     # Identifier of the lab session.
-    session_id: LabSessionId
+    lab_session_id: LabSessionId
     # Number of the walk, 1 to 3.
     walk: int
 
