@@ -598,13 +598,13 @@ begin select raise(abort, 'safety reviews are append-only'); end;
 
 ---------------------------------------------------------------- Blind pairs
 
--- Pairs of gaits shown to raters. A rater knows a pair by its token only. Gait A is the newer one, so trial_a and trial_b do
+-- Pairs of gaits shown to raters. A rater knows a pair by its code only. Gait A is the newer one, so trial_a and trial_b do
 -- not tell which gait is shown first: that is an allocation (blind_pair_allocations).
 create table blind_pairs (
     id         text primary key not null,
-    token      text not null
-               constraint blind_pairs_token_unique unique
-               constraint blind_pairs_token_length check (length(token) = 64),
+    code       text not null
+               constraint blind_pairs_code_unique unique
+               constraint blind_pairs_code_length check (length(code) = 64),
     study_id   text not null references studies (id),
     rater      text not null constraint blind_pairs_rater_length check (length(rater) between 1 and 80),
     -- Number for this rater in this study.

@@ -24,7 +24,7 @@ pub async fn fill(database: &Path) {
     let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["code"].as_str().unwrap());
     assert_eq!(service.post(&answer, &json!({"answer": "first"})).await.status, StatusCode::OK);
     service.wait_for(study, &[StudyState::Waiting]).await;
     let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();

@@ -47,7 +47,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
             let method: Method = method.to_uppercase().parse().unwrap();
             let address = path
                 .replace("{id}", UNKNOWN)
-                .replace("{token}", "unknown")
+                .replace("{code}", "unknown")
                 .replace("{side}", "first")
                 .replace("{file}", "a.svg");
             for (who, rights) in &callers {
@@ -119,9 +119,9 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("post /units", Some(Right::Read)),
     ("get /rate", Some(Right::Rate)),
     ("post /rate/{id}", Some(Right::Rate)),
-    ("get /rate/pair/{token}", Some(Right::Rate)),
-    ("post /rate/pair/{token}", Some(Right::Rate)),
-    ("post /rate/pair/{token}/retract", Some(Right::Rate)),
+    ("get /rate/pair/{code}", Some(Right::Rate)),
+    ("post /rate/pair/{code}", Some(Right::Rate)),
+    ("post /rate/pair/{code}/retract", Some(Right::Rate)),
     ("get /studies/{id}/lab", Some(Right::Read)),
     ("post /studies/{id}/lab", Some(Right::Run)),
     ("get /lab-sessions/{id}", Some(Right::Read)),
@@ -172,7 +172,7 @@ async fn every_page_is_shown_to_users_with_its_right() {
         let Some(needed) = needed else { continue };
         let address = path
             .replace("{id}", UNKNOWN)
-            .replace("{token}", "unknown")
+            .replace("{code}", "unknown")
             .replace("{side}", "first")
             .replace("{file}", "a.svg");
         for (who, rights) in &callers {

@@ -47,7 +47,7 @@ fn operations() -> Vec<(Method, String)> {
 
 /// A path of a route.
 fn path_of(route: &str) -> String {
-    let path = route.replace("{id}", ANY_ID).replace("{token}", "secret").replace("{side}", "first");
+    let path = route.replace("{id}", ANY_ID).replace("{code}", "secret").replace("{side}", "first");
     path.replace("{link}", "secret").replace("{file}", "a.svg").replace("{name}", "conflict")
 }
 

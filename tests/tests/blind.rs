@@ -32,7 +32,7 @@ async fn next(service: &Service, study: StudyId) -> Value {
 }
 
 async fn say(service: &Service, pair: &Value, answer: &str) -> StatusCode {
-    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     service.post(&path, &json!({"answer": answer, "response_ms": 900})).await.status
 }
 
@@ -44,13 +44,13 @@ async fn shown(service: &Service, study: StudyId) -> Vec<BlindPair> {
 async fn responses_to_raters_reveal_no_gait() {
     let (_folder, service, study) = waiting(4).await;
     let pair = next(&service, study).await;
-    let token = pair["token"].as_str().unwrap();
+    let code = pair["code"].as_str().unwrap();
     let mut bytes = pair.to_string();
     for path in [
         "/rate".to_owned(),
-        format!("/rate/pair/{token}"),
-        format!("/api/v1/blind-pairs/{token}/motions/first"),
-        format!("/api/v1/blind-pairs/{token}/motions/second"),
+        format!("/rate/pair/{code}"),
+        format!("/api/v1/blind-pairs/{code}/motions/first"),
+        format!("/api/v1/blind-pairs/{code}/motions/second"),
     ] {
         let answer = service.fetch(&path).await;
         assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
@@ -67,7 +67,7 @@ async fn responses_to_raters_reveal_no_gait() {
         }
     }
     let taken = service.post_text(&format!("/rate/{study}"), "application/x-www-form-urlencoded", "").await;
-    assert_eq!(taken.headers["location"], format!("/rate/pair/{token}"), "the same pair until it is answered");
+    assert_eq!(taken.headers["location"], format!("/rate/pair/{code}"), "the same pair until it is answered");
     for trial in service.trials(study).await {
         for secret in [
             trial.id.to_string(),
@@ -86,7 +86,7 @@ async fn responses_to_raters_reveal_no_gait() {
     }
     // Both motions have the same length, number of figures and start position.
     let motion = |side: &str| {
-        let path = format!("/api/v1/blind-pairs/{token}/motions/{side}");
+        let path = format!("/api/v1/blind-pairs/{code}/motions/{side}");
         let service = &service;
         async move { service.fetch(&path).await.json()["figures"].take() }
     };
@@ -111,7 +111,7 @@ async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &s
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         }
-        let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+        let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
         let body = json!({"answer": answer}).to_string();
         let said = send(service, who, &Method::POST, &path, "application/json", &body).await;
         assert_eq!(said.status, StatusCode::OK, "{}", said.text);
@@ -221,7 +221,7 @@ async fn each_side_shows_the_gait_drawn_for_it() {
             break;
         }
         let pair = next(&service, study).await;
-        let Some(token) = pair["token"].as_str() else {
+        let Some(code) = pair["code"].as_str() else {
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         };
@@ -229,7 +229,7 @@ async fn each_side_shows_the_gait_drawn_for_it() {
         let of = |id| hip_m(trials.iter().find(|trial| trial.id == id).unwrap().gait_rmse_rad.unwrap());
         let (first, second) = *sides(&service.store, study).await.last().unwrap();
         for (side, trial) in [("first", first), ("second", second)] {
-            let motion = service.fetch(&format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.json();
+            let motion = service.fetch(&format!("/api/v1/blind-pairs/{code}/motions/{side}")).await.json();
             let hip = motion["figures"][0][0][1].as_f64().unwrap();
             assert!((hip - of(trial)).abs() < 6e-4, "{side}: {hip} m, drawn: {} m", of(trial));
         }
@@ -259,10 +259,10 @@ async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() 
         while pair.is_null() {
             pair = send(&service, who, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
         }
-        let token = pair["token"].as_str().unwrap();
-        let page = send(&service, who, &Method::GET, &format!("/rate/pair/{token}"), "", "").await.text;
+        let code = pair["code"].as_str().unwrap();
+        let page = send(&service, who, &Method::GET, &format!("/rate/pair/{code}"), "", "").await.text;
         assert_eq!(page.contains("recorded as not blind"), unblinded, "{page}");
-        let path = format!("/api/v1/blind-pairs/{token}/answer");
+        let path = format!("/api/v1/blind-pairs/{code}/answer");
         let said = send(&service, who, &Method::POST, &path, "application/json", "{\"answer\": \"second\"}").await;
         assert_eq!(said.status, StatusCode::OK, "{}", said.text);
         let newest = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
@@ -291,11 +291,11 @@ async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
     }
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
-    for page in ["/rate".to_owned(), format!("/rate/pair/{}", pair["token"].as_str().unwrap())] {
+    for page in ["/rate".to_owned(), format!("/rate/pair/{}", pair["code"].as_str().unwrap())] {
         let page = send(&service, &rater, &Method::GET, &page, "", "").await;
         assert!(page.text.contains("recorded as not blind"), "{}", page.text);
     }
-    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, "application/json", "{\"answer\": \"first\"}").await;
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
     service.stop().await;
@@ -312,7 +312,7 @@ async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let pair = send(&service, &rater, &Method::POST, &next, json_of, "{}").await.json()["pair"].clone();
     let unblind = json!({"rater": "a rater", "reason": "adverse event"}).to_string();
     send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/raters/unblind"), json_of, &unblind).await;
-    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, json_of, "{\"answer\": \"first\"}").await;
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
     service.stop().await;
@@ -371,8 +371,8 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     };
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = post(&rater, &next, json!({})).await.json()["pair"].clone();
-    let token = pair["token"].as_str().unwrap();
-    post(&rater, &format!("/api/v1/blind-pairs/{token}/answer"), json!({"answer": "second"})).await;
+    let code = pair["code"].as_str().unwrap();
+    post(&rater, &format!("/api/v1/blind-pairs/{code}/answer"), json!({"answer": "second"})).await;
     let path = format!("/api/v1/studies/{study}/raters/unblind");
     let refused = post(&admin, &path, json!({"rater": "a rater", "reason": " "})).await;
     assert_eq!(refused.json()["field"], "reason");
@@ -381,7 +381,7 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let told = post(&admin, &path, json!({"rater": "a rater", "reason": "adverse event"})).await;
     assert_eq!(told.status, StatusCode::OK);
     assert_eq!(told.json()["pairs"][0]["shown_first"], json!(sides(&service.store, study).await[0].0));
-    assert!(!told.text.contains(token));
+    assert!(!told.text.contains(code));
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
     assert_eq!((rows[0].change.as_str(), &rows[0].detail["reason"]), ("study.unblind", &json!("adverse event")));
     loop {
@@ -400,7 +400,7 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
     const FORM: &str = "application/x-www-form-urlencoded";
     let (_folder, service, study) = waiting(6).await;
     let pair = next(&service, study).await;
-    let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["token"].as_str().unwrap());
+    let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["code"].as_str().unwrap());
     assert_eq!(say(&service, &pair, "first").await, StatusCode::OK);
     let answers_in_force = |rows: &[gaitwright_store::feedback::FeedbackRow]| {
         rows.iter().filter(|row| row.by_rater && row.retraction.is_none()).count()
@@ -445,7 +445,7 @@ async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
 
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
-    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &answer, "application/json", r#"{"answer": "first"}"#).await;
     let (seen, by_clinician) = (read(&admin).await, read(&clinician).await);
     assert!(seen.contains("<th scope=\"row\">a rater</th>") && seen.contains("<td>concealed</td>"), "{seen}");

@@ -51,7 +51,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let human = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{human}/blind-pairs/next"), &json!({})).await.json();
-    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
+    let code = pair["pair"]["code"].as_str().unwrap().to_owned();
     let script = service.study(|new| (new.number_of_trials, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     // One is open at any instant.
@@ -111,7 +111,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/studies/{finished}/suggestions"), suggestion),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
         (format!("/api/v1/studies/{human}/blind-pairs/next"), json!({})),
-        (format!("/api/v1/blind-pairs/{token}/answer"), json!({"answer": "first"})),
+        (format!("/api/v1/blind-pairs/{code}/answer"), json!({"answer": "first"})),
         (format!("/api/v1/trials/{cancelled}/retry"), json!({})),
         (format!("/api/v1/studies/{finished}/lab-sessions"), gaits),
         (format!("/api/v1/lab-sessions/{session}/walks"), json!({"walk": 2})),
@@ -152,7 +152,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         ("/jobs/{id}", format!("solve-{}", trials[0].id)),
         ("/preferences/{id}", preference.to_string()),
         ("/assessments/{id}", assessment.clone()),
-        ("/blind-pairs/{token}", token.clone()),
+        ("/blind-pairs/{code}", code.clone()),
         ("/lab-sessions/{id}", session.clone()),
         ("/measurement-files/{id}", recording.json()["id"].as_str().unwrap().to_owned()),
         ("/study-comparison", format!("study-comparison?ids={finished},{running}")),
@@ -201,7 +201,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         format!("/studies/{finished}/live"),
         format!("/studies/{finished}/compare"),
         format!("/trials/{}", trials[0].id),
-        format!("/rate/pair/{token}"),
+        format!("/rate/pair/{code}"),
         format!("/studies/{finished}/lab"),
         format!("/studies/{finished}/figures"),
         format!("/lab-sessions/{session}"),

@@ -82,7 +82,7 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
     Some(match operation {
         "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => EntryPoint::Preference,
         "post /api/v1/studies/{id}/assessments" => EntryPoint::Note,
-        "post /api/v1/blind-pairs/{token}/answer" | "post /rate/pair/{token}" => EntryPoint::RaterAnswer,
+        "post /api/v1/blind-pairs/{code}/answer" | "post /rate/pair/{code}" => EntryPoint::RaterAnswer,
         "post /api/v1/studies/{id}/blind-pairs/next" | "post /rate/{id}" => EntryPoint::RaterPair,
         "post /api/v1/studies/{id}/lab-sessions" | "post /studies/{id}/lab" => EntryPoint::Plan,
         "post /api/v1/lab-sessions/{id}/walks" | "post /lab/{id}" => EntryPoint::Walk,
@@ -104,7 +104,7 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
         | "post /studies/{id}/retract"
         | "post /api/v1/lab-sessions/{id}/retract-answer"
         | "post /lab/{id}/retract"
-        | "post /rate/pair/{token}/retract" => RETRACTS,
+        | "post /rate/pair/{code}/retract" => RETRACTS,
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
             EntryPoint::None("the lab evaluates a trial by itself; figures, and no person's answer")
         }
@@ -452,20 +452,16 @@ async fn pair_cannot_be_answered_after_a_rule_excludes_it() {
         (Rule::Withdrawal, [StatusCode::CONFLICT, StatusCode::CONFLICT]),
     ] {
         let scene = Rated::new().await;
-        let token = scene.token().await;
+        let code = scene.code().await;
         scene.close(rule).await;
         let before = scene.service.feedback(scene.study).await.len();
-        let answer = format!("/api/v1/blind-pairs/{token}/answer");
+        let answer = format!("/api/v1/blind-pairs/{code}/answer");
         let refused = scene.service.post(&answer, &json!({"answer": "first"})).await;
         assert_eq!(refused.status, statuses[0], "{rule:?}: {}", refused.text);
         assert_eq!(scene.service.feedback(scene.study).await.len(), before, "{rule:?}");
         let next = scene.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", scene.study), &json!({})).await;
         assert_eq!(next.status, statuses[1], "{rule:?}: {}", next.text);
-        assert!(
-            next.status != StatusCode::OK || next.json()["pair"]["token"] != json!(token),
-            "{rule:?}: {}",
-            next.text
-        );
+        assert!(next.status != StatusCode::OK || next.json()["pair"]["code"] != json!(code), "{rule:?}: {}", next.text);
         scene.service.stop().await;
     }
 }
@@ -486,10 +482,10 @@ impl Rated {
         Self { _folder: folder, service, study }
     }
 
-    async fn token(&self) -> String {
+    async fn code(&self) -> String {
         let next =
             self.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", self.study), &json!({})).await.json();
-        next["pair"]["token"].as_str().unwrap().to_owned()
+        next["pair"]["code"].as_str().unwrap().to_owned()
     }
 
     async fn close(&self, rule: Rule) {
@@ -525,10 +521,10 @@ impl Rated {
 async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
     for blind_first in [true, false] {
         let scene = Rated::new().await;
-        let token = scene.token().await;
+        let code = scene.code().await;
         let shown = blind_pairs::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
         let (a, b) = shown[0].trials();
-        let blind = format!("/api/v1/blind-pairs/{token}/answer");
+        let blind = format!("/api/v1/blind-pairs/{code}/answer");
         let open = format!("/api/v1/studies/{}/preferences", scene.study);
         let (said, chosen) = (json!({"answer": "first"}), json!({"trial_a": b, "trial_b": a, "answer": "a"}));
         let (first, second) =
@@ -563,7 +559,7 @@ async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
         assert_eq!(of_people(rows_before), 0, "blind first: {blind_first}");
         let next =
             scene.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", scene.study), &json!({})).await.json();
-        assert_ne!(next["pair"]["token"], json!(token), "the pair is not shown again");
+        assert_ne!(next["pair"]["code"], json!(code), "the pair is not shown again");
         scene.service.stop().await;
     }
 }
@@ -660,10 +656,10 @@ impl Plan {
 #[tokio::test]
 async fn plan_made_before_an_answer_is_not_written() {
     let scene = Rated::new().await;
-    let token = scene.token().await;
+    let code = scene.code().await;
     let plan = Plan::of(&scene).await;
     assert!(plan.is_written(&scene).await);
-    let answer = format!("/api/v1/blind-pairs/{token}/answer");
+    let answer = format!("/api/v1/blind-pairs/{code}/answer");
     let answered = scene.service.post(&answer, &json!({"answer": "first"})).await;
     assert!(answered.status.is_success(), "{}", answered.text);
     assert!(!plan.is_written(&scene).await);

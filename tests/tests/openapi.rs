@@ -111,7 +111,7 @@ async fn repeated_change_with_a_key_happens_once_or_refuses_the_key_as_described
     for (path, item) in document["paths"].as_object().unwrap() {
         for (method, operation) in item.as_object().unwrap().iter().filter(|(method, _)| *method != "get") {
             let address =
-                path.replace("{id}", &id_of(path)).replace("{token}", &"0".repeat(64)).replace("{side}", "first");
+                path.replace("{id}", &id_of(path)).replace("{code}", &"0".repeat(64)).replace("{side}", "first");
             let send = async || {
                 let request = Request::builder().method(method.to_uppercase().as_str()).uri(&address);
                 let request =

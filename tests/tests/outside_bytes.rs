@@ -56,7 +56,7 @@ impl Target {
 
     fn path(&self, template: &str) -> String {
         let id = if template.starts_with("/api/v1/trials") { &self.trial } else { &self.study };
-        template.replace("{id}", id).replace("{token}", &"a".repeat(64))
+        template.replace("{id}", id).replace("{code}", &"a".repeat(64))
     }
 }
 

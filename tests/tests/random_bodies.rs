@@ -129,18 +129,18 @@ impl Scene {
     /// The value of the path parameter of an operation: an object in a suitable state.
     async fn target(&mut self, path: &str) -> Option<String> {
         Some(match path {
-            "/blind-pairs/{token}/answer" => {
+            "/blind-pairs/{code}/answer" => {
                 // After an answer, no comparison is pending until the study has chosen the next one.
-                let mut token = None;
+                let mut code = None;
                 for _ in 0..100 {
                     let next = self.post(&format!("/studies/{}/blind-pairs/next", self.human), json!({})).await;
-                    token = next["pair"]["token"].as_str().map(str::to_owned);
-                    if token.is_some() || self.service.get(self.human).await.state == StudyState::Finished {
+                    code = next["pair"]["code"].as_str().map(str::to_owned);
+                    if code.is_some() || self.service.get(self.human).await.state == StudyState::Finished {
                         break;
                     }
                     tokio::time::sleep(Duration::from_millis(50)).await;
                 }
-                token?
+                code?
             }
             "/studies/{id}/start" => self.study(false).await,
             "/studies/{id}/pause" | "/studies/{id}/stop" => self.study(true).await,
@@ -192,7 +192,7 @@ impl Scene {
             *target = self.target(path).await;
         }
         let known = target.as_ref()?;
-        let address = path.replace("{id}", known).replace("{token}", known);
+        let address = path.replace("{id}", known).replace("{code}", known);
         let answer = self.request(method, &address, body).await;
         if answer.status.is_success() {
             *target = None;
@@ -270,7 +270,7 @@ async fn bodies_are_accepted_if_and_only_if_they_match_the_description() {
     let mut drawn = Drawn::from(document.clone());
     scene.post("/users", json!({"name": MEMBER, "role": "rater"})).await;
     // A rater exists once a pair was drawn.
-    scene.target("/blind-pairs/{token}/answer").await;
+    scene.target("/blind-pairs/{code}/answer").await;
     let common = known(&scene).await;
     let (mut faults, mut never, mut accepted, mut refused) = (Vec::new(), Vec::new(), 0, 0);
     for (path, item) in document["paths"].as_object().unwrap() {

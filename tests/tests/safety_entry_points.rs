@@ -273,14 +273,14 @@ async fn pair_is_no_longer_shown_to_its_rater_after_a_report() {
     let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let token = pair["pair"]["token"].as_str().unwrap();
-    let motion = format!("/api/v1/blind-pairs/{token}/motions/first");
+    let code = pair["pair"]["code"].as_str().unwrap();
+    let motion = format!("/api/v1/blind-pairs/{code}/motions/first");
     assert_eq!(service.fetch(&motion).await.status, StatusCode::OK);
     for trial in converged(&service, study).await {
         report(&service, &trial).await;
     }
     assert_eq!(service.fetch(&motion).await.status, StatusCode::CONFLICT);
-    assert_eq!(service.fetch(&format!("/rate/pair/{token}")).await.status, StatusCode::CONFLICT);
+    assert_eq!(service.fetch(&format!("/rate/pair/{code}")).await.status, StatusCode::CONFLICT);
     service.stop().await;
 }
 

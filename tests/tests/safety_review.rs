@@ -45,7 +45,7 @@ async fn waits_at_home(service: &Service) -> bool {
 async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     let (_folder, service, study) = started(AnswerSource::People, 4).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["code"].as_str().unwrap());
     assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!(said.len(), 1, "{said:?}");

@@ -63,7 +63,7 @@ impl Scene {
         let start = path.split('/').nth(3).unwrap_or_default();
         let id = self.ids.get(start).map_or(UNKNOWN, String::as_str);
         path.replace("{id}", id)
-            .replace("{token}", &"0".repeat(64))
+            .replace("{code}", &"0".repeat(64))
             .replace("{file}", "a.svg")
             .replace("{side}", "first")
     }
@@ -131,7 +131,7 @@ async fn described_refusals_occur() {
             let address = scene.address(path);
             let schema = &operation["requestBody"]["content"]["application/json"]["schema"];
             let example = scene.example("", schema).to_string();
-            let unknown = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{side}", "first");
+            let unknown = path.replace("{id}", UNKNOWN).replace("{code}", "unknown").replace("{side}", "first");
             let unknown = unknown.replace("{file}", "a.svg");
             for status in operation["responses"].as_object().unwrap().keys() {
                 let got = match status.as_str() {

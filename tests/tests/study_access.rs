@@ -31,7 +31,7 @@ struct Closed {
     service: Service,
     admin: As,
     study: StudyId,
-    /// By the start of the address: what stands for `{id}` or `{token}` there.
+    /// By the start of the address: what stands for `{id}` or `{code}` there.
     names: BTreeMap<&'static str, String>,
 }
 
@@ -344,11 +344,11 @@ async fn rater_accesses_assigned_studies_only_until_removed() {
     let list = send(&service, &rater, &Method::GET, "/rate", "", "").await;
     assert!(list.text.contains(&format!("/rate/{study}")), "{}", list.text);
     let pair = post(&service, &rater, &next, &json!({})).await;
-    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
+    let code = pair["pair"]["code"].as_str().unwrap().to_owned();
     let addresses = [
-        (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/first")),
-        (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/second")),
-        (Method::GET, format!("/rate/pair/{token}")),
+        (Method::GET, format!("/api/v1/blind-pairs/{code}/motions/first")),
+        (Method::GET, format!("/api/v1/blind-pairs/{code}/motions/second")),
+        (Method::GET, format!("/rate/pair/{code}")),
     ];
     for (method, path) in &addresses {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::OK, "{path}");
@@ -359,8 +359,8 @@ async fn rater_accesses_assigned_studies_only_until_removed() {
     post(&service, &clinician, &remove, &json!({})).await;
     let twice = send(&service, &clinician, &Method::POST, &remove, JSON, "{}").await;
     assert_eq!(twice.status, StatusCode::CONFLICT, "{}", twice.text);
-    let (answer, body) = (format!("/api/v1/blind-pairs/{token}/answer"), r#"{"answer": "first"}"#);
-    let form = format!("/rate/pair/{token}");
+    let (answer, body) = (format!("/api/v1/blind-pairs/{code}/answer"), r#"{"answer": "first"}"#);
+    let form = format!("/rate/pair/{code}");
     for (method, path) in &addresses {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::NOT_FOUND, "{path}");
     }
@@ -369,7 +369,7 @@ async fn rater_accesses_assigned_studies_only_until_removed() {
     assert_eq!(sent.status, StatusCode::NOT_FOUND);
     let back = send(&service, &rater, &Method::POST, &format!("{form}/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::NOT_FOUND);
-    let saved = send(&service, &rater, &Method::GET, &format!("/rate?saved={token}"), "", "").await;
+    let saved = send(&service, &rater, &Method::GET, &format!("/rate?saved={code}"), "", "").await;
     assert_eq!(saved.status, StatusCode::NOT_FOUND);
 
     // After a new assignment, the pair is accessible again.

@@ -16,8 +16,8 @@ pub(crate) struct BlindFigure([[f64; 2]; 10]);
 
 /// The phase at which both motions of a pair start, as a fraction of the stride. It differs between pairs, so that no
 /// motion has the same bytes as an earlier one. A rater may still recognise a gait by its movement.
-pub(crate) fn phase(token: &str) -> f64 {
-    let digest = Sha256::digest(token.as_bytes());
+pub(crate) fn phase(code: &str) -> f64 {
+    let digest = Sha256::digest(code.as_bytes());
     let number = digest.iter().take(6).fold(0_u64, |number, byte| (number << 8) | u64::from(*byte));
     number as f64 / (1_u64 << 48) as f64
 }

@@ -42,7 +42,7 @@ const NAMES: [(&str, &str, u32); 12] = [
 ];
 
 /// Parameters with rules.
-const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "token", "ids", "x", "y"];
+const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "code", "ids", "x", "y"];
 
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
@@ -343,7 +343,7 @@ fn state_parameter(parameter: &mut Value) {
             let names: Vec<String> = SORTS.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
             json!({ "enum": names })
         }
-        "token" => json!({ "pattern": "^[0-9a-f]{64}$" }),
+        "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => {
             let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
             json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })

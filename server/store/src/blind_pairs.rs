@@ -172,7 +172,7 @@ pub struct BlindPair {
     /// Identifier.
     pub id: BlindPairId,
     /// Token by which the rater knows the pair.
-    pub token: String,
+    pub code: String,
     /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
@@ -215,7 +215,7 @@ impl BlindPair {
 #[derive(Debug, Clone)]
 pub struct NewBlindPair {
     /// Token by which the rater knows the pair.
-    pub token: String,
+    pub code: String,
     /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
@@ -239,11 +239,11 @@ pub struct NewBlindPair {
 pub async fn insert(db: &mut Connection, new: &NewBlindPair) -> StoreResult<BlindPairId> {
     let id = BlindPairId::fresh();
     sqlx::query(
-        "insert into blind_pairs (id, token, study_id, rater, number, kind, trial_a, trial_b, repeats, \
+        "insert into blind_pairs (id, code, study_id, rater, number, kind, trial_a, trial_b, repeats, \
          unblinded, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
-    .bind(&new.token)
+    .bind(&new.code)
     .bind(new.study_id)
     .bind(&new.rater)
     .bind(new.number)
@@ -395,7 +395,7 @@ impl BlindPair {
     pub(super) fn from_row(row: &SqliteRow) -> StoreResult<Self> {
         Ok(Self {
             id: row.try_get("id")?,
-            token: row.try_get("token")?,
+            code: row.try_get("code")?,
             study_id: row.try_get("study_id")?,
             rater: row.try_get("rater")?,
             number: row.try_get("number")?,

@@ -197,12 +197,12 @@ impl PairWithSides {
     }
 }
 
-/// The pair with this token, if it belongs to the rater.
+/// The pair with this code, if it belongs to the rater.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreResult<Option<PairWithSides>> {
-    let found = sided("where p.token = ? and p.rater = ?", &[token, rater], db).await?;
+pub async fn own_pair(db: &mut Connection, code: &str, rater: &str) -> StoreResult<Option<PairWithSides>> {
+    let found = sided("where p.code = ? and p.rater = ?", &[code, rater], db).await?;
     Ok(found.into_iter().next())
 }
 

@@ -77,7 +77,7 @@ mod tests {
     fn shown(number: u32, next: NextPair) -> BlindPair {
         BlindPair {
             id: BlindPairId::fresh(),
-            token: String::new(),
+            code: String::new(),
             study_id: StudyId::fresh(),
             rater: "R".to_owned(),
             number,
