@@ -831,7 +831,7 @@ create table measurement_files (
     id             text primary key not null,
     lab_session_id text not null references lab_sessions (id),
     walk           integer not null constraint measurement_files_walk check (walk in (1, 2, 3)),
-    kind           text not null constraint measurement_files_kind check (kind in ('emg', 'motion')),
+    kind           text not null constraint measurement_files_kind check (kind in ('emg', 'joint_angles')),
     -- How to read the file, as JSON.
     reading        text not null constraint measurement_files_reading check (json_valid(reading)),
     -- The file, compressed with zstd.

@@ -74,7 +74,7 @@ pub async fn fill(database: &Path) {
          select 'S', id, 'clinician', 'K', '' from trials limit 1",
         "insert into safety_review_reports (review_id, report_id) values ('I', 'S')",
         "insert into measurement_files (id, lab_session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
-         values ('R', 'L', 1, 'motion', '{}', x'00', '', 'K', '')",
+         values ('R', 'L', 1, 'joint_angles', '{}', x'00', '', 'K', '')",
         "insert into emg_results (id, lab_session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",
         "insert into subject_muscles (subject_id, definition, actor, created_at) \
          select id, '{}', 'K', '' from subjects limit 1",

@@ -129,7 +129,7 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("post /lab-sessions/{id}/unblind", Some(Right::Administer)),
     ("post /trials/{id}/safety-report", Some(Right::Answer)),
     ("post /lab-sessions/{id}/measurement-files/emg", Some(Right::Run)),
-    ("post /lab-sessions/{id}/measurement-files/motion", Some(Right::Run)),
+    ("post /lab-sessions/{id}/measurement-files/joint-angles", Some(Right::Run)),
     ("post /lab-sessions/{id}/process", Some(Right::Run)),
     ("get /lab", Some(Right::Rate)),
     ("get /lab/{id}", Some(Right::Rate)),

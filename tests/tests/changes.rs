@@ -18,7 +18,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::signed_in;
 use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::explained::without_gaits;
-use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::measured::{electromyogram, joint_angles};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -247,13 +247,13 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
         .one(done, "post /lab-sessions/{id}/measurement-files/emg", &format!("{session}/measurement-files/emg"), emg)
         .await;
     scene.one(done, "post /lab-sessions/{id}/emg-results", &format!("{session}/emg-results"), json!({})).await;
-    let motion = json!({"walk": 1, "recording": motion()});
+    let angles = json!({"walk": 1, "recording": joint_angles()});
     scene
         .one(
             done,
-            "post /lab-sessions/{id}/measurement-files/motion",
-            &format!("{session}/measurement-files/motion"),
-            motion,
+            "post /lab-sessions/{id}/measurement-files/joint-angles",
+            &format!("{session}/measurement-files/joint-angles"),
+            angles,
         )
         .await;
     scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;

@@ -11,7 +11,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::cli;
 use gaitwright_tests::consistent_gaits::Consistent;
-use gaitwright_tests::measured::motion;
+use gaitwright_tests::measured::joint_angles;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -70,8 +70,9 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let session = service.post(&format!("/api/v1/studies/{finished}/lab-sessions"), &gaits).await.json();
     let session = session["id"].as_str().unwrap().to_owned();
     service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
-    let measured = json!({"walk": 1, "recording": motion()});
-    let recording = service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &measured).await;
+    let measured = json!({"walk": 1, "recording": joint_angles()});
+    let recording =
+        service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/joint-angles"), &measured).await;
     assert_eq!(recording.status, StatusCode::CREATED, "{}", recording.text);
     let assessment = json!({"trial_a": converged[0].id, "trial_b": converged[1].id, "answer": "cannot_tell"});
     let assessment = service.post(&format!("/api/v1/studies/{finished}/assessments"), &assessment).await.json();

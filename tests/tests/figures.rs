@@ -7,7 +7,7 @@ use axum::http::{Request, StatusCode};
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::measured::{electromyogram, four_strides, motion};
+use gaitwright_tests::measured::{electromyogram, four_strides, joint_angles};
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
 use serde_json::json;
@@ -52,7 +52,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     for (what, body) in [
         ("measurement-files/emg", emg),
         ("emg-results", json!({})),
-        ("measurement-files/motion", json!({"walk": 1, "recording": motion()})),
+        ("measurement-files/joint-angles", json!({"walk": 1, "recording": joint_angles()})),
     ] {
         let done = service.post(&format!("{api}/{what}"), &body).await;
         assert!(done.status.is_success(), "{}", done.text);

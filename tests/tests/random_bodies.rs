@@ -12,7 +12,7 @@ use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::{StudyId, SubjectId, TrialId};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::bodies_from_schema::Drawn;
-use gaitwright_tests::measured::{electromyogram, four_strides, motion};
+use gaitwright_tests::measured::{electromyogram, four_strides, joint_angles};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -232,8 +232,8 @@ fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>
             ("recording", vec![json!(electromyogram(1.0))]),
             reading(json!({"heel_strike_column": "heel"})),
         ]),
-        path if path.ends_with("/measurement-files/motion") => {
-            BTreeMap::from([("recording", vec![json!(motion())]), reading(json!({}))])
+        path if path.ends_with("/measurement-files/joint-angles") => {
+            BTreeMap::from([("recording", vec![json!(joint_angles())]), reading(json!({}))])
         }
         path if path.ends_with("/reference-gaits") => BTreeMap::from([
             ("recording", vec![json!(four_strides(100))]),

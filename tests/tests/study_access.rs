@@ -12,7 +12,7 @@ use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::callers::{As, FORM, member, send, service, signed_in, token};
-use gaitwright_tests::measured::motion;
+use gaitwright_tests::measured::joint_angles;
 use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
@@ -70,10 +70,14 @@ impl Closed {
         let session = post(&service, &admin, &format!("{api}/lab-sessions"), &session).await;
         let session = session["id"].as_str().unwrap().to_owned();
         post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
-        let measured = json!({"walk": 1, "recording": motion()});
-        let brought =
-            post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &measured)
-                .await;
+        let measured = json!({"walk": 1, "recording": joint_angles()});
+        let brought = post(
+            &service,
+            &admin,
+            &format!("/api/v1/lab-sessions/{session}/measurement-files/joint-angles"),
+            &measured,
+        )
+        .await;
         member(&service, study, MemberKind::User, "a administrator").await;
         put(&service, &admin, &format!("{api}/access"), &json!({"restricted": true})).await;
         let listed = send(&service, &admin, &Method::GET, &format!("{api}/members"), "", "").await.items();

@@ -154,7 +154,7 @@ pub(crate) fn role(role: &Role) -> &'static str {
 pub(crate) fn file_kind(kind: &MeasurementKind) -> &'static str {
     match kind {
         MeasurementKind::Emg => "EMG recording",
-        MeasurementKind::Motion => "joint angles",
+        MeasurementKind::JointAngles => "joint angles",
     }
 }
 

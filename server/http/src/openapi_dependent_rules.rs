@@ -19,7 +19,7 @@ const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
 const EMG_FILE: &str = "A file in the format that `format` names, with the columns of the muscles, sampled at 100 Hz or more, with one whole \
                         stride or more. It has all columns and heel strikes that are named in the request.";
-const MOTION_FILE: &str = "A file in the format that `format` names, with the angle of at least one joint over several strides, as `/help/data-files` describes it.";
+const JOINT_ANGLE_FILE: &str = "A file in the format that `format` names, with the angle of at least one joint over several strides, as `/help/data-files` describes it.";
 const REFERENCE_FILE: &str = "A file in the format that `format` names, with its columns, as `/help/data-files` describes it: five \
                               joint angles over at least one whole stride of a walking person. It has all columns and heel \
                               strikes that are named in the request.";
@@ -58,8 +58,8 @@ const RULES: [(&str, &str, &str); 27] = [
         "reading",
         "An OpenSim file has no `rate_hz`. Heel strikes are given as two or more times in seconds, or as a column instead.",
     ),
-    ("NewMotion", "recording", MOTION_FILE),
-    ("NewMotion", "reading", "`cutoff_hz` is at most 0.45 times the sampling rate."),
+    ("NewJointAngles", "recording", JOINT_ANGLE_FILE),
+    ("NewJointAngles", "reading", "`cutoff_hz` is at most 0.45 times the sampling rate."),
     ("NewReferenceGait", "recording", REFERENCE_FILE),
     (
         "Processing",

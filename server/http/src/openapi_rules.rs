@@ -120,12 +120,12 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             tell.insert("else".to_owned(), reason);
         }
         schemas.add("NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
-        for component in ["NewReferenceGait", "NewEmg", "NewMotion"] {
+        for component in ["NewReferenceGait", "NewEmg", "NewJointAngles"] {
             schemas.add(component, "recording", &json!({ "minLength": 1 }));
         }
         schemas.add("NewReferenceGait", "format", &json!({ "default": "opensim" }));
         schemas.add("EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
-        schemas.add("MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
+        schemas.add("JointAngleReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
         state_emg(schemas);
         let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });
         schemas.add("Suggestion", "bounds", &bounds);

@@ -13,14 +13,14 @@ use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
+/// Kind of measurement file: `emg`, an EMG recording; `joint_angles`, joint angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeasurementKind {
     /// EMG recording.
     Emg,
     /// Joint angles.
-    Motion,
+    JointAngles,
 }
 
 impl MeasurementKind {
@@ -28,7 +28,7 @@ impl MeasurementKind {
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Emg => "emg",
-            Self::Motion => "motion",
+            Self::JointAngles => "joint_angles",
         }
     }
 }
@@ -36,7 +36,7 @@ impl MeasurementKind {
 impl FromStr for MeasurementKind {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Emg, Self::Motion]
+        [Self::Emg, Self::JointAngles]
             .into_iter()
             .find(|kind| kind.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("kind of a measurement file", text))

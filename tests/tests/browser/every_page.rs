@@ -11,7 +11,7 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId, commit, explanations};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{explanation, without_gaits};
-use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::measured::{electromyogram, joint_angles};
 use gaitwright_tests::simulated;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -95,8 +95,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         let emg = json!({"walk": walk, "recording": emg, "reading": {"heel_strike_column": "heel"}});
         site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/emg"), &emg).await;
     }
-    let joints = json!({"walk": 2, "recording": motion()});
-    site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &joints).await;
+    let joints = json!({"walk": 2, "recording": joint_angles()});
+    site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/joint-angles"), &joints).await;
     site.service.post(&format!("/api/v1/lab-sessions/{session}/emg-results"), &json!({})).await;
     // A session that waits for the answer of the subject, and one with an answer.
     let gaits = json!({"trial_a": converged[0].id, "trial_b": converged[1].id});

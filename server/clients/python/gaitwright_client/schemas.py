@@ -94,8 +94,8 @@ MeasurementFileId = str
 # or storage file (.mot, .sto).
 MeasurementFormat = Literal["csv", "opensim"]
 
-# Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
-MeasurementKind = Literal["emg", "motion"]
+# Kind of measurement file: `emg`, an EMG recording; `joint_angles`, joint angles.
+MeasurementKind = Literal["emg", "joint_angles"]
 
 # Identifier of a membership in a study.
 MemberId = str
@@ -1824,7 +1824,7 @@ class Motion(TypedDict):
     stride_time_s: float
 
 
-class MotionReading(TypedDict, total=False):
+class JointAngleReading(TypedDict, total=False):
     """How to read a file with joint angles."""
 
     # Cut-off frequency of the low-pass filter before differentiation, Hz.
@@ -2091,18 +2091,18 @@ class NewMember(TypedDict):
     name: str
 
 
-class _NewMotionRequired(TypedDict):
+class _NewJointAnglesRequired(TypedDict):
     # Content of the file.
     recording: str
     # Number of the walk.
     walk: int
 
 
-class NewMotion(_NewMotionRequired, total=False):
+class NewJointAngles(_NewJointAnglesRequired, total=False):
     """Joint angles of a walk."""
 
     # How to read the file.
-    reading: MotionReading
+    reading: JointAngleReading
 
 
 class _NewPreferenceRequired(TypedDict):

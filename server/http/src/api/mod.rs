@@ -124,7 +124,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(measurement_files::get))
         .routes(routes!(measurement_files::content))
         .routes(routes!(measurement_files::emg))
-        .routes(routes!(measurement_files::motion))
+        .routes(routes!(measurement_files::joint_angles))
         .routes(routes!(measurement_files::result, measurement_files::process))
         .routes(routes!(measurement_files::limit_cycles))
         .routes(routes!(lab_sessions::session_progress))

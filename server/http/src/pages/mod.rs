@@ -96,7 +96,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/lab-sessions/{id}/close", post(lab::close))
         .route("/lab-sessions/{id}/unblind", post(lab::unblind))
         .route("/lab-sessions/{id}/measurement-files/emg", post(measurement_files::emg))
-        .route("/lab-sessions/{id}/measurement-files/motion", post(measurement_files::motion))
+        .route("/lab-sessions/{id}/measurement-files/joint-angles", post(measurement_files::joint_angles))
         .route("/lab-sessions/{id}/process", post(measurement_files::process))
         .route("/lab", get(lab_walk::list))
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
