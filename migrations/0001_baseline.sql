@@ -436,10 +436,10 @@ create table feedback (
     seq        integer primary key autoincrement,
     id         text not null constraint feedback_id_unique unique,
     study_id   text not null references studies (id),
-    kind       text not null constraint feedback_kind check (kind in ('label', 'preference', 'tie', 'suggestion')),
-    -- label: the trial. preference: the winner. tie: one of the two trials. suggestion: the trial that it improves.
+    kind       text not null constraint feedback_kind check (kind in ('label', 'preference', 'no_difference', 'suggestion')),
+    -- label: the trial. preference: the winner. no_difference: one of the two trials. suggestion: the trial that it improves.
     trial_a    text not null references trials (id),
-    -- preference: the loser. tie: the other trial.
+    -- preference: the loser. no_difference: the other trial.
     trial_b    text references trials (id),
     -- label: the ordinal category; 0 is not converged.
     category   integer,

@@ -185,7 +185,7 @@ impl Learner {
             .iter()
             .filter_map(|feedback| match *feedback {
                 Feedback::Preference { winner, loser } => Some(pair(winner, loser)),
-                Feedback::Tie { a, b } => Some(pair(a, b)),
+                Feedback::NoDifference { a, b } => Some(pair(a, b)),
                 Feedback::Label { .. } | Feedback::Suggestion { .. } => None,
             })
             .collect();

@@ -1,7 +1,7 @@
 //! Preference-based Bayesian optimisation over a finite grid of actions.
 //!
 //! A person, or a computed figure of merit, evaluates actions of a [`SearchSpace`] and gives [`Feedback`]: labels,
-//! preferences, ties and suggestions. The learner infers a Gaussian-process posterior over the latent utility
+//! preferences, answers of no difference and suggestions. The learner infers a Gaussian-process posterior over the latent utility
 //! ([`posterior`]), proposes the next action ([`propose`]) and the comparisons worth asking ([`comparisons_to_ask`],
 //! [`what_to_ask`]), and recommends an action ([`Posterior::best`]).
 //!

@@ -235,7 +235,7 @@ mod tests {
                     let (a, b) = (proposal.action, question);
                     let (winner, loser) = if utility(a) > utility(b) { (a, b) } else { (b, a) };
                     if utility(a) == utility(b) {
-                        log.feedback.push(Feedback::Tie { a, b });
+                        log.feedback.push(Feedback::NoDifference { a, b });
                     } else {
                         log.feedback.push(Feedback::Preference { winner, loser });
                     }

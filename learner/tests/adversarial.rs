@@ -91,7 +91,7 @@ fn contradictory_feedback_keeps_probabilities_moderate() {
         log.feedback.push(Feedback::Preference { winner: b, loser: a });
         log.feedback.push(Feedback::Label { action: if i % 2 == 0 { a } else { b }, category: i % 2 });
         if i % 10 == 0 {
-            log.feedback.push(Feedback::Tie { a, b });
+            log.feedback.push(Feedback::NoDifference { a, b });
         }
     }
     for settings in all_settings() {
@@ -239,7 +239,7 @@ fn invalid_input_is_rejected_with_its_error() {
         refused(Feedback::Preference { winner: inside, loser: inside }),
         LearnerError::SelfComparison { entry: 0, .. }
     ));
-    assert!(matches!(refused(Feedback::Tie { a: inside, b: outside }), LearnerError::UnknownAction { .. }));
+    assert!(matches!(refused(Feedback::NoDifference { a: inside, b: outside }), LearnerError::UnknownAction { .. }));
     assert!(matches!(refused(Feedback::Label { action: inside, category: 2 }), LearnerError::UnknownCategory { .. }));
     assert!(propose(&space, &FeedbackLog::default(), &[outside], &settings, 0).is_err());
     for settings in [
@@ -260,7 +260,7 @@ fn any_feedback(actions: u64, categories: usize) -> impl Strategy<Value = Feedba
     let pair = (0..actions, 1..actions).prop_map(move |(a, gap)| (ActionIndex(a), ActionIndex((a + gap) % actions)));
     prop_oneof![
         3 => pair.clone().prop_map(|(winner, loser)| Feedback::Preference { winner, loser }),
-        1 => pair.clone().prop_map(|(a, b)| Feedback::Tie { a, b }),
+        1 => pair.clone().prop_map(|(a, b)| Feedback::NoDifference { a, b }),
         1 => pair.prop_map(|(suggested, over)| Feedback::Suggestion { suggested, over }),
         2 => (0..actions, 0..categories).prop_map(|(a, category)| Feedback::Label { action: ActionIndex(a), category }),
     ]
@@ -329,7 +329,7 @@ proptest! {
                 Feedback::Preference { winner, loser } => {
                     Feedback::Preference { winner: within(winner), loser: within(loser) }
                 }
-                Feedback::Tie { a, b } => Feedback::Tie { a: within(a), b: within(b) },
+                Feedback::NoDifference { a, b } => Feedback::NoDifference { a: within(a), b: within(b) },
                 Feedback::Suggestion { suggested, over } => {
                     Feedback::Suggestion { suggested: within(suggested), over: within(over) }
                 }
@@ -337,7 +337,7 @@ proptest! {
             })
             .filter(|feedback| match *feedback {
                 Feedback::Preference { winner: a, loser: b }
-                | Feedback::Tie { a, b }
+                | Feedback::NoDifference { a, b }
                 | Feedback::Suggestion { suggested: a, over: b } => a != b,
                 Feedback::Label { .. } => true,
             })

@@ -156,7 +156,7 @@ pub struct Row {
 }
 #[derive(Serialize)]
 pub enum Content {
-    Tie {
+    NoDifference {
         a: Id,
     },
 }

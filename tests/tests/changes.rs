@@ -295,7 +295,7 @@ fn essence(trials: &[Trial], feedback_rows: &[FeedbackRow]) -> Vec<String> {
         .map(|row| match row.content {
             FeedbackContent::Label { trial, category } => format!("label {category} of {}", number(trial)),
             FeedbackContent::Preference { winner, loser } => format!("{} over {}", number(winner), number(loser)),
-            FeedbackContent::Tie { a, b } => format!("{} as good as {}", number(a), number(b)),
+            FeedbackContent::NoDifference { a, b } => format!("{} as good as {}", number(a), number(b)),
             FeedbackContent::Suggestion { suggested, over } => format!("{suggested:?} over {}", number(over)),
         })
         .collect()

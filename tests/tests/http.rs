@@ -228,8 +228,8 @@ async fn preferences_are_created_read_and_retracted() {
     assert_eq!((&row["content"]["kind"], &row["content"]["winner"]), (&json!("preference"), &json!(converged[1])));
     assert_eq!(service.fetch(given.headers["location"].to_str().unwrap()).await.json(), row);
 
-    let tie = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "no_difference"});
-    assert_eq!(service.post(&path, &tie).await.json()["content"]["kind"], "tie");
+    let equal = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "no_difference"});
+    assert_eq!(service.post(&path, &equal).await.json()["content"]["kind"], "no_difference");
 
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     let itself = json!({"trial_a": converged[0], "trial_b": converged[0], "answer": "a"});

@@ -12,7 +12,7 @@ const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more.";
 const SPACE: &str = "Each bound has at most one dimension. The values of a dimension increase, each within the range of the \
                      bound. Its lengthscale lies between a hundredth of the smallest step between the values and 10,000 times \
                      their range. The smallest a4 exceeds the largest a3 by 0.001 or more.";
-const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise scales and `tie_width` are 1e-3 to 1e3 times the \
+const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise scales and `no_difference_width` are 1e-3 to 1e3 times the \
                        square root of `signal_variance`, and the threshold is at most 10 times that square root. \
                        `expectation_propagation` needs the link `probit`.";
 const EXISTS: &str = "An existing object.";

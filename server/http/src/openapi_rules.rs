@@ -282,8 +282,8 @@ fn learner(missed: &mut Vec<String>) -> Value {
             preference_noise: usual.preference_noise * deviation,
             ordinal_noise: usual.ordinal_noise * deviation,
             coactive_noise: usual.coactive_noise * deviation,
-            tie_noise: usual.tie_noise * deviation,
-            tie_width: usual.tie_width * deviation,
+            no_difference_noise: usual.no_difference_noise * deviation,
+            no_difference_width: usual.no_difference_width * deviation,
             ordinal_thresholds: usual.ordinal_thresholds.iter().map(|threshold| threshold * deviation).collect(),
             ..usual.clone()
         };

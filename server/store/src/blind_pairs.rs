@@ -85,7 +85,7 @@ impl OrderedAnswer {
             Self::Second | Self::UnsafeFirst => {
                 Some(feedback::FeedbackContent::Preference { winner: second, loser: first })
             }
-            Self::NoDifference => Some(feedback::FeedbackContent::Tie { a: first, b: second }),
+            Self::NoDifference => Some(feedback::FeedbackContent::NoDifference { a: first, b: second }),
             Self::CannotTell | Self::UnsafeBoth | Self::Retracted => None,
         }
     }

@@ -276,8 +276,8 @@ pub(super) const FORGERIES: [Forgery; 69] = [
         "the preference contradicts Gait RMSE",
     ),
     (
-        "a tie of Gait RMSE",
-        |r| of_source(r, "gait_rmse")["kind"] = "tie".into(),
+        "no difference by Gait RMSE",
+        |r| of_source(r, "gait_rmse")["kind"] = "no_difference".into(),
         "the preference contradicts Gait RMSE",
     ),
     (

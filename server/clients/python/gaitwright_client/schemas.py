@@ -903,7 +903,7 @@ class _PreferenceRequired(TypedDict):
 
 
 class Preference(_PreferenceRequired, total=False):
-    """A preference, a tie or a suggestion of a study."""
+    """A preference or a suggestion of a study."""
 
     # Retraction. Null if it was not retracted.
     retraction: Optional[Retraction]
@@ -1655,10 +1655,10 @@ class LearnerSettings(TypedDict, total=False):
     signal_variance: float
     # First action of a study: `random`, a random one; `centre`, the middle value of every dimension.
     start: Literal["random", "centre"]
-    # Noise scale of ties, in units of utility.
-    tie_noise: float
+    # Noise scale of answers of no difference, in units of utility.
+    no_difference_noise: float
     # Difference in utility below which two gaits feel equal.
-    tie_width: float
+    no_difference_width: float
 
 
 class LegPoints(TypedDict):
@@ -2370,7 +2370,7 @@ class PreferenceContentPreference(TypedDict):
     winner: TrialId
 
 
-class PreferenceContentTie(TypedDict):
+class PreferenceContentNoDifference(TypedDict):
     """Two trials are equally good."""
 
     # One trial.
@@ -2378,7 +2378,7 @@ class PreferenceContentTie(TypedDict):
     # The other trial.
     b: TrialId
     # Kind of preference.
-    kind: Literal["tie"]
+    kind: Literal["no_difference"]
 
 
 class PreferenceContentSuggestion(TypedDict):
@@ -3616,5 +3616,5 @@ MarginEntry = Union[int, list[float]]
 
 # Content of a preference, in terms of trials.
 PreferenceContent = Union[
-    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentTie, PreferenceContentSuggestion,
+    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentNoDifference, PreferenceContentSuggestion,
 ]

@@ -40,7 +40,7 @@ fn by_gait_rmse(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String>
 
 fn by_utility(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String> {
     analysis.gaits.first()?;
-    let comparisons = match analysis.agreement.comparisons + analysis.agreement.ties {
+    let comparisons = match analysis.agreement.comparisons + analysis.agreement.no_difference {
         1 => "1 comparison".to_owned(),
         all => format!("{all} comparisons"),
     };

@@ -391,7 +391,7 @@ fn given(content: &FeedbackContent) -> &'static str {
     match content {
         FeedbackContent::Preference { winner, loser } if winner < loser => "a",
         FeedbackContent::Preference { .. } => "b",
-        FeedbackContent::Tie { .. } => "no_difference",
+        FeedbackContent::NoDifference { .. } => "no_difference",
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => "",
     }
 }
@@ -399,9 +399,8 @@ fn given(content: &FeedbackContent) -> &'static str {
 /// The two trials of an answer, the earlier one first, so that the order does not repeat the answer.
 fn compared(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
     match *content {
-        FeedbackContent::Preference { winner: one, loser: other } | FeedbackContent::Tie { a: one, b: other } => {
-            Some((one.min(other), one.max(other)))
-        }
+        FeedbackContent::Preference { winner: one, loser: other }
+        | FeedbackContent::NoDifference { a: one, b: other } => Some((one.min(other), one.max(other))),
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
 }

@@ -42,7 +42,8 @@ pub struct Analysis {
 pub struct UnexpectedAnswer {
     /// The answer.
     pub answer: FeedbackRow,
-    /// For a preference or suggestion, the probability that its order of utilities is right; `None` for a tie.
+    /// For a preference or suggestion, the probability that its order of utilities is right; `None` for an answer of no
+    /// difference.
     pub probability: Option<f64>,
 }
 
@@ -64,7 +65,7 @@ impl Analysis {
     }
 }
 
-/// The comparisons that the posterior does not agree with, the most surprising first; ties last.
+/// The comparisons that the posterior does not agree with, the most surprising first; answers of no difference last.
 fn unexpected_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<UnexpectedAnswer>, LearnerError> {
     let mut unexpected_answers = Vec::new();
     for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
@@ -73,7 +74,7 @@ fn unexpected_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result
             Feedback::Label { .. } => continue,
             Feedback::Preference { winner, loser } => Some((winner, loser)),
             Feedback::Suggestion { suggested, over } => Some((suggested, over)),
-            Feedback::Tie { .. } => None,
+            Feedback::NoDifference { .. } => None,
         };
         if posterior.agrees_with(feedback) {
             continue;

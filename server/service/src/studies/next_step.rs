@@ -101,7 +101,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
     for content in [
         FeedbackContent::Preference { winner: a, loser: b },
         FeedbackContent::Preference { winner: b, loser: a },
-        FeedbackContent::Tie { a, b },
+        FeedbackContent::NoDifference { a, b },
     ] {
         let mut then = snapshot.clone();
         then.study.state = StudyState::Running;

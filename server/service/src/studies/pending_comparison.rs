@@ -26,14 +26,14 @@ pub fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Ve
     Ok(questions.into_iter().filter_map(|q| snapshot.trial_of(q.against)).map(|trial| trial.id).collect())
 }
 
-/// The preference that Gait RMSE implies: the smaller value is better, equal values tie.
+/// The preference that Gait RMSE implies: the smaller value is better, equal values mean no difference.
 pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent {
     if new.1 < old.1 {
         FeedbackContent::Preference { winner: new.0, loser: old.0 }
     } else if old.1 < new.1 {
         FeedbackContent::Preference { winner: old.0, loser: new.0 }
     } else {
-        FeedbackContent::Tie { a: new.0, b: old.0 }
+        FeedbackContent::NoDifference { a: new.0, b: old.0 }
     }
 }
 

@@ -222,7 +222,7 @@ fn in_terms_of_actions(content: &FeedbackContent, action: impl Fn(TrialId) -> Op
         FeedbackContent::Preference { winner, loser } => {
             Feedback::Preference { winner: action(winner)?, loser: action(loser)? }
         }
-        FeedbackContent::Tie { a, b } => Feedback::Tie { a: action(a)?, b: action(b)? },
+        FeedbackContent::NoDifference { a, b } => Feedback::NoDifference { a: action(a)?, b: action(b)? },
         FeedbackContent::Suggestion { suggested, over } => Feedback::Suggestion { suggested, over: action(over)? },
     };
     match feedback.actions() {

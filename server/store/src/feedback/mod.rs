@@ -84,7 +84,7 @@ pub async fn append(
     let (kind, a, b, category, suggested) = match *content {
         FeedbackContent::Label { trial, category } => ("label", trial, None, Some(category), None),
         FeedbackContent::Preference { winner, loser } => ("preference", winner, Some(loser), None, None),
-        FeedbackContent::Tie { a, b } => ("tie", a, Some(b), None, None),
+        FeedbackContent::NoDifference { a, b } => ("no_difference", a, Some(b), None, None),
         FeedbackContent::Suggestion { suggested, over } => {
             ("suggestion", over, None, None, Some(i64::try_from(suggested.0).unwrap_or(i64::MAX)))
         }
@@ -161,7 +161,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreR
     read_many(&query.fetch_all(db).await?, from_row).await
 }
 
-/// At most `limit` preferences and ties of a study after a sequence number, retracted ones included, in order.
+/// At most `limit` preferences of a study after a sequence number, retracted ones included, in order.
 ///
 /// # Errors
 /// Errors of the database.
@@ -321,7 +321,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
     let content = match (kind, b, category, suggested) {
         ("label", None, Some(category), None) => FeedbackContent::Label { trial: a, category },
         ("preference", Some(loser), None, None) => FeedbackContent::Preference { winner: a, loser },
-        ("tie", Some(b), None, None) => FeedbackContent::Tie { a, b },
+        ("no_difference", Some(b), None, None) => FeedbackContent::NoDifference { a, b },
         ("suggestion", None, None, Some(index)) => {
             FeedbackContent::Suggestion { suggested: ActionIndex(u64::try_from(index).unwrap_or(0)), over: a }
         }

@@ -97,7 +97,7 @@ fn sorted(a: TrialId, b: TrialId) -> (TrialId, TrialId) {
 fn pair(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
     match *content {
         FeedbackContent::Preference { winner, loser } => Some(sorted(winner, loser)),
-        FeedbackContent::Tie { a, b } => Some(sorted(a, b)),
+        FeedbackContent::NoDifference { a, b } => Some(sorted(a, b)),
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
 }
@@ -126,7 +126,7 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
                 return Err(format!("the source of a label is {source}; it must be convergence or script"));
             }
         }
-        FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
+        FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::NoDifference { a, b } => {
             let (a, b) = (trial(a)?, trial(b)?);
             after_both(row.created_at, [a, b])?;
             if a.state != TrialState::Converged || b.state != TrialState::Converged {
