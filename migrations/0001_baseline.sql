@@ -482,16 +482,16 @@ when (select subject_id from studies where id = new.study_id) in (select subject
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- A retracted answer stays in the record.
-create table retractions (
+create table feedback_retractions (
     feedback_seq integer primary key not null references feedback (seq),
-    author       text not null constraint retractions_author_length check (length(author) between 1 and 80),
-    reason       text not null constraint retractions_reason_length check (length(reason) between 1 and 2000),
+    author       text not null constraint feedback_retractions_author_length check (length(author) between 1 and 80),
+    reason       text not null constraint feedback_retractions_reason_length check (length(reason) between 1 and 2000),
     created_at   text not null
 ) strict;
 
-create trigger retractions_no_update before update on retractions
+create trigger feedback_retractions_no_update before update on feedback_retractions
 begin select raise(abort, 'retractions are append-only'); end;
-create trigger retractions_no_delete before delete on retractions
+create trigger feedback_retractions_no_delete before delete on feedback_retractions
 begin select raise(abort, 'retractions are append-only'); end;
 
 -- Answers about two gaits that state no preference. Those of raters are in blind_pair_answers, those of subjects in
@@ -686,18 +686,18 @@ create trigger blind_pair_allocations_no_delete before delete on blind_pair_allo
 begin select raise(abort, 'allocations are append-only'); end;
 
 -- Raters who were unblinded in a study.
-create table unblindings (
+create table rater_unblindings (
     seq        integer primary key autoincrement,
     study_id   text not null references studies (id),
     rater      text not null,
     actor      text not null,
-    reason     text not null constraint unblindings_reason_length check (length(reason) between 1 and 2000),
+    reason     text not null constraint rater_unblindings_reason_length check (length(reason) between 1 and 2000),
     created_at text not null
 ) strict;
 
-create trigger unblindings_no_update before update on unblindings
+create trigger rater_unblindings_no_update before update on rater_unblindings
 begin select raise(abort, 'unblindings are append-only'); end;
-create trigger unblindings_no_delete before delete on unblindings
+create trigger rater_unblindings_no_delete before delete on rater_unblindings
 begin select raise(abort, 'unblindings are append-only'); end;
 
 ---------------------------------------------------------------- Lab sessions

@@ -308,12 +308,12 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
         assert!(before.gaits[..place].iter().all(|other| !is_same_gait(find(other.trials[0]), find(gait.trials[0]))));
     }
     assert!(before.gaits.windows(2).all(|pair| pair[0].utility.mean >= pair[1].utility.mean));
-    assert!(before.unexpected_answers.iter().all(|unexpected| unexpected.probability.is_none_or(|p| p < 0.5)));
+    assert!(before.surprising_answers.iter().all(|surprising| surprising.probability.is_none_or(|p| p < 0.5)));
     let doubted = |analysis: &Analysis| {
         let Agreement { comparisons, comparisons_agreeing, no_difference, no_difference_agreeing, .. } =
             analysis.agreement;
         comparisons - comparisons_agreeing + no_difference - no_difference_agreeing
     };
-    assert_eq!(before.unexpected_answers.len(), doubted(&before));
+    assert_eq!(before.surprising_answers.len(), doubted(&before));
     service.stop().await;
 }

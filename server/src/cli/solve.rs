@@ -48,7 +48,7 @@ pub(super) struct Solve {
         long,
         value_name = "FILE",
         conflicts_with_all = [
-            "subject", "height_m", "mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
+            "subject", "height_m", "body_mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
             "max_iterations", "time_limit_s", "solver_settings", "bounds", "initial_guesses", "nearest_within"
         ]
     )]

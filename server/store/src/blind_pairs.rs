@@ -367,7 +367,7 @@ pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreR
 /// # Errors
 /// Errors of the database.
 pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &str, reason: &str) -> StoreResult<()> {
-    sqlx::query("insert into unblindings (study_id, rater, actor, reason, created_at) values (?, ?, ?, ?, ?)")
+    sqlx::query("insert into rater_unblindings (study_id, rater, actor, reason, created_at) values (?, ?, ?, ?, ?)")
         .bind(study)
         .bind(rater)
         .bind(actor)
@@ -383,7 +383,7 @@ pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &s
 /// # Errors
 /// Errors of the database.
 pub async fn is_unblinded(db: &mut Connection, study: StudyId, rater: &str) -> StoreResult<bool> {
-    let row = sqlx::query("select 1 from unblindings where study_id = ? and rater = ? limit 1")
+    let row = sqlx::query("select 1 from rater_unblindings where study_id = ? and rater = ? limit 1")
         .bind(study)
         .bind(rater)
         .fetch_optional(db)

@@ -333,7 +333,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
         },
         "not in the search space",
     ),
-    ("a retraction of nothing", |r| r.first("retractions")["feedback_seq"] = 99_999.into(), "FOREIGN KEY"),
+    ("a retraction of nothing", |r| r.first("feedback_retractions")["feedback_seq"] = 99_999.into(), "FOREIGN KEY"),
     (
         "an author that reads backwards",
         |r| of_source(r, "clinician")["author"] = "a\u{202e}b".into(),

@@ -19,7 +19,7 @@ use gait_learner::{Agreement, Prediction};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::analysis::{Analysis, UnexpectedAnswer};
+use gaitwright_service::studies::analysis::{Analysis, SurprisingAnswer};
 use gaitwright_service::studies::gait_utilities::{GaitUtility, is_distinguishable};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::FeedbackContent;
@@ -61,8 +61,8 @@ struct ShownAnalysis {
     parallel: Option<PageChart>,
     /// Whether some trials are not drawn.
     newest_only: bool,
-    unexpected_answers: Vec<UnexpectedAnswerRow>,
-    more_unexpected_answers: usize,
+    surprising_answers: Vec<SurprisingAnswerRow>,
+    more_surprising_answers: usize,
 }
 
 /// A gait, which one or several trials have.
@@ -88,7 +88,7 @@ struct BoundEffect {
     is_distinguishable: bool,
 }
 
-struct UnexpectedAnswerRow {
+struct SurprisingAnswerRow {
     text: String,
     source: &'static str,
     percent: String,
@@ -152,13 +152,13 @@ fn show(
         by_bound: by_bound.iter().flatten().map(drawn).collect(),
         parallel: parallel.as_ref().map(drawn),
         newest_only: results > DRAWN,
-        unexpected_answers: analysis
-            .unexpected_answers
+        surprising_answers: analysis
+            .surprising_answers
             .iter()
             .take(LISTED)
-            .filter_map(|s| unexpected_answer_row(s, snapshot))
+            .filter_map(|s| surprising_answer_row(s, snapshot))
             .collect(),
-        more_unexpected_answers: analysis.unexpected_answers.len().saturating_sub(LISTED),
+        more_surprising_answers: analysis.surprising_answers.len().saturating_sub(LISTED),
     })
 }
 
@@ -219,13 +219,13 @@ fn bounds(analysis: &Analysis) -> Vec<BoundEffect> {
     ranked.into_iter().filter(|place| dimensions[*place].values.len() > 1).map(row).collect()
 }
 
-fn unexpected_answer_row(unexpected: &UnexpectedAnswer, snapshot: &StudySnapshot) -> Option<UnexpectedAnswerRow> {
-    let text = match unexpected.answer.content {
+fn surprising_answer_row(surprising: &SurprisingAnswer, snapshot: &StudySnapshot) -> Option<SurprisingAnswerRow> {
+    let text = match surprising.answer.content {
         FeedbackContent::Suggestion { over, .. } => {
             format!("the suggested bounds are better than those of trial {}", snapshot.trial(over)?.number)
         }
-        _ => answer_in_words(&unexpected.answer, snapshot)?,
+        _ => answer_in_words(&surprising.answer, snapshot)?,
     };
-    let percent = unexpected.probability.map_or_else(|| "–".to_owned(), percent);
-    Some(UnexpectedAnswerRow { text, source: format::source(&unexpected.answer), percent })
+    let percent = surprising.probability.map_or_else(|| "–".to_owned(), percent);
+    Some(SurprisingAnswerRow { text, source: format::source(&surprising.answer), percent })
 }

@@ -20,7 +20,7 @@ use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
 use gaitwright_charts::{Figure, Ghost, WalkerFigure, gait_charts};
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Answer, Permission, Read, Run};
+use gaitwright_service::access::{Answer, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};

@@ -19,7 +19,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::emg::{CycleActivity, EmgSettings};
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
+use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
     self, Condition, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkView,

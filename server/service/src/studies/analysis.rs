@@ -34,12 +34,12 @@ pub struct Analysis {
     /// How many answers the posterior agrees with.
     pub agreement: Agreement,
     /// The answers that it does not agree with, the most surprising first.
-    pub unexpected_answers: Vec<UnexpectedAnswer>,
+    pub surprising_answers: Vec<SurprisingAnswer>,
 }
 
 /// An answer that the posterior does not agree with.
 #[derive(Debug)]
-pub struct UnexpectedAnswer {
+pub struct SurprisingAnswer {
     /// The answer.
     pub answer: FeedbackRow,
     /// For a preference or suggestion, the probability that its order of utilities is right; `None` for an answer of no
@@ -59,15 +59,15 @@ impl Analysis {
             main_effects: main_effects.collect::<Result<_, _>>()?,
             gaits: gait_utilities(snapshot, &posterior)?,
             agreement: posterior.agreement(),
-            unexpected_answers: unexpected_answers(snapshot, &posterior)?,
+            surprising_answers: surprising_answers(snapshot, &posterior)?,
             posterior,
         })
     }
 }
 
 /// The comparisons that the posterior does not agree with, the most surprising first; answers of no difference last.
-fn unexpected_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<UnexpectedAnswer>, LearnerError> {
-    let mut unexpected_answers = Vec::new();
+fn surprising_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<SurprisingAnswer>, LearnerError> {
+    let mut surprising_answers = Vec::new();
     for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
         let Some(feedback) = snapshot.feedback_for_learner(&row.content) else { continue };
         let order = match feedback {
@@ -83,10 +83,10 @@ fn unexpected_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result
             Some((winner, loser)) => Some(posterior.difference(winner, loser)?.probability_above_zero()),
             None => None,
         };
-        unexpected_answers.push(UnexpectedAnswer { answer: row.clone(), probability });
+        surprising_answers.push(SurprisingAnswer { answer: row.clone(), probability });
     }
-    unexpected_answers.sort_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
-    Ok(unexpected_answers)
+    surprising_answers.sort_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
+    Ok(surprising_answers)
 }
 
 /// What is kept of the studies used last, the one used last at the end.

@@ -212,7 +212,7 @@ pub async fn own_pair(db: &mut Connection, code: &str, rater: &str) -> StoreResu
 /// Errors of the database.
 pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreResult<Vec<PairWithSides>> {
     let rest = "where p.study_id = ? and exists \
-                (select 1 from unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
+                (select 1 from rater_unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
     sided(rest, &[&study.to_string()], db).await
 }
 

@@ -16,7 +16,7 @@ use gait_learner::LearnerError;
 use gaitwright_charts::Figure;
 use gaitwright_charts::gait_charts;
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Caller, Permission, Run};
+use gaitwright_service::access::{Caller, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::{Analyses, MOST_ANSWERS};
 use gaitwright_service::studies::certified_best::{self, BestCertification, CertificateState};

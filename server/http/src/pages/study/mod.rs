@@ -24,7 +24,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::{Administer, Permission, Read, Run};
+use gaitwright_service::access::{Administer, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_store::devices::{self, Device};
