@@ -110,7 +110,7 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("post /trials/{id}/certify", Some(Right::Run)),
     ("post /trials/{id}/explain", Some(Right::Run)),
     ("post /trials/{id}/relaxed-trial", Some(Right::Run)),
-    ("post /trials/{id}/simulate", Some(Right::Run)),
+    ("post /trials/{id}/execution-report", Some(Right::Run)),
     ("post /trials/{id}/safety-review", Some(Right::Answer)),
     ("get /reference-gaits", Some(Right::Read)),
     ("post /reference-gaits", Some(Right::Run)),

@@ -217,21 +217,23 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     let unknown = recommended().await;
     assert!(unknown["trial_id"] == json!(trial.id) && unknown["execution_report"].is_null(), "{unknown}");
     let before = page().await;
-    assert!(before.contains("No walks with this gait have been simulated yet."), "{before}");
-    for (wrong, field) in
-        [(json!({"walks": 0}), "walks"), (json!({"walks": 1001}), "walks"), (json!({"seed": -1}), "seed")]
-    {
+    assert!(before.contains("No simulated walks with this gait yet."), "{before}");
+    for (wrong, field) in [
+        (json!({"simulated_walks": 0}), "simulated_walks"),
+        (json!({"simulated_walks": 1001}), "simulated_walks"),
+        (json!({"seed": -1}), "seed"),
+    ] {
         let refused = service.post(&address, &wrong).await;
         assert!(refused.status.is_client_error() && refused.text.contains(field), "{}", refused.text);
     }
 
-    let found = simulated(&service, &address, &json!({"walks": 4, "seed": 3})).await;
+    let found = simulated(&service, &address, &json!({"simulated_walks": 4, "seed": 3})).await;
     let report = &found["report"];
     let gait = service.fetch(&format!("/api/v1/trials/{}/gait", trial.id)).await.text;
     std::fs::write(folder.path().join("gait.json"), gait).unwrap();
     let printed = done(folder.path(), &["simulate", "gait.json", "--walks", "4", "--seed", "3", "--json"]);
     assert_eq!(*report, serde_json::from_str::<Value>(&printed).unwrap());
-    let walks: Vec<&Value> = report["grounds"].as_array().unwrap().iter().map(|on| &on["walks"]).collect();
+    let walks: Vec<&Value> = report["grounds"].as_array().unwrap().iter().map(|on| &on["simulated_walks"]).collect();
     assert_eq!(walks, [4, 4, 4]);
 
     // The page has the same without scripts, and the study page and the recommendation follow it.
@@ -248,18 +250,22 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     assert!(of_study.contains(&level) && of_study.contains("#simulated-walks"), "{of_study}");
     assert_eq!(recommended().await["execution_report"], *report);
 
-    // The same walks exist; other walks replace them as the newest report, and the record keeps both.
-    let again = service.post(&address, &json!({"walks": 4, "seed": 3})).await;
+    // The same simulated walks exist; others replace them as the newest report, and the record keeps both.
+    let again = service.post(&address, &json!({"simulated_walks": 4, "seed": 3})).await;
     assert_eq!((again.status, &again.json()["state"]), (StatusCode::OK, &json!("done")));
-    let other = simulated(&service, &address, &json!({"walks": 4, "seed": 4})).await;
+    let other = simulated(&service, &address, &json!({"simulated_walks": 4, "seed": 4})).await;
     assert_eq!((&other["report"]["seed"], other["report"]["grounds"] == report["grounds"]), (&json!(4), false));
     let audit = service.fetch("/api/v1/audit").await.text;
-    assert_eq!(["ask_execution_report", "trial.simulate"].map(|act| audit.matches(act).count()), [2, 2], "{audit}");
+    assert_eq!(
+        ["ask_execution_report", "trial.report_execution"].map(|act| audit.matches(act).count()),
+        [2, 2],
+        "{audit}"
+    );
     let events = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
-    let events: Vec<_> = events.iter().filter(|event| event.kind == "gait_simulated").collect();
+    let events: Vec<_> = events.iter().filter(|event| event.kind == "execution_reported").collect();
     assert_eq!((events.len(), &events[0].payload["report"]), (2, report));
     let details = audit_trail(&service).await;
-    assert!(["passed", "failures", "walks"].iter().all(|name| details.contains(*name)), "{details:?}");
+    assert!(["passed", "failures", "simulated_walks"].iter().all(|name| details.contains(*name)), "{details:?}");
     service.stop().await;
 }
 
@@ -276,29 +282,29 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
     };
-    let long = json!({"walks": 1000, "seed": 1});
+    let long = json!({"simulated_walks": 1000, "seed": 1});
     assert_eq!(service.post(&address, &long).await.status, StatusCode::ACCEPTED);
     until(&service, "running").await;
     let listed = service.fetch("/api/v1/jobs?kind=execution_report").await.items();
     assert_eq!((&listed[0]["trial_id"], listed[0]["progress"].is_number()), (&json!(trial.id), true), "{listed}");
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("1000 walks on each ground with seed 1 are being simulated") && page.contains("<progress"));
-    assert!(page.contains("simulated_walks.mjs") && !page.contains("/simulate\""), "{page}");
-    let other = service.post(&address, &json!({"walks": 2})).await;
+    assert!(page.contains("1000 simulated walks on each ground with seed 1 are running") && page.contains("<progress"));
+    assert!(page.contains("simulated_walks.mjs") && !page.contains("/execution-report\""), "{page}");
+    let other = service.post(&address, &json!({"simulated_walks": 2})).await;
     assert_eq!(other.status, StatusCode::CONFLICT, "{}", other.text);
-    assert!(other.text.contains("1000 walks with seed 1 are already queued or running"), "{}", other.text);
+    assert!(other.text.contains("1000 simulated walks with seed 1 are already queued or running"), "{}", other.text);
     assert_eq!(service.post(&address, &long).await.status, StatusCode::ACCEPTED, "the same walks are the same job");
     assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.json()["state"], "cancelled");
     until(&service, "cancelled").await;
     assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
 
-    assert_eq!(service.post(&address, &json!({"walks": 1000, "seed": 2})).await.status, StatusCode::ACCEPTED);
+    assert_eq!(service.post(&address, &json!({"simulated_walks": 1000, "seed": 2})).await.status, StatusCode::ACCEPTED);
     until(&service, "running").await;
     service.stop().await;
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
     until(&service, "running").await;
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("1000 walks on each ground with seed 2"), "{page}");
+    assert!(page.contains("1000 simulated walks on each ground with seed 2"), "{page}");
     service.post(&format!("{job}/cancel"), &json!({})).await;
     service.stop().await;
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;

@@ -36,16 +36,16 @@ const ELSEWHERE: [&str; 21] = [
     "last_at",
     "names",
     "network",
+    "number_of_trials",
     "passed",
     "relaxed_bound",
     "scheduled",
     "signed_by",
+    "simulated_walks",
     "to_device",
     "trajectories",
-    "number_of_trials",
     "trusted",
     "unchecked_rmse",
-    "walks",
     "without_gait",
 ];
 

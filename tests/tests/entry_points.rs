@@ -115,7 +115,6 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
             "/explanation",
             "/execution-report",
             "/relaxed-trial",
-            "/simulate",
             "/cancel",
             "/retry",
             "/emg-results",

@@ -169,7 +169,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         return Err(Error::conflict(why).into());
     };
     let certification = certified_best::of_ranking(&mut reader, &ranking[place..]).await?;
-    let execution_report = execution::newest(&mut reader, trial.id).await?.map(|kept| kept.simulated.report);
+    let execution_report = execution::newest(&mut reader, trial.id).await?.map(|kept| kept.reported.report);
     drop(reader);
     Ok(Recommendation {
         study_id: id,

@@ -82,7 +82,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/trials/{id}/explain", post(explanation::post))
         .route("/trials/{id}/relaxed-trial", post(explanation::try_relaxed))
-        .route("/trials/{id}/simulate", post(simulated_walks::post))
+        .route("/trials/{id}/execution-report", post(simulated_walks::post))
         .route("/trials/{id}/safety-report", post(safety_review::report))
         .route("/trials/{id}/safety-review", post(safety_review::post))
         .route("/reference-gaits", get(reference_gaits::list).post(reference_gaits::import))

@@ -204,7 +204,7 @@ pub(super) async fn read_live(
         None => false,
     };
     let simulated_walks = match outcome.best {
-        Some(best) => execution::newest(&mut reader, best).await?.map(|kept| kept.simulated.report.sentence()),
+        Some(best) => execution::newest(&mut reader, best).await?.map(|kept| kept.reported.report.sentence()),
         None => None,
     };
     drop(reader);
