@@ -11,7 +11,7 @@ use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub(super) struct Certify {
+pub(super) struct CertifyCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
@@ -24,7 +24,7 @@ pub(super) struct Certify {
     json: bool,
 }
 
-impl Certify {
+impl CertifyCommand {
     /// Certifies the gait. A failed certificate is a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let GaitFile { gait, report } = read_gait_file(&self.gait)?;

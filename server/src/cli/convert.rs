@@ -28,7 +28,7 @@ enum TargetFormat {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Convert {
+pub(super) struct ConvertCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
@@ -43,7 +43,7 @@ pub(super) struct Convert {
     out: Option<PathBuf>,
 }
 
-impl Convert {
+impl ConvertCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let gait = read_gait_file(&self.gait)?.gait;
         let out = OutFile::instead_of_stdout(self.out.as_deref(), &[&self.gait])?;

@@ -14,7 +14,7 @@ use std::thread::available_parallelism;
 const CLOCKS_DIFFER_S: i64 = 5;
 
 #[derive(Debug, Args)]
-pub(super) struct Doctor {
+pub(super) struct DoctorCommand {
     #[command(flatten)]
     flags: Box<Flags>,
 }
@@ -26,7 +26,7 @@ enum CheckOutcome {
 }
 use CheckOutcome::{Good, Trouble};
 
-impl Doctor {
+impl DoctorCommand {
     pub(super) fn flags(&self) -> Flags {
         (*self.flags).clone()
     }

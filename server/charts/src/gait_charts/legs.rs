@@ -1,8 +1,8 @@
 //! The charts in which both legs are compared, as gait laboratories draw them: each leg over its own cycle, torques and
 //! powers normalised to body mass, forces in body weights.
 
-use super::cycle::{Cycle, Leg};
 use super::group::Group;
+use super::leg_cycle::{Cycle, Leg};
 use crate::gait_series::Point;
 use crate::{Chart, Stroke, band_in_words, over_reference_of_leg};
 use gait_optimizer::ReferenceGait;

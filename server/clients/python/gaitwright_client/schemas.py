@@ -33,9 +33,6 @@ BlindPairKind = Literal["new", "repeat"]
 # `not_certified`, the gait has no certificate.
 CertificateState = Literal["passed", "failed", "being_certified", "not_certified"]
 
-# Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
-Condition = Literal["normal", "gait_a", "gait_b"]
-
 # Kind of entry: `given`, the subject gave consent; `withdrawn`, the subject withdrew it.
 ConsentKind = Literal["given", "withdrawn"]
 
@@ -192,6 +189,9 @@ Unit = Literal["degrees", "radians"]
 # Identifier of a user.
 UserId = str
 
+# Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
+WalkCondition = Literal["normal", "gait_a", "gait_b"]
+
 # The gait from which a trial is warm-started: `incumbent`, the best gait so far, as in the published method; `root`,
 # the first gait of the study, which has the default bounds, so that the gait of an action does not depend on other
 # trials.
@@ -251,7 +251,19 @@ class AnswerReceipt(TypedDict):
     number: int
 
 
-class Ask(TypedDict, total=False):
+class _AnswerRetractionRequired(TypedDict):
+    # Why the answer is void.
+    reason: str
+
+
+class AnswerRetraction(_AnswerRetractionRequired, total=False):
+    """Retraction of a preference or an assessment."""
+
+    # Author of the retraction. Defaults to the caller's name.
+    author: Optional[str]
+
+
+class AskRequest(TypedDict, total=False):
     """A request for a trial."""
 
     # Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
@@ -557,7 +569,20 @@ class BlindMotion(TypedDict):
     figures: list[list[list[float]]]
 
 
-class Body(TypedDict):
+class BlindPair(TypedDict):
+    """Pair to compare, as shown to a rater."""
+
+    # URL of the motion that is shown first.
+    first: str
+    # Number of the pair for this rater.
+    number: int
+    # URL of the motion that is shown second.
+    second: str
+    # Token of the pair.
+    token: str
+
+
+class BodyMeasures(TypedDict):
     """Height and mass of a subject."""
 
     # Body mass, kg.
@@ -696,31 +721,6 @@ class CertifiedSubject(TypedDict):
     height_m: float
 
 
-class Change(TypedDict, total=False):
-    """Changes to a study. Absent fields keep their values."""
-
-    # Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be archived
-    # before its start and after its end.
-    archived: Optional[bool]
-    # Name shown to users.
-    name: Optional[str]
-    # Free-text notes.
-    notes: Optional[str]
-    # Number of trials that run in parallel.
-    parallel_trials: Optional[int]
-    # Priority, -10 to 10. Studies with a higher priority run first.
-    priority: Optional[int]
-    # Tags, at most 10 of at most 40 characters. They replace the present ones.
-    tags: Optional[list[str]]
-
-
-class Closing(TypedDict, total=False):
-    """Closing of a session."""
-
-    # Note, at most 2000 characters.
-    note: str
-
-
 class _ConflictRequired(TypedDict):
     # The bounds. Empty if the fixed constraints conflict with each other.
     bounds: list[BoundValue]
@@ -758,6 +758,13 @@ class Consent(TypedDict):
     note: str
     # Sequence number.
     seq: int
+
+
+class ConsentWithdrawal(TypedDict):
+    """A withdrawal of consent."""
+
+    # Reason, 1 to 2000 characters, or `none given` if the subject gave none.
+    reason: str
 
 
 class ContactRowName(TypedDict):
@@ -870,15 +877,6 @@ class Correction(TypedDict):
     seq: int
 
 
-class CreatedInvitation(TypedDict):
-    """Invited rater."""
-
-    # The membership.
-    member: Member
-    # Path of the one-time sign-in link, which is shown once and valid for a day.
-    path: str
-
-
 class _PreferenceRequired(TypedDict):
     # Name or pseudonym of the person who answered.
     author: str
@@ -916,6 +914,15 @@ class CreatedPreference(Preference):
     other_answers: list[FeedbackId]
 
 
+class CreatedRaterInvitation(TypedDict):
+    """Invited rater."""
+
+    # The membership.
+    member: Member
+    # Path of the one-time sign-in link, which is shown once and valid for a day.
+    path: str
+
+
 class _TokenRequired(TypedDict):
     # Time of creation.
     created_at: Instant
@@ -943,6 +950,20 @@ class CreatedToken(Token):
 
     # Secret, shown once. Send it as `Authorization: Bearer SECRET`.
     secret: str
+
+
+class _CurrentUserRequired(TypedDict):
+    # Name of the user or the token.
+    name: str
+    # Rights of the caller.
+    rights: list[Right]
+
+
+class CurrentUser(_CurrentUserRequired, total=False):
+    """Caller of the request."""
+
+    # Role of the user. Null for tokens.
+    role: Optional[Role]
 
 
 class CycleActivity(TypedDict):
@@ -1080,6 +1101,13 @@ class DomainTrajectory(_DomainTrajectoryRequired, total=False):
     muscles: Optional[MuscleTrajectory]
 
 
+class EmgProcessing(TypedDict, total=False):
+    """Settings of EMG processing."""
+
+    # band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
+    settings: EmgSettings
+
+
 class EmgReading(TypedDict, total=False):
     """How to read an EMG recording."""
 
@@ -1174,41 +1202,13 @@ class ExecutionReport(_ExecutionReportRequired, total=False):
     pushes: Optional[SurvivedPushes]
 
 
-class Extend(TypedDict):
-    """A larger number of trials."""
+class FloquetMultiplier(TypedDict):
+    """A Floquet multiplier: an eigenvalue of the linearised stride-to-stride map."""
 
-    # Total number of trials. Must exceed the current budget.
-    trial_budget: int
-
-
-class StickFigure(TypedDict):
-    """Points of the body at an instant as forward and upward coordinates, m."""
-
-    # Hip.
-    hip: list[float]
-    # Left (intact) leg.
-    left: LegPoints
-    # Right (prosthetic) leg.
-    right: LegPoints
-    # Shoulder.
-    shoulder: list[float]
-    # Time from the start of the stride, s.
-    time_s: float
-
-
-class _FrameRequired(StickFigure):
-    # Name of the domain.
-    domain: str
-    # Ground forces on left heel, left toe, right heel and right toe, forward and up, N.
-    forces_n: list[list[float]]
-
-
-class Frame(_FrameRequired, total=False):
-    """Node of a motion."""
-
-    # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
-    # muscles.
-    activations: Optional[list[float]]
+    # Imaginary part.
+    imaginary: float
+    # Real part.
+    real: float
 
 
 class GaitDocument(TypedDict):
@@ -1239,6 +1239,17 @@ class GaitDocument(TypedDict):
     stride_time_s: float
     # The subject.
     subject: WalkerSubject
+
+
+class GaitMotion(TypedDict):
+    """Motion of a gait over one stride from right heel strike."""
+
+    # Nodes in order of time. Interpolate linearly between them.
+    frames: list[MotionFrame]
+    # Stride length, m.
+    stride_length_m: float
+    # Stride time, s.
+    stride_time_s: float
 
 
 class GaitProblem(TypedDict):
@@ -1440,13 +1451,6 @@ class Import(_ImportRequired, total=False):
     signed_by: Optional[str]
 
 
-class Invitation(TypedDict):
-    """Rater to invite."""
-
-    # Name or code of the rater, 1 to 80 characters. A new name adds a rater.
-    name: str
-
-
 class Iteration(TypedDict):
     """One iteration of a solve."""
 
@@ -1529,6 +1533,13 @@ class LabAnswer(TypedDict):
     number: int
 
 
+class LabSessionClosing(TypedDict, total=False):
+    """Closing of a session."""
+
+    # Note, at most 2000 characters.
+    note: str
+
+
 class _LabSessionProgressRequired(TypedDict):
     # Whether the current answer can be retracted: the session is neither closed nor unblinded, and the answer is not a
     # safety report.
@@ -1565,6 +1576,13 @@ class LabSessionStep(TypedDict):
     created_at: Instant
     # Reason or note.
     note: str
+
+
+class LabSessionUnblinding(TypedDict):
+    """Session to unblind, with the reason."""
+
+    # Reason, 1 to 2000 characters.
+    reason: str
 
 
 class _LabSessionViewRequired(TypedDict):
@@ -1704,20 +1722,6 @@ class LinearAlgebra(TypedDict):
     substitutions: int
 
 
-class _MeRequired(TypedDict):
-    # Name of the user or the token.
-    name: str
-    # Rights of the caller.
-    rights: list[Right]
-
-
-class Me(_MeRequired, total=False):
-    """Caller of the request."""
-
-    # Role of the user. Null for tokens.
-    role: Optional[Role]
-
-
 class _MeasurementFileRequired(TypedDict):
     # Who uploaded it.
     actor: str
@@ -1813,15 +1817,34 @@ class ModelActivity(_ModelActivityRequired, total=False):
     correlation: Optional[float]
 
 
-class Motion(TypedDict):
-    """Motion of a gait over one stride from right heel strike."""
+class StickFigure(TypedDict):
+    """Points of the body at an instant as forward and upward coordinates, m."""
 
-    # Nodes in order of time. Interpolate linearly between them.
-    frames: list[Frame]
-    # Stride length, m.
-    stride_length_m: float
-    # Stride time, s.
-    stride_time_s: float
+    # Hip.
+    hip: list[float]
+    # Left (intact) leg.
+    left: LegPoints
+    # Right (prosthetic) leg.
+    right: LegPoints
+    # Shoulder.
+    shoulder: list[float]
+    # Time from the start of the stride, s.
+    time_s: float
+
+
+class _MotionFrameRequired(StickFigure):
+    # Name of the domain.
+    domain: str
+    # Ground forces on left heel, left toe, right heel and right toe, forward and up, N.
+    forces_n: list[list[float]]
+
+
+class MotionFrame(_MotionFrameRequired, total=False):
+    """Node of a motion."""
+
+    # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
+    # muscles.
+    activations: Optional[list[float]]
 
 
 class MotionReading(TypedDict, total=False):
@@ -1836,15 +1859,6 @@ class MotionReading(TypedDict, total=False):
     format: MeasurementFormat
     # Unit of angles, if the header of an OpenSim file does not state it.
     unit: Optional[Unit]
-
-
-class Multiplier(TypedDict):
-    """A Floquet multiplier: an eigenvalue of the linearised stride-to-stride map."""
-
-    # Imaginary part.
-    imaginary: float
-    # Real part.
-    real: float
 
 
 class MuscleParametersGas(TypedDict, total=False):
@@ -2286,11 +2300,11 @@ class NewUser(TypedDict):
     role: Role
 
 
-class NextPair(TypedDict, total=False):
+class NextBlindPair(TypedDict, total=False):
     """Next pair for a rater."""
 
     # The pair. Null if no comparison is pending.
-    pair: Optional[Pair]
+    pair: Optional[BlindPair]
 
 
 class _OpenSolveRequired(TypedDict):
@@ -2322,19 +2336,6 @@ class Optimality(TypedDict):
     complementarity: float
     # Largest entry of the Lagrangian's gradient.
     dual_infeasibility: float
-
-
-class Pair(TypedDict):
-    """Pair to compare, as shown to a rater."""
-
-    # URL of the motion that is shown first.
-    first: str
-    # Number of the pair for this rater.
-    number: int
-    # URL of the motion that is shown second.
-    second: str
-    # Token of the pair.
-    token: str
 
 
 class PhasePortrait(TypedDict):
@@ -2436,13 +2437,6 @@ class Problem(_ProblemRequired, total=False):
     value: Any
 
 
-class Processing(TypedDict, total=False):
-    """Settings of EMG processing."""
-
-    # band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
-    settings: EmgSettings
-
-
 class _ProportionRequired(TypedDict):
     # Number of successes.
     count: int
@@ -2484,6 +2478,13 @@ class RaterAnswer(_RaterAnswerRequired, total=False):
     response_ms: Optional[int]
 
 
+class RaterInvitation(TypedDict):
+    """Rater to invite."""
+
+    # Name or code of the rater, 1 to 80 characters. A new name adds a rater.
+    name: str
+
+
 class _RaterReliabilityRequired(TypedDict):
     # Number of answers.
     answered: int
@@ -2507,6 +2508,15 @@ class RaterReliability(_RaterReliabilityRequired, total=False):
     # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Null until
     # the rater is unblinded, because it would reveal allocations.
     first_preferred: Optional[Proportion]
+
+
+class RaterUnblinding(TypedDict):
+    """Rater to unblind, with the reason."""
+
+    # Name of the rater.
+    rater: str
+    # Reason, 1 to 2000 characters.
+    reason: str
 
 
 class _RecommendedRequired(TypedDict):
@@ -2680,18 +2690,6 @@ class ResultDerivatives(TypedDict):
     speed_m_s: float
 
 
-class _RetractRequired(TypedDict):
-    # Why the answer is void.
-    reason: str
-
-
-class Retract(_RetractRequired, total=False):
-    """Retraction of a preference or an assessment."""
-
-    # Author of the retraction. Defaults to the caller's name.
-    author: Optional[str]
-
-
 class Retraction(TypedDict):
     """Retraction of an answer."""
 
@@ -2719,7 +2717,7 @@ class ReturnMap(TypedDict):
     # Largest modulus of the multipliers, from finite differences of simulated domains.
     largest_by_differences: float
     # Multipliers from variational equations and saltation matrices, largest first.
-    multipliers: list[Multiplier]
+    multipliers: list[FloquetMultiplier]
     # Fraction of a proportional change of all velocities that remains after one stride.
     speed_kept: float
     # Change in other coordinates that a proportional change of all velocities causes within one stride, relative to its
@@ -3014,6 +3012,13 @@ class SolveReport(_SolveReportRequired, total=False):
     optimality: Optional[Optimality]
 
 
+class StateChangeReason(TypedDict, total=False):
+    """Reason for a command."""
+
+    # Reason, at most 2000 characters.
+    reason: str
+
+
 class StridesOnYield(TypedDict):
     """Undisturbed simulated walk on ground of a given stiffness."""
 
@@ -3027,7 +3032,7 @@ class _StudyPlanRequired(TypedDict):
     # Values of bounds that are not tuned.
     base_bounds: Bounds
     # Height and mass used by solves, independent of later corrections.
-    body: Body
+    body: BodyMeasures
     # Identifier of the device.
     device_id: DeviceId
     # What evaluates trials.
@@ -3103,11 +3108,22 @@ class Study(_StudyRequired, total=False):
     cloned_from: Optional[StudyId]
 
 
-class StudyAccess(TypedDict):
-    """Access to a study."""
+class StudyChange(TypedDict, total=False):
+    """Changes to a study. Absent fields keep their values."""
 
-    # Whether only members and administrators can access the study. Raters must be members in any case.
-    restricted: bool
+    # Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be archived
+    # before its start and after its end.
+    archived: Optional[bool]
+    # Name shown to users.
+    name: Optional[str]
+    # Free-text notes.
+    notes: Optional[str]
+    # Number of trials that run in parallel.
+    parallel_trials: Optional[int]
+    # Priority, -10 to 10. Studies with a higher priority run first.
+    priority: Optional[int]
+    # Tags, at most 10 of at most 40 characters. They replace the present ones.
+    tags: Optional[list[str]]
 
 
 class StudyClone(TypedDict, total=False):
@@ -3160,6 +3176,20 @@ class StudyComparison(_StudyComparisonRequired, total=False):
     best_gait_rmse_rad: Optional[float]
     # Number of the recommended trial. Null if there is no recommendation.
     best_trial: Optional[int]
+
+
+class StudyExtension(TypedDict):
+    """A larger number of trials."""
+
+    # Total number of trials. Must exceed the current budget.
+    trial_budget: int
+
+
+class StudyRestriction(TypedDict):
+    """Access to a study."""
+
+    # Whether only members and administrators can access the study. Raters must be members in any case.
+    restricted: bool
 
 
 class StudyView(Study):
@@ -3219,12 +3249,12 @@ class SurvivedPushes(TypedDict):
     largest_tried_n_s: float
 
 
-class _TellRequired(TypedDict):
+class _TellRequestRequired(TypedDict):
     # Whether the evaluation found a gait.
     outcome: Outcome
 
 
-class Tell(_TellRequired, total=False):
+class TellRequest(_TellRequestRequired, total=False):
     """The outcome of a trial, as a script reports it."""
 
     # Cost of transport.
@@ -3243,13 +3273,6 @@ class TightenedBounds(TypedDict):
     # For each tightened variable a list of its number, from 0, and a list of two margins, of its lower and of its upper
     # bound.
     variables: list[list[MarginEntry]]
-
-
-class TransitionReason(TypedDict, total=False):
-    """Reason for a command."""
-
-    # Reason, at most 2000 characters.
-    reason: str
 
 
 class _TrialRequired(TypedDict):
@@ -3381,22 +3404,6 @@ class TrialSensitivities(TypedDict):
     trial_id: TrialId
 
 
-class Unblind(TypedDict):
-    """Rater to unblind, with the reason."""
-
-    # Name of the rater.
-    rater: str
-    # Reason, 1 to 2000 characters.
-    reason: str
-
-
-class UnblindSession(TypedDict):
-    """Session to unblind, with the reason."""
-
-    # Reason, 1 to 2000 characters.
-    reason: str
-
-
 class _UnblindedPairRequired(TypedDict):
     # Whether the rater could have known the allocation.
     could_have_known: bool
@@ -3520,7 +3527,7 @@ class WalkView(_WalkViewRequired, total=False):
     """Walk of a session."""
 
     # Condition of the walk. Null while it is blinded.
-    condition: Optional[Condition]
+    condition: Optional[WalkCondition]
     # Who recorded the walk, and when. Null if it is not recorded yet.
     recorded: Optional[LabSessionStep]
 
@@ -3580,13 +3587,6 @@ class WarmStart(_WarmStartRequired, total=False):
     # Margins by which bounds are tightened, because an earlier gait violated them between nodes. Absent if there are
     # none.
     margins: TightenedBounds
-
-
-class Withdrawal(TypedDict):
-    """A withdrawal of consent."""
-
-    # Reason, 1 to 2000 characters, or `none given` if the subject gave none.
-    reason: str
 
 
 class Workers(TypedDict):

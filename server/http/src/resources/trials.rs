@@ -22,7 +22,7 @@ pub(crate) struct Trial {
     #[schema(value_type = u64)]
     action_index: ActionIndex,
     /// The action: values of the bounds a1 to a8, tuned or fixed.
-    #[schema(value_type = study_plan_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::BoundsSchema)]
     action: TunedBounds,
     /// Reason for the trial.
     reason: String,

@@ -1,7 +1,7 @@
 //! Records and retracts assessments: answers of staff about two gaits that state no preference (cannot tell, or
 //! unsafe).
 
-use super::answer::attribution;
+use super::pair_answer::attribution;
 use super::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::access::Caller;
 use crate::error::Error;

@@ -5,7 +5,7 @@
 
 use super::safety_reports::SafetyReports;
 use super::same_motion::is_same_gait;
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::export::ControllerFile;

@@ -11,11 +11,11 @@ from ..paging import Pages
 from ..schemas import (
     AnswerReceipt,
     BlindMotion,
-    NextPair,
+    NextBlindPair,
     RaterAnswer,
     RaterReliability,
+    RaterUnblinding,
     StudyId,
-    Unblind,
     UnblindedRater,
 )
 from ..transport import Transport
@@ -65,13 +65,13 @@ class BlindMethods(Transport):
             ),
         )
 
-    def draw_blind_pair(self, study_id: StudyId, *, idempotency_key: Optional[str] = None) -> NextPair:
+    def draw_blind_pair(self, study_id: StudyId, *, idempotency_key: Optional[str] = None) -> NextBlindPair:
         """Get the next pair for a rater.
 
         Returns the same pair until it is answered.
         """
         return cast(
-            NextPair,
+            NextBlindPair,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/blind-pairs/next",
@@ -92,7 +92,7 @@ class BlindMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Unblind],
+        **body: Unpack[RaterUnblinding],
     ) -> UnblindedRater:
         """Unblind a rater.
 

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
-    Closing,
     ControllerFile,
+    EmgProcessing,
     EmgView,
+    LabSessionClosing,
     LabSessionId,
     LabSessionProgress,
+    LabSessionUnblinding,
     LabSessionView,
     LimitCycles,
     MeasurementFile,
@@ -22,10 +24,8 @@ from ..schemas import (
     NewLabAnswer,
     NewLabSession,
     NewMotion,
-    Processing,
     RecordedWalk,
     StudyId,
-    UnblindSession,
 )
 from ..transport import Transport
 
@@ -73,7 +73,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Closing],
+        **body: Unpack[LabSessionClosing],
     ) -> LabSessionView:
         """Close a lab session.
 
@@ -132,7 +132,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Processing],
+        **body: Unpack[EmgProcessing],
     ) -> EmgView:
         """Process EMG recordings.
 
@@ -262,7 +262,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[UnblindSession],
+        **body: Unpack[LabSessionUnblinding],
     ) -> LabSessionView:
         """Unblind a lab session.
 

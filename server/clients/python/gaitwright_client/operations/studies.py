@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Optional, cast
 from ..events import Event, follow
 from ..paging import Pages
 from ..schemas import (
-    Change,
-    Extend,
     Import,
     Milestone,
     NewStudy,
     Recommendation,
+    StateChangeReason,
+    StudyChange,
     StudyClone,
     StudyComparison,
+    StudyExtension,
     StudyId,
     StudyState,
     StudyView,
     SubjectId,
-    TransitionReason,
 )
 from ..transport import Transport
 
@@ -88,7 +88,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Change],
+        **body: Unpack[StudyChange],
     ) -> StudyView:
         """Update a study.
 
@@ -157,7 +157,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Extend],
+        **body: Unpack[StudyExtension],
     ) -> StudyView:
         """Raise the number of trials of a study.
 
@@ -204,7 +204,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Pause a study.
 
@@ -244,7 +244,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Resume a study.
 
@@ -270,7 +270,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Start a study.
 
@@ -296,7 +296,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Stop a study.
 

@@ -13,9 +13,9 @@ from ..schemas import (
     Certificate,
     ControllerFile,
     GaitDocument,
+    GaitMotion,
     Iteration,
     Job,
-    Motion,
     NewExecutionReport,
     SolveProblem,
     StudyId,
@@ -220,12 +220,12 @@ class TrialsMethods(Transport):
         """
         return Pages(self, "/api/v1/trials/{id}/iterations", {"id": trial_id}, query={"limit": page_size})
 
-    def get_gait_motion(self, trial_id: TrialId) -> Motion:
+    def get_gait_motion(self, trial_id: TrialId) -> GaitMotion:
         """Get the motion of a gait.
 
         Stick figures over one stride, for an animation.
         """
-        return cast(Motion, self.request_json("GET", "/api/v1/trials/{id}/motion", {"id": trial_id}))
+        return cast(GaitMotion, self.request_json("GET", "/api/v1/trials/{id}/motion", {"id": trial_id}))
 
     def get_solve_problem(self, trial_id: TrialId) -> SolveProblem:
         """Download the problem file of a trial.

@@ -1,6 +1,6 @@
 //! Unblinding of a lab session.
 
-use super::answer;
+use super::lab_answer;
 use super::session::{not_included, still_shown};
 use crate::error::Error;
 use crate::printable;
@@ -26,6 +26,6 @@ pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reaso
     let detail = json!({ "reason": reason });
     audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;
     let session = lab_sessions::get(writer, id).await?;
-    answer::record_answer(writer, &session).await?;
+    lab_answer::record_answer(writer, &session).await?;
     Ok(session)
 }

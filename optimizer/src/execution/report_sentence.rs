@@ -1,6 +1,6 @@
 //! An execution report as a sentence.
 
-use super::report::{ExecutionReport, WalksOnGround};
+use super::execution_report::{ExecutionReport, WalksOnGround};
 
 impl WalksOnGround {
     /// The ground, as in "ground uneven by ±5 mm".

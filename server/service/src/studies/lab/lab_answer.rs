@@ -8,8 +8,8 @@ use super::session::{LabSessionProgress, session_progress, still_open, still_sho
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::answer as answering;
 use crate::studies::assessment;
+use crate::studies::pair_answer as answering;
 use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;

@@ -4,7 +4,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
-use crate::studies::trial_state::has_state;
+use crate::studies::trial_transitions::has_state;
 use crate::studies::walkable;
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::OrderedAnswer;
