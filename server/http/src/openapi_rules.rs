@@ -199,7 +199,8 @@ fn state_bounds(schemas: &mut Schemas<'_>) {
     for (bound, name) in TunedBounds::NAMES.iter().enumerate() {
         let side = if TunedBounds::IS_LOWER[bound] { "Minimum" } else { "Maximum" };
         // Two meanings name the side themselves.
-        let quantity = TunedBounds::MEANINGS[bound].replace(" lower bound", "").replace(" upper bound", "");
+        let meaning = TunedBounds::MEANINGS[bound];
+        let quantity = meaning.trim_start_matches("minimum ").trim_start_matches("maximum ");
         let meaning = format!("{side} {quantity}.");
         let (least, most) = TunedBounds::RANGES[bound];
         let mut schema = number(&meaning, least, most, &json!("number"));

@@ -64,7 +64,12 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
     if let Some(certified) = &certificate.certified {
         lines.push(format!("  gait {}, {}", certified.gait_sha256, certified.walker_in_words()));
-        lines.extend(certified.differences.iter().map(|difference| format!("  differs: {}", difference.in_words())));
+        lines.extend(
+            certified
+                .differences
+                .iter()
+                .map(|difference| format!("  differs from the built-in problem: {}", difference.in_words())),
+        );
         lines.push(format!(
             "  cost of transport {:.4} (from absolute joint powers, which the objective smooths)",
             certified.unsmoothed_cost_of_transport

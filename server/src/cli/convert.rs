@@ -35,7 +35,7 @@ pub(super) struct ConvertCommand {
     /// Target format.
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: TargetFormat,
-    /// Sampling rate of `mot`, 10 to 5000.
+    /// Sampling rate of the `mot` file, Hz, 10 to 5000.
     #[arg(long, value_name = "HZ", default_value = "200", value_parser = number, allow_negative_numbers = true)]
     rate_hz: f64,
     /// Output file (default: standard output).

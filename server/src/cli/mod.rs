@@ -88,7 +88,7 @@ enum Command {
     Sweep(sweep::SweepCommand),
     /// Find the gait of every action of Table I, starting every solve from one root gait.
     ///
-    /// Actions share a gait if the bounds that differ are inactive in it, so that a fraction of the solves is enough.
+    /// Actions that differ only in inactive bounds share a gait, so only a fraction of the solves is needed.
     Atlas(atlas::AtlasCommand),
     /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
     Certify(certify::CertifyCommand),

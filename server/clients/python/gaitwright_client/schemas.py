@@ -129,7 +129,7 @@ Right = Literal["read", "run", "answer", "rate", "device", "administer"]
 # gaits blind and records walks and answers in lab sessions.
 Role = Literal["administrator", "clinician", "rater"]
 
-# Decision of a safety review: `cleared`, somebody may walk with the gait; `unsafe`, it remains marked as unsafe.
+# Decision of a safety review: `cleared`, the gait may be used for walking; `unsafe`, it remains marked as unsafe.
 SafetyDecision = Literal["cleared", "unsafe"]
 
 # Identifier of a safety report.
@@ -410,7 +410,7 @@ AuditDetail = TypedDict(
         "recording": "MeasurementFileId",
         # `lab_session.process`: the measurement files that were processed.
         "recordings": "list[MeasurementFileId]",
-        # `trial.explain`: name of a bound with a relaxed value of which a gait exists. Null if none was found.
+        # `trial.explain`: name of the bound that gives a gait if it is relaxed. Null if there is none.
         "relaxed_bound": "Optional[str]",
         # Whether only members see the study: `study.create`, `study.restrict`.
         "restricted": "bool",
@@ -726,7 +726,8 @@ class _ConflictRequired(TypedDict):
     bounds: list[BoundValue]
     # Number of starting points of the search.
     starts: int
-    # Whether a solve ended undecided, such as `stalled` or `time_limit`. If so, infeasibility is not certain.
+    # Whether a solve ended without a decision, for example as `stalled` or `time_limit`. If so, infeasibility is not
+    # certain.
     undecided: bool
     # Violations in the motion closest to feasibility that the search found, with all other tuned bounds at their
     # loosest, worst first.
@@ -1467,7 +1468,7 @@ class Iteration(TypedDict):
     # Objective of the phase.
     objective: float
     # Phase of the solve: `tracking` and `muscle_tracking`, tracking of the reference gait without and with muscles;
-    # `plain_cost`, minimisation of the cost of transport without muscles, before that with muscles; `cost`,
+    # `plain_cost`, minimisation of the cost of transport without muscles, which precedes the one with muscles; `cost`,
     # minimisation of the cost of transport; `inter_node`, minimisation with tightened bounds.
     phase: str
     # Primal step length.
@@ -1511,7 +1512,7 @@ class JointRelaxation(TypedDict):
     solves: int
     # Number of starting points of the search at the `not_with` values.
     starts: int
-    # Whether a solve at the `not_with` values ended undecided. If so, infeasibility is not certain.
+    # Whether a solve at the `not_with` values ended without a decision. If so, infeasibility is not certain.
     undecided: bool
 
 
@@ -2387,7 +2388,7 @@ class PreferenceContentSuggestion(TypedDict):
 
     # Kind of preference.
     kind: Literal["suggestion"]
-    # Trial that it would have been better than.
+    # Trial to which the suggested action is preferred.
     over: TrialId
     # Index of the suggested action.
     suggested: int
@@ -2636,7 +2637,7 @@ _RelaxationRequired = TypedDict(
         "solves": "int",
         # Number of starting points of the search at the `not_with` value. 0 if unknown.
         "starts": "int",
-        # Whether the solve at the `not_with` value ended undecided. If so, infeasibility is not certain.
+        # Whether the solve at the `not_with` value ended without a decision. If so, infeasibility is not certain.
         "undecided": "bool",
     },
 )
@@ -2777,7 +2778,7 @@ class SearchSpace(TypedDict):
 
 
 class _SensitivityToBoundRequired(TypedDict):
-    # The active constraints that it sets. Empty if small changes of the bound change nothing.
+    # The active constraints that contain the bound. Empty if small changes of the bound change nothing.
     active: list[ActiveConstraint]
     # Name of the bound.
     bound: str
@@ -2909,8 +2910,8 @@ class SolveOptionsSolver(TypedDict, total=False):
     # Initial weight of the proximal term after steps that the line search shortened often. Default 1e-4. 0 disables the
     # term.
     proximal_first: float
-    # Number of iterations that begin with a decreasing regularisation after the unregularised matrix has had the wrong
-    # inertia twice in a row, one more for each further time. Default 4.
+    # After the unregularised matrix has had the wrong inertia twice in a row, this many iterations start from a reduced
+    # regularisation. Each further time adds one iteration. Default 4.
     regularisation_memory: int
     # Share of the violation at which the restoration phase ends if the filter accepts the point. Default 0.9.
     required_reduction: float
@@ -3303,13 +3304,13 @@ class Trial(_TrialRequired, total=False):
 
     # Best trial when this one was proposed. Null if there was none.
     best_before: Optional[TrialId]
-    # Cost of transport of a converged gait, dimensionless. Null without one, and if the script that evaluated the trial
-    # did not report it.
+    # Cost of transport of a converged gait, dimensionless. Null if the trial has no converged gait, or if the script
+    # that evaluated it did not report the value.
     cost_of_transport: Optional[float]
     # Time at which it ended. Null while it is open.
     finished_at: Optional[Instant]
-    # Gait RMSE of a converged gait, rad. Null without one, and if the script that evaluated the trial did not report
-    # it. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
+    # Gait RMSE of a converged gait, rad. Null if the trial has no converged gait, or if the script that evaluated it
+    # did not report the value. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Optional[float]
     # Number of interior-point iterations. Null without a completed solve.
     iterations: Optional[int]

@@ -158,7 +158,7 @@ pub(super) async fn cancel(
 
 /// Retry a trial
 ///
-/// Queues a trial again that ended without a result. The job of its solve can be followed and cancelled.
+/// Requeues a trial that ended without a result. The job of its solve can be followed and cancelled.
 #[utoipa::path(
     post,
     path = "/trials/{id}/retry",

@@ -236,7 +236,7 @@ fn checked(study: &Study, tell: &TellRequest) -> Result<ScriptOutcome, Error> {
     let state = match tell.outcome {
         Outcome::Converged => TrialState::Converged,
         Outcome::NotConverged if reason.is_empty() => {
-            return Err(Error::invalid("reason", "", "1 to 2000 characters that say why no gait was found"));
+            return Err(Error::invalid("reason", "", "1 to 2000 characters, the reason why no gait was found"));
         }
         Outcome::NotConverged => TrialState::NotConverged,
     };

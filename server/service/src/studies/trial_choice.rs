@@ -69,7 +69,7 @@ fn root(snapshot: &StudySnapshot) -> Result<NewTrial, ChoiceError> {
         number: 1,
         action_index,
         action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
-        reason: "nearest to the default bounds: its gait is the root of all others".to_owned(),
+        reason: "nearest to the default bounds: its gait is the root gait".to_owned(),
         best_before: None,
         warm_started_from: None,
     })

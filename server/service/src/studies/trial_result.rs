@@ -204,9 +204,9 @@ fn message_of(outcome: &SolveOutcome) -> String {
     let cause = match outcome.report.status {
         SolveStatus::Converged => return String::new(),
         SolveStatus::Infeasible => "No gait near the last motion tried satisfies all constraints.",
-        SolveStatus::Stalled => "The solver stalled.",
-        SolveStatus::IterationLimit => "The solver reached the iteration limit.",
-        SolveStatus::TimeLimit => "The solver reached the time limit.",
+        SolveStatus::Stalled => "The optimiser stalled.",
+        SolveStatus::IterationLimit => "The optimiser reached the iteration limit.",
+        SolveStatus::TimeLimit => "The optimiser reached the time limit.",
         SolveStatus::Cancelled => "The solve was cancelled.",
     };
     match worst {

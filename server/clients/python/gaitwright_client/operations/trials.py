@@ -237,7 +237,7 @@ class TrialsMethods(Transport):
     def retry_trial(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Job:
         """Retry a trial.
 
-        Queues a trial again that ended without a result. The job of its solve can be followed and cancelled.
+        Requeues a trial that ended without a result. The job of its solve can be followed and cancelled.
         """
         return cast(Job, self.request_json("POST", "/api/v1/trials/{id}/retry", {"id": trial_id}, key=idempotency_key))
 
