@@ -274,7 +274,17 @@ fn every_link_of_a_page_to_a_guide_has_its_section() {
         }
     }
     assert!(sections > 15, "{sections}");
-    for guide in ["clinician", "rater", "lab-session", "lab-script", "administrator", "glossary"] {
+    for guide in [
+        "clinician",
+        "rater",
+        "lab-session",
+        "lab-script",
+        "unattended",
+        "administrator",
+        "developer",
+        "method",
+        "glossary",
+    ] {
         assert!(linked.contains(guide), "no page links to the guide {guide}");
     }
 }
