@@ -3,6 +3,7 @@
 #[cfg(feature = "nats")]
 use super::cores::cores_or;
 use super::flag_numbers::workers;
+#[cfg(feature = "nats")]
 use super::interruption::interrupted;
 use super::settings::{Flags, Settings};
 use clap::Args;
