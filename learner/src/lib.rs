@@ -54,6 +54,7 @@ mod learner;
 mod likelihood;
 mod linalg;
 mod observations;
+mod observed_feedback;
 mod posterior;
 mod propose;
 mod random;

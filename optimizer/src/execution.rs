@@ -11,6 +11,7 @@
 mod actuator;
 mod control_period;
 mod disturbance;
+mod execution_report;
 mod foot_contact;
 mod gains;
 mod ground;
@@ -18,19 +19,18 @@ mod human;
 mod planned_stride;
 mod plant;
 mod prosthesis;
-mod random;
-mod report;
+mod random_stream;
+mod report_sentence;
 mod sensors;
 mod simulated_walk;
 mod stride_clock;
 mod terrain;
-mod words;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod simulation_tests;
 
-pub use report::{ExecutionReport, SimulatedWalksOnGround, StridesOnYield, SurvivedPushes};
+pub use execution_report::{ExecutionReport, SimulatedWalksOnGround, StridesOnYield, SurvivedPushes};
 
 use crate::cancel_token::CancelToken;
 use crate::certificate::CertifiedGait;

@@ -9,7 +9,7 @@ mod active;
 mod bound_sensitivity;
 mod parameter;
 mod result_derivatives;
-mod words;
+mod sensitivity_sentences;
 
 pub use active::ActiveConstraint;
 pub use bound_sensitivity::{BoundSensitivity, GaitSensitivities, GaitSensitivityError};

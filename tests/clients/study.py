@@ -25,7 +25,7 @@ from gaitwright_client.api.studies import (
 from gaitwright_client.api.subjects import create_subject, get_subject
 from gaitwright_client.api.trials import get_certificate, list_trials, request_certificate
 from gaitwright_client.models import (
-    Ask,
+    AskRequest,
     Bounds,
     Certificate,
     CreatedPreference,
@@ -52,7 +52,7 @@ from gaitwright_client.models import (
     StudyState,
     StudyView,
     Subject,
-    Tell,
+    TellRequest,
     Trial,
     TrialPage,
     TrialState,
@@ -111,15 +111,15 @@ def by_script(client: Client, subject: UUID) -> None:
     new = NewStudy(subject_id=subject, name="python", evaluation=Evaluation.SCRIPT, number_of_trials=TRIALS)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new))
     while True:
-        asked = ask_for_trial.sync_detailed(study.id, client=client, body=Ask(script="treadmill"))
+        asked = ask_for_trial.sync_detailed(study.id, client=client, body=AskRequest(script="treadmill"))
         if asked.status_code == HTTPStatus.CONFLICT:
             break
         trial = given(Trial, asked.parsed)
         rmse = measure(trial.action)
         told = (
-            Tell(outcome=Outcome.NOT_CONVERGED, reason="the walker stumbled")
+            TellRequest(outcome=Outcome.NOT_CONVERGED, reason="the walker stumbled")
             if rmse is None
-            else Tell(outcome=Outcome.CONVERGED, gait_rmse_rad=rmse)
+            else TellRequest(outcome=Outcome.CONVERGED, gait_rmse_rad=rmse)
         )
         given(Trial, tell_outcome.sync(trial.id, client=client, body=told))
     trials = trials_of(client, study.id)

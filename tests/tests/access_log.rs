@@ -7,7 +7,7 @@ use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use axum::middleware::map_request;
 use axum::routing::{any, get};
-use gaitwright_http::access_log::NO_SUBJECT_DATA;
+use gaitwright_http::access_log_layer::NO_SUBJECT_DATA;
 use gaitwright_http::{openapi, with_layers};
 use gaitwright_service::access::{Right, Role};
 use gaitwright_store::access_log::{self, Access, AccessKind, AccessRow, Tally};

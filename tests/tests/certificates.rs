@@ -53,8 +53,12 @@ fn commands_solve_certify_and_convert_a_gait() {
     std::fs::write(folder.join("alone.json"), outcome["gait"].to_string()).unwrap();
     let text = done(folder, &["certify", "alone.json"]);
     assert!(text.starts_with("certificate: ") && text.contains("largest multiplier"), "{text}");
-    let walker = "subject of 1.727 m and 65.7 kg, device \"AMPRO3\", without muscles";
-    assert!(text.contains(walker) && text.contains("differs: settings.mesh.ds2 is 2 (built-in: 4)"), "{text}");
+    let walker = "subject: 1.727 m, 65.7 kg; device: AMPRO3; without muscles";
+    assert!(
+        text.contains(walker)
+            && text.contains("differs from the built-in problem: settings.mesh.ds2 is 2 (built-in: 4)"),
+        "{text}"
+    );
 
     // Figures that the file states are compared with those of its gait.
     for (figure, expected) in [

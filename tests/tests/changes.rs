@@ -8,7 +8,7 @@ use axum::body::Body;
 use axum::http::{Request, header};
 use gaitwright_http::openapi;
 use gaitwright_service::access::Role;
-use gaitwright_service::studies::search_space;
+use gaitwright_service::studies::bound_grid;
 use gaitwright_store::audit::{self, ChainCheck};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
 use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
@@ -98,7 +98,7 @@ fn text(value: &Value) -> &str {
 
 /// A level of a6 that is not that of the trial.
 fn elsewhere(trial: &Trial) -> f64 {
-    if search_space::table_i().unwrap().values(trial.action_index)[5] == 0.3 { 0.2 } else { 0.3 }
+    if bound_grid::table_i().unwrap().values(trial.action_index)[5] == 0.3 { 0.2 } else { 0.3 }
 }
 
 #[tokio::test]

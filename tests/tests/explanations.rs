@@ -98,8 +98,10 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     assert!(!page.contains("/explain\""), "there is nothing to ask for any more");
 
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    let reason =
-        format!("In {0} of {0} explained trials, relaxing a5 (swing-foot clearance) alone gives a gait", trials.len());
+    let reason = format!(
+        "In {0} of the {0} trials with an explanation, relaxing a5 (swing-foot clearance) alone gives a gait",
+        trials.len()
+    );
     assert!(page.contains(&reason) && page.contains(&format!("/trials/{}#explanation", trials[0].id)), "{page}");
     service.stop().await;
 }

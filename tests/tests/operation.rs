@@ -5,7 +5,7 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::SolveStatus;
-use gaitwright_service::studies::archive::file::read_through;
+use gaitwright_service::studies::archive::archive_file::read_through;
 use gaitwright_service::studies::pruning::prune;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable::{self, NotWalkable};

@@ -6,7 +6,7 @@
 use axum::body::Body;
 use axum::http::{HeaderValue, Method, Request, StatusCode};
 use gaitwright_http::{AccessState, openapi};
-use gaitwright_service::studies::archive::file::read_through;
+use gaitwright_service::studies::archive::archive_file::read_through;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::exported;

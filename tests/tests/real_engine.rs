@@ -111,7 +111,7 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     let output = cli::run(BINARY, folder, &[&sweep[..], &["200", "--muscles", "on"]].concat());
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("it was solved without muscles, but the problem is solved with muscles"), "{text}");
+    assert!(text.contains("the gait has no muscles, but the problem has muscles"), "{text}");
 }
 
 /// The answer of a solve as those that start from it name it.

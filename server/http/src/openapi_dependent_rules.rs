@@ -47,10 +47,10 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewStudy", "search_space", SPACE),
     ("NewStudy", "gait_settings", LIMITS),
     ("NewStudy", "learner", LEARNER),
-    ("Extend", "number_of_trials", "More than the current number of trials."),
+    ("StudyExtension", "number_of_trials", "More than the current number of trials."),
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
-    ("Invitation", "name", "The name of a rater, or one that is not taken."),
-    ("Unblind", "rater", "A rater who was shown a pair of this study."),
+    ("RaterInvitation", "name", "The name of a rater, or one that is not taken."),
+    ("RaterUnblinding", "rater", "A rater who was shown a pair of this study."),
     ("NewSafetyReview", "reports", "Includes every safety report in force about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
     (
@@ -62,7 +62,7 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewJointAngles", "reading", "`cutoff_hz` is at most 0.45 times the sampling rate."),
     ("NewReferenceGait", "recording", REFERENCE_FILE),
     (
-        "Processing",
+        "EmgProcessing",
         "settings",
         "`band_high_hz` exceeds `band_low_hz` by 1 or more, and is at most 0.495 times the sampling rate. The other \
          frequencies are at most 0.45 times the sampling rate.",

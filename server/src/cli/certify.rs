@@ -11,7 +11,7 @@ use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub(super) struct Certify {
+pub(super) struct CertifyCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
@@ -24,7 +24,7 @@ pub(super) struct Certify {
     json: bool,
 }
 
-impl Certify {
+impl CertifyCommand {
     /// Certifies the gait. A failed certificate is a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let GaitFile { gait, report } = read_gait_file(&self.gait)?;
@@ -64,7 +64,12 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
     if let Some(certified) = &certificate.certified {
         lines.push(format!("  gait {}, {}", certified.gait_sha256, certified.walker_in_words()));
-        lines.extend(certified.differences.iter().map(|difference| format!("  differs: {}", difference.in_words())));
+        lines.extend(
+            certified
+                .differences
+                .iter()
+                .map(|difference| format!("  differs from the built-in problem: {}", difference.in_words())),
+        );
         lines.push(format!(
             "  cost of transport {:.4} (from absolute joint powers, which the objective smooths)",
             certified.unsmoothed_cost_of_transport

@@ -28,14 +28,14 @@ enum TargetFormat {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Convert {
+pub(super) struct ConvertCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
     /// Target format.
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: TargetFormat,
-    /// Sampling rate of `mot`, 10 to 5000.
+    /// Sampling rate of the `mot` file, Hz, 10 to 5000.
     #[arg(long, value_name = "HZ", default_value = "200", value_parser = number, allow_negative_numbers = true)]
     rate_hz: f64,
     /// Output file (default: standard output).
@@ -43,7 +43,7 @@ pub(super) struct Convert {
     out: Option<PathBuf>,
 }
 
-impl Convert {
+impl ConvertCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let gait = read_gait_file(&self.gait)?.gait;
         let out = OutFile::instead_of_stdout(self.out.as_deref(), &[&self.gait])?;

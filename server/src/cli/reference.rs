@@ -12,7 +12,7 @@ use gaitwright_service::studies::reference_import::{JointAngleFormat, NewReferen
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-pub(super) struct Reference {
+pub(super) struct ReferenceCommand {
     /// Recording of joint angles.
     #[arg(value_name = "FILE")]
     recording: PathBuf,
@@ -50,7 +50,7 @@ pub(super) struct Reference {
     out: Option<PathBuf>,
 }
 
-impl Reference {
+impl ReferenceCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let new = NewReferenceGait {
             name: self.name,

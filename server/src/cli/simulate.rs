@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicU32;
 
 #[derive(Debug, Args)]
-pub(super) struct Simulate {
+pub(super) struct SimulateCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
@@ -43,7 +43,7 @@ fn ground(text: &str) -> Result<f64, String> {
     }
 }
 
-impl Simulate {
+impl SimulateCommand {
     /// Simulates the walks. Falls are a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let mut options = ExecutionOptions {

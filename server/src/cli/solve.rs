@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 const MOST_THREADS: usize = 16;
 
 #[derive(Debug, Args)]
-pub(super) struct Solve {
+pub(super) struct SolveCommand {
     #[command(flatten)]
     flags: ProblemFlags,
     /// Bounds that differ from the loosest values in Table I of the paper, as in a1=20,a5=0.013.
@@ -104,7 +104,7 @@ struct SolveFile<'a> {
     lineage: &'a Lineage,
 }
 
-impl Solve {
+impl SolveCommand {
     fn input(&self) -> Result<(GaitProblem, SolveOptions, Option<LineageStart>), Error> {
         if let Some(path) = &self.problem {
             let SolveInput { problem, options, warm_start } =

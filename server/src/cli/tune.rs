@@ -24,7 +24,7 @@ use gaitwright_store::studies::WarmStartFrom;
 use std::sync::Arc;
 
 #[derive(Debug, Args)]
-pub(super) struct Tune {
+pub(super) struct TuneCommand {
     #[command(flatten)]
     body: SubjectFlags,
     /// Whether to solve with muscles.
@@ -57,7 +57,7 @@ pub(super) struct Tune {
     json: bool,
 }
 
-impl Tune {
+impl TuneCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<CommandEnd, Error> {
         let subject = self.body.subject()?;
         let (device, reference, gait_settings) =

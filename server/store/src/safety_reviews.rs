@@ -7,7 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Decision of a safety review: `cleared`, somebody may walk with the gait; `unsafe`, it remains marked as unsafe.
+/// Decision of a safety review: `cleared`, the gait may be used for walking; `unsafe`, it remains marked as unsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SafetyDecision {

@@ -58,7 +58,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     page.wait_until(&format!("{phase} !== {before:?}")).await;
     // The sentence about certainty states what the recommendation says.
     let sure = page.text("[data-part=best]").await;
-    assert!(sure.contains("Its Gait RMSE is computed, not estimated: it is the lowest of"), "{sure}");
+    assert!(sure.contains("The recommended gait has the lowest Gait RMSE of"), "{sure}");
     // Another gait walks once this one is reported as unsafe.
     let report = format!("/api/v1/trials/{}/safety-reports", best["trial_id"].as_str().unwrap());
     assert!(site.service.post(&report, &serde_json::json!({"note": "fell"})).await.status.is_success());

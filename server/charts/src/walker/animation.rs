@@ -1,6 +1,6 @@
 //! A gait as a picture that moves by itself: one stride, repeated without end.
 
-use super::body::parts;
+use super::body_outline::parts;
 use super::figure::{Pose, WalkerFigure, muscle_line, muscle_opacity, muscle_width, share_of_peak};
 use super::muscle_paths::{is_left, muscle_paths};
 use super::segment::{Placement, Segment, UNITS_PER_M};

@@ -1,6 +1,6 @@
 //! The figure of a gait on a page: one pose, with everything that the script needs to move it.
 
-use super::body::{BodyPart, human_parts, parts};
+use super::body_outline::{BodyPart, human_parts, parts};
 use super::muscle_paths::{MusclePath, is_left, muscle_paths};
 use super::segment::UNITS_PER_M;
 use crate::escaped_text::escape;

@@ -20,7 +20,7 @@ use utoipa::ToSchema;
 
 /// Pair to compare, as shown to a rater.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Pair {
+pub(super) struct BlindPair {
     /// Code of the pair.
     code: String,
     /// Number of the pair for this rater.
@@ -33,9 +33,9 @@ pub(super) struct Pair {
 
 /// Next pair for a rater.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct NextPair {
+pub(super) struct NextBlindPair {
     /// The pair. Null if no comparison is pending.
-    pair: Option<Pair>,
+    pair: Option<BlindPair>,
 }
 
 /// Get the next pair for a rater
@@ -47,7 +47,7 @@ pub(super) struct NextPair {
     operation_id = "draw_blind_pair",
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "Pair, or null if no comparison is pending", body = NextPair)),
+    responses((status = 200, description = "Pair, or null if no comparison is pending", body = NextBlindPair)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn next(
@@ -60,13 +60,13 @@ pub(super) async fn next(
     }
     let answering = app.clone();
     let (writer, shown) = blind::next(app.store_mut(), &request.caller, id).await?;
-    let pair = shown.map(|shown| Pair {
+    let pair = shown.map(|shown| BlindPair {
         first: format!("/api/v1/blind-pairs/{}/motions/first", shown.pair.code),
         second: format!("/api/v1/blind-pairs/{}/motions/second", shown.pair.code),
         code: shown.pair.code,
         number: shown.pair.number,
     });
-    request.done(&answering, writer, &NextPair { pair }).await
+    request.done(&answering, writer, &NextBlindPair { pair }).await
 }
 
 /// Motion to compare.
@@ -180,7 +180,7 @@ pub(super) async fn raters(
 /// Rater to unblind, with the reason.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Unblind {
+pub(super) struct RaterUnblinding {
     /// Name of the rater.
     rater: String,
     /// Reason, 1 to 2000 characters.
@@ -205,14 +205,14 @@ pub(super) struct UnblindedRater {
     operation_id = "unblind_rater",
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    request_body = Unblind,
+    request_body = RaterUnblinding,
     responses((status = 200, description = "Pairs of the rater, in order", body = UnblindedRater)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Administer>,
-    IdempotentWith(request, whose): IdempotentWith<Administer, Unblind>,
+    IdempotentWith(request, whose): IdempotentWith<Administer, RaterUnblinding>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

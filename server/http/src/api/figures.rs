@@ -5,7 +5,7 @@ use crate::accessible::{Id, Named, accessible};
 use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::figures::{analysis, lab_session, reference, study, trial};
+use crate::figures::{analysis, lab_session, reference_figures, study, trial};
 use crate::openapi_binary::Binary;
 use crate::problem_details::Refusal;
 use crate::visible::Visible;
@@ -152,7 +152,7 @@ pub(super) async fn of_reference(
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?.definition;
-    response(&mut app, reference::of_reference(&reference), file).await
+    response(&mut app, reference_figures::of_reference(&reference), file).await
 }
 
 /// Responds with a figure in the format of the file name.

@@ -163,7 +163,7 @@ async fn keep(
 /// Settings of EMG processing.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Processing {
+pub(super) struct EmgProcessing {
     /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
     #[schema(value_type = documents::EmgSettings)]
     settings: EmgSettings,
@@ -186,14 +186,14 @@ fn of_settings(error: Error) -> Error {
     operation_id = "process_emg",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
-    request_body = Processing,
+    request_body = EmgProcessing,
     responses((status = 200, description = "Result", body = EmgView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn process(
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    IdempotentWith(request, processing): IdempotentWith<Run, Processing>,
+    IdempotentWith(request, processing): IdempotentWith<Run, EmgProcessing>,
 ) -> Result<Response, Refusal> {
     if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);

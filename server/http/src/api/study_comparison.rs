@@ -51,7 +51,7 @@ pub(super) struct StudyComparison {
     /// Number of the recommended trial. Null if there is no recommendation.
     best_trial: Option<u32>,
     /// Action of the recommended trial. Null if there is no recommendation.
-    #[schema(value_type = Option<study_plan_schemas::Bounds>)]
+    #[schema(value_type = Option<study_plan_schemas::BoundsSchema>)]
     best_action: Option<TunedBounds>,
     /// Gait RMSE of the recommended trial, rad. Null if there is no recommendation, or if the script that evaluated the
     /// trial did not report it. Null in every row if the compared studies have different reference gaits, because

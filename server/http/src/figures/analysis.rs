@@ -76,7 +76,7 @@ pub(crate) async fn analysis_of(app: &mut AppState, id: StudyId) -> Result<Analy
     drop(reader);
     let answers = snapshot.log().feedback.len();
     if answers == 0 {
-        let why = "No results yet. The page appears with the first result.";
+        let why = "No results yet. The analysis appears after the first result.";
         return Ok(AnalysisState::Absent(why.to_owned()));
     }
     if answers > MOST_ANSWERS {

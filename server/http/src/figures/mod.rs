@@ -4,7 +4,7 @@ pub(crate) mod analysis;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
 mod outcome;
-pub(crate) mod reference;
+pub(crate) mod reference_figures;
 pub(crate) mod study;
 mod study_progress;
 mod study_results;

@@ -25,15 +25,20 @@ fn by_gait_rmse(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String>
     let rmse = |trial: &&Trial| trial.gait_rmse_rad.unwrap_or(f64::INFINITY);
     let lowest = others.min_by(|a, b| rmse(a).total_cmp(&rmse(b)));
     Some(match (lowest, analysis.gaits.len()) {
-        (None, _) => "Its Gait RMSE is computed, not estimated. It is the only gait so far.".to_owned(),
+        (None, _) => {
+            "The recommended gait is the only gait so far. Its Gait RMSE is computed, not estimated.".to_owned()
+        }
         (Some(other), _) if rmse(&other) < own => format!(
-            "Trial {} has a lower Gait RMSE, {} rad. The learner recommends by estimated utility, which also draws on gaits \
-             with similar bounds.",
+            "Trial {} has a lower Gait RMSE, {} rad. The learner recommends the gait with the highest estimated utility. \
+             The estimate also uses gaits with similar bounds.",
             other.number,
             figure(other.gait_rmse_rad)
         ),
         (Some(_), gaits) => {
-            format!("Its Gait RMSE is computed, not estimated: it is the lowest of {gaits} different gaits.")
+            format!(
+                "The recommended gait has the lowest Gait RMSE of {gaits} different gaits. This is computed from the \
+                 gaits, not estimated."
+            )
         }
     })
 }
@@ -45,7 +50,7 @@ fn by_utility(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String> {
         all => format!("{all} comparisons"),
     };
     let Some(next) = analysis.gaits.get(1) else {
-        return Some("It is the only gait that can be recommended, so there is nothing to compare it with.".to_owned());
+        return Some("Only one gait can be recommended, so there is nothing to compare it with.".to_owned());
     };
     let (difference, number) = (next.behind?, snapshot.trial(*next.trials.first()?)?.number);
     // Without a line break before the sign.

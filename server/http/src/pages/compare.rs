@@ -22,7 +22,7 @@ use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::answer;
+use gaitwright_service::studies::pair_answer;
 use gaitwright_service::studies::pending_comparison::{Question, awaited_question};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
@@ -303,7 +303,7 @@ async fn read_back(
                 return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
             }
             let in_words = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
-            let other_answers = answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
+            let other_answers = pair_answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
             answer_in_words(&row, snapshot).map(|text| SavedAnswer {
                 id: saved,
                 text,

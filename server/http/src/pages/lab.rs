@@ -22,11 +22,11 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
-    self, Condition, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkView,
+    self, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkCondition, WalkView,
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::trials_table::ListedTrial;
+use gaitwright_store::trial_query::ListedTrial;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 
@@ -306,12 +306,12 @@ pub(super) async fn show(
     })
 }
 
-fn in_words(condition: Option<Condition>) -> &'static str {
+fn in_words(condition: Option<WalkCondition>) -> &'static str {
     match condition {
         None => "one of the two gaits (blinded)",
-        Some(Condition::Normal) => "without the device",
-        Some(Condition::GaitA) => "gait A",
-        Some(Condition::GaitB) => "gait B",
+        Some(WalkCondition::Normal) => "without the device",
+        Some(WalkCondition::GaitA) => "gait A",
+        Some(WalkCondition::GaitB) => "gait B",
     }
 }
 

@@ -23,7 +23,7 @@ mod lab_walk;
 mod measurement_files;
 mod measurement_forms;
 mod members;
-mod muscles;
+mod muscle_form;
 mod new_study;
 mod page_chart;
 mod problem_types;
@@ -42,7 +42,7 @@ mod subject;
 mod subjects;
 mod system;
 mod undo;
-mod units;
+mod unit_choice;
 mod unsent_form;
 mod users;
 mod walking_pair;
@@ -74,7 +74,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/subjects/{id}/consent", post(subject::consent))
         .route("/subjects/{id}/withdraw", post(subject::withdraw))
         .route("/subjects/{id}/correct", post(subject::correct))
-        .route("/subjects/{id}/muscles", get(muscles::get).post(muscles::post))
+        .route("/subjects/{id}/muscles", get(muscle_form::get).post(muscle_form::post))
         .route("/devices", get(devices::list))
         .route("/devices/{id}", get(devices::get).post(devices::post))
         .route("/trials/{id}", get(gait::get))
@@ -103,7 +103,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/lab/{id}/answer", post(lab_walk::answer))
         .route("/lab/{id}/retract", post(lab_walk::retract))
         .route("/jobs/{id}/cancel", post(jobs::cancel))
-        .route("/units", post(units::post))
+        .route("/units", post(unit_choice::post))
         .route("/users", get(users::get).post(users::post))
         .route("/audit", get(audit::get))
         .route("/access-log", get(access_log::get))

@@ -94,7 +94,7 @@ pub(crate) enum PreferenceContent {
         /// Index of the suggested action.
         #[schema(value_type = u64)]
         suggested: ActionIndex,
-        /// Trial that it would have been better than.
+        /// Trial to which the suggested action is preferred.
         over: TrialId,
     },
 }

@@ -1,7 +1,7 @@
 //! The execution report of one trial's gait: what it is of, its state, and its storage.
 
 use super::study_plan::LARGEST_SEED;
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::execution::{ExecutionOptions, ExecutionReport};

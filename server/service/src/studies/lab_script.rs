@@ -27,7 +27,7 @@ use utoipa::ToSchema;
 /// A request for a trial.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Ask {
+pub struct AskRequest {
     /// Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
@@ -162,7 +162,7 @@ pub enum Outcome {
 /// The outcome of a trial, as a script reports it.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Tell {
+pub struct TellRequest {
     /// Whether the evaluation found a gait.
     pub outcome: Outcome,
     /// Reason why no gait was found, 1 to 2000 characters. Required for `not_converged`.
@@ -190,7 +190,7 @@ pub struct CheckedOutcome {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial is not open or not evaluated by a script.
-pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Result<CheckedOutcome, Error> {
+pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &TellRequest) -> Result<CheckedOutcome, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
     if trial.script.is_none() {
@@ -225,7 +225,7 @@ pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Resul
     Ok(CheckedOutcome { snapshot, outcome, answers })
 }
 
-fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
+fn checked(study: &Study, tell: &TellRequest) -> Result<ScriptOutcome, Error> {
     let reason = tell.reason.trim();
     printable::note("reason", reason, 2000)?;
     for (field, value) in [("gait_rmse_rad", tell.gait_rmse_rad), ("cost_of_transport", tell.cost_of_transport)] {
@@ -236,7 +236,7 @@ fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
     let state = match tell.outcome {
         Outcome::Converged => TrialState::Converged,
         Outcome::NotConverged if reason.is_empty() => {
-            return Err(Error::invalid("reason", "", "1 to 2000 characters that say why no gait was found"));
+            return Err(Error::invalid("reason", "", "1 to 2000 characters, the reason why no gait was found"));
         }
         Outcome::NotConverged => TrialState::NotConverged,
     };

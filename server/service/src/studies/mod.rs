@@ -5,11 +5,11 @@
 //! state is in the record, so a new process continues where a killed one stopped.
 
 pub mod analysis;
-pub mod answer;
 pub mod archive;
 pub mod assessment;
 pub mod atlas;
 pub mod blind;
+pub mod bound_grid;
 pub mod built_in_entries;
 pub mod certification;
 pub mod certified_best;
@@ -32,6 +32,7 @@ pub mod lifecycle;
 pub mod membership;
 pub mod nearest_reference;
 mod next_step;
+pub mod pair_answer;
 pub mod pending_comparison;
 mod planning_tasks;
 pub mod preference;
@@ -48,7 +49,6 @@ pub mod safety_review;
 pub mod same_motion;
 pub mod sample_study;
 pub mod scheduler;
-pub mod search_space;
 pub mod seed;
 pub mod sensitivities;
 pub mod snapshot;
@@ -63,7 +63,7 @@ pub mod trial_choice;
 mod trial_jobs;
 mod trial_queue;
 pub mod trial_result;
-pub mod trial_state;
+pub mod trial_transitions;
 pub mod utility_history;
 mod walk_simulator;
 pub mod walkable;

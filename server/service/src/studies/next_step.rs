@@ -87,9 +87,9 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Anal
 fn all_known(snapshot: &StudySnapshot) -> String {
     let tried: HashSet<ActionIndex> = snapshot.trials.iter().map(|trial| trial.action_index).collect();
     if (tried.len() as u64) < snapshot.study.plan.search_space.len() {
-        "Every action of the search space was tried or has the gait of one that was tried.".to_owned()
+        "Every action of the search space has been tried, or has the same gait as one that has.".to_owned()
     } else {
-        "Every action of the search space was tried.".to_owned()
+        "Every action of the search space has been tried.".to_owned()
     }
 }
 

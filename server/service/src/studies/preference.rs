@@ -2,7 +2,7 @@
 //! ends here. A test fails if another module writes the table.
 
 use super::same_motion::is_same_gait;
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
 use crate::error::Error;
 use crate::printable;

@@ -4,8 +4,8 @@
 //! the gait that the explanation found is a solution of it.
 
 use super::analysis::Analyses;
+use super::bound_grid;
 use super::lifecycle::{self, StudyTransition};
-use super::search_space;
 use super::snapshot::StudySnapshot;
 use super::study_change;
 use super::trial_choice::{best_trial, warm_start_of_next};
@@ -24,10 +24,10 @@ use std::sync::Arc;
 use thiserror::Error;
 
 /// Relaxed bounds: names and values.
-pub type Relaxation = Vec<(String, f64)>;
+pub type RelaxedBounds = Vec<(String, f64)>;
 
 /// The relaxations with which the explanation found a gait: single bounds first.
-pub fn relaxations(explanation: &Explanation) -> Vec<Relaxation> {
+pub fn relaxations(explanation: &Explanation) -> Vec<RelaxedBounds> {
     let alone = explanation.relaxations.iter().filter_map(|one| Some(vec![(one.bound.clone(), one.to?)]));
     let together = explanation
         .together
@@ -76,7 +76,7 @@ impl From<NoRelaxedTrial> for Error {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RelaxedTrial {
     /// The relaxed bounds with their values in the search space.
-    pub bounds: Relaxation,
+    pub bounds: RelaxedBounds,
     /// Whether the study needs a larger number of trials for it.
     pub extends: bool,
     action: ActionIndex,
@@ -90,7 +90,7 @@ pub async fn of(
     db: &mut Connection,
     study: &Study,
     trial: &Trial,
-    relaxation: &Relaxation,
+    relaxation: &RelaxedBounds,
 ) -> Result<Result<RelaxedTrial, NoRelaxedTrial>, Error> {
     if let Err(refused) = may_take_a_trial(study) {
         return Ok(Err(refused));
@@ -111,7 +111,7 @@ fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
     let refused = match study.state {
         _ if study.plan.evaluation == Evaluation::Script => "A lab script evaluates the trials of this study.",
         _ if study.archived_at.is_some() => {
-            "The study is archived. Press \u{201c}Show in the list of studies again\u{201d} in its details first."
+            "The study is archived. Press \u{201c}Show in the list of studies again\u{201d} on its page Name, tags and notes first."
         }
         StudyState::Running | StudyState::Finished => return Ok(()),
         StudyState::NotStarted => "The study has not started.",
@@ -126,10 +126,10 @@ fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
 fn relaxed(
     space: &SearchSpace,
     from: ActionIndex,
-    relaxation: &Relaxation,
-) -> Result<Result<(ActionIndex, Relaxation), NoRelaxedTrial>, LearnerError> {
+    relaxation: &RelaxedBounds,
+) -> Result<Result<(ActionIndex, RelaxedBounds), NoRelaxedTrial>, LearnerError> {
     let mut levels = space.levels(space.check(from)?);
-    let mut bounds = Relaxation::new();
+    let mut bounds = RelaxedBounds::new();
     for (bound, needed) in relaxation {
         let tuned = space.dimensions().iter().zip(&mut levels).find(|(dimension, _)| dimension.name == *bound);
         let Some((dimension, level)) = tuned else { return Ok(Err(NoRelaxedTrial::NotTuned(bound.clone()))) };
@@ -157,7 +157,7 @@ pub struct ChosenTrial {
     new: NewTrial,
     /// The trial without a gait.
     from: TrialId,
-    bounds: Relaxation,
+    bounds: RelaxedBounds,
 }
 
 /// Chooses the trial that tries a relaxation of an explanation, outside any transaction.
@@ -196,7 +196,7 @@ pub async fn choose(
     let new = NewTrial {
         number: snapshot.trials.last().map_or(1, |newest| newest.number + 1),
         action_index: action,
-        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, action)?,
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, action)?,
         reason: format!("requested by a person: trial {} with {} relaxed", trial.number, names(&bounds)),
         best_before,
         warm_started_from,
@@ -205,7 +205,7 @@ pub async fn choose(
 }
 
 /// `a5 and a7`.
-fn names(bounds: &Relaxation) -> String {
+fn names(bounds: &RelaxedBounds) -> String {
     bounds.iter().map(|(bound, _)| bound.as_str()).collect::<Vec<_>>().join(" and ")
 }
 
@@ -255,7 +255,7 @@ mod tests {
         SearchSpace::new(vec![dimension("a5", &[0.0, 0.02, 0.04]), dimension("a7", &[20.0, 35.0, 50.0])]).unwrap()
     }
 
-    fn found(relaxation: &[(&str, f64)]) -> Result<(Vec<f64>, Relaxation), NoRelaxedTrial> {
+    fn found(relaxation: &[(&str, f64)]) -> Result<(Vec<f64>, RelaxedBounds), NoRelaxedTrial> {
         let (space, relaxation) = (space(), relaxation.iter().map(|(name, to)| ((*name).to_owned(), *to)).collect());
         // The tightest action: a5 is a lower bound.
         let from = space.index_of_values(&[0.04, 20.0]).unwrap();

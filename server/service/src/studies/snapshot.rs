@@ -1,6 +1,6 @@
 //! A consistent snapshot of a study: its trials, its feedback log and its walkable gaits.
 
-use super::search_space;
+use super::bound_grid;
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
 use crate::error::Error;
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
@@ -203,7 +203,7 @@ impl StudySnapshot {
         let unsafe_bounds =
             self.grounds.safety_reports.reported_bounds().filter(|_| plan.evaluation == Evaluation::Script);
         let unsafe_actions =
-            unsafe_bounds.filter_map(|bounds| search_space::action_of(&plan.search_space, plan.base_bounds, bounds));
+            unsafe_bounds.filter_map(|bounds| bound_grid::action_of(&plan.search_space, plan.base_bounds, bounds));
         open.chain(unsafe_actions).collect()
     }
 }

@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 /// Changes to a study. Absent fields keep their values.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Change {
+pub struct StudyChange {
     /// Name shown to users.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 120)]
@@ -83,7 +83,7 @@ pub(super) fn check_filing(study: &Study) -> Result<(), Error> {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`].
-pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Change) -> Result<Study, Error> {
+pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &StudyChange) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
     let name = match change.name.as_deref().map(str::trim) {
         None => study.plan.name.clone(),
@@ -134,7 +134,7 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
 /// A larger number of trials.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Extend {
+pub struct StudyExtension {
     /// Total number of trials. Must exceed the current number.
     #[schema(minimum = 2, maximum = 10000)]
     pub number_of_trials: u32,
@@ -144,7 +144,7 @@ pub struct Extend {
 ///
 /// # Errors
 /// [`Error::Invalid`] if the number of trials would not increase, [`Error::NotFound`].
-pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Extend) -> Result<Study, Error> {
+pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &StudyExtension) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
     let least = i64::from(study.plan.number_of_trials) + 1;
     study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least, 10_000)?;

@@ -1,6 +1,6 @@
 //! Checks and creates a study, for pages, REST and the command line.
 
-use super::search_space::{self, RequestedSearchSpace};
+use super::bound_grid::{self, RequestedSearchSpace};
 use super::subject::{self, NewSubject};
 use super::{built_in_entries, membership, study_plan_schemas};
 use crate::access::{Caller, Reach};
@@ -39,23 +39,23 @@ pub struct NewStudy {
     pub muscles: bool,
     /// Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::GaitSettings)]
+    #[schema(value_type = study_plan_schemas::GaitSettingsSchema)]
     pub gait_settings: Box<GaitSettings>,
     /// Options of the solver: limits, tolerance, initial guesses and retries.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::SolveOptions)]
+    #[schema(value_type = study_plan_schemas::SolveOptionsSchema)]
     pub solve_options: SolveOptions,
     /// Values of the bounds that are not tuned.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::BoundsSchema)]
     pub base_bounds: TunedBounds,
     /// Tuned bounds and their values. Table I of the paper by default.
     #[serde(default)]
-    #[schema(value_type = Option<study_plan_schemas::SearchSpace>)]
+    #[schema(value_type = Option<study_plan_schemas::SearchSpaceSchema>)]
     pub search_space: Option<RequestedSearchSpace>,
     /// Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::LearnerSettings)]
+    #[schema(value_type = study_plan_schemas::LearnerSettingsSchema)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
     #[serde(default = "gait_rmse")]
@@ -306,7 +306,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     };
     let search_space = match new.search_space {
         Some(given) => given.checked()?,
-        None => search_space::table_i().map_err(Error::Learner)?,
+        None => bound_grid::table_i().map_err(Error::Learner)?,
     };
     let plan = StudyPlan {
         name,
@@ -357,7 +357,7 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     plan.gait_settings.validate().map_err(within("gait_settings"))?;
     plan.solve_options.validate().map_err(within("solve_options"))?;
     plan.base_bounds.validate().map_err(within("base_bounds"))?;
-    search_space::validate(&plan.search_space, plan.base_bounds)?;
+    bound_grid::validate(&plan.search_space, plan.base_bounds)?;
     check_learner(&plan.learner)?;
     if plan.learner.categories() != 2 {
         let allowed = "one threshold, because a trial is either converged or not converged";

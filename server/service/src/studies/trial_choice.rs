@@ -1,9 +1,9 @@
 //! Chooses the next trial and the best trial of a study, as pure functions of its snapshot.
 
 use super::analysis::Analyses;
+use super::bound_grid;
 use super::equal_actions::equal_actions;
 use super::ranking::{by_mean, ranking};
-use super::search_space;
 use super::seed::{Purpose, derive};
 use super::snapshot::StudySnapshot;
 use gait_learner::{LearnerError, Posterior, ProposalReason, propose, propose_outside};
@@ -54,7 +54,7 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, posterior: &Posterior) -
     Ok(NewTrial {
         number,
         action_index: proposal.action,
-        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
         reason: reason_in_words(proposal.reason, snapshot.has_best_action()),
         best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
         warm_started_from: warm_start_of_next(snapshot, posterior)?,
@@ -64,12 +64,12 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, posterior: &Posterior) -
 /// The trial of the root gait: the action nearest to the bounds that the study starts from.
 fn root(snapshot: &StudySnapshot) -> Result<NewTrial, ChoiceError> {
     let plan = &snapshot.study.plan;
-    let action_index = search_space::nearest_action(&plan.search_space, plan.base_bounds)?;
+    let action_index = bound_grid::nearest_action(&plan.search_space, plan.base_bounds)?;
     Ok(NewTrial {
         number: 1,
         action_index,
-        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
-        reason: "nearest to the default bounds: its gait is the root of all others".to_owned(),
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
+        reason: "nearest to the default bounds: its gait is the root gait".to_owned(),
         best_before: None,
         warm_started_from: None,
     })

@@ -1,6 +1,6 @@
 //! `gaitwright reproduce`: repeats the paper's comparison of gaits with and without muscles, unattended.
 
-mod report;
+mod report_page;
 mod statements;
 mod variants;
 
@@ -56,7 +56,7 @@ fn seeds(text: &str) -> Result<u64, String> {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Reproduce {
+pub(super) struct ReproduceCommand {
     /// Subjects from the paper.
     #[arg(long, value_enum, default_value = "both")]
     subject: Subjects,
@@ -77,7 +77,7 @@ pub(super) struct Reproduce {
     folder: PathBuf,
 }
 
-impl Reproduce {
+impl ReproduceCommand {
     /// Runs two studies for each subject and seed, one trial at a time, so that results are reproducible bit for bit.
     pub(super) async fn run(self) -> Result<CommandEnd, Error> {
         let reference = reference_of(self.reference.as_deref())?;
@@ -94,7 +94,7 @@ impl Reproduce {
             return Ok(CommandEnd::Interrupted);
         };
         let texts = [
-            report::html(&outcomes, self.trials)?,
+            report_page::html(&outcomes, self.trials)?,
             variants::iterations_csv(&outcomes),
             variants::studies_csv(&outcomes),
             variants::angles_csv(&outcomes),

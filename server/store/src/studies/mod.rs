@@ -2,14 +2,14 @@
 
 mod lists;
 mod plan;
-mod state;
+mod study_state;
 
 pub use lists::{
     StudyFilter, active, awaiting_raters, ended_before, is_named, of_subject, of_subject_with_safety_reports, open_of,
     page, tags, waiting_for_people, with_safety_reports,
 };
 pub use plan::{AnswerSource, Evaluation, StudyPlan, WarmStartFrom};
-pub use state::StudyState;
+pub use study_state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
 use gait_optimizer::Subject as Body;

@@ -1,10 +1,10 @@
 //! Stored trials: actions of a study and their results.
 
-mod progress;
-mod state;
+mod trial_counts;
+mod trial_state;
 
-pub use progress::{SolveTimes, TrialCounts, counts, improvements, measured};
-pub use state::TrialState;
+pub use trial_counts::{SolveTimes, TrialCounts, counts, improvements, measured};
+pub use trial_state::TrialState;
 
 use super::many_rows::read_many;
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now};

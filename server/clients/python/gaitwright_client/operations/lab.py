@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
-    Closing,
     ControllerFile,
+    EmgProcessing,
     EmgView,
+    LabSessionClosing,
     LabSessionId,
     LabSessionProgress,
+    LabSessionUnblinding,
     LabSessionView,
     LimitCycles,
     MeasurementFile,
@@ -21,11 +23,9 @@ from ..schemas import (
     NewEmg,
     NewLabAnswer,
     NewLabSession,
-    NewJointAngles,
-    Processing,
+    NewMotion,
     RecordedWalk,
     StudyId,
-    UnblindSession,
 )
 from ..transport import Transport
 
@@ -73,7 +73,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Closing],
+        **body: Unpack[LabSessionClosing],
     ) -> LabSessionView:
         """Close a lab session.
 
@@ -132,7 +132,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Processing],
+        **body: Unpack[EmgProcessing],
     ) -> EmgView:
         """Process EMG recordings.
 
@@ -199,12 +199,12 @@ class LabMethods(Transport):
             ),
         )
 
-    def add_joint_angle_file(
+    def add_motion_file(
         self,
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewJointAngles],
+        **body: Unpack[NewMotion],
     ) -> MeasurementFile:
         """Upload joint angles of a walk.
 
@@ -216,7 +216,7 @@ class LabMethods(Transport):
             MeasurementFile,
             self.request_json(
                 "POST",
-                "/api/v1/lab-sessions/{id}/measurement-files/joint-angles",
+                "/api/v1/lab-sessions/{id}/measurement-files/motion",
                 {"id": lab_session_id},
                 body=body,
                 key=idempotency_key,
@@ -262,7 +262,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[UnblindSession],
+        **body: Unpack[LabSessionUnblinding],
     ) -> LabSessionView:
         """Unblind a lab session.
 

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Optional, cast
 from ..events import Event, follow
 from ..paging import Pages
 from ..schemas import (
-    Change,
-    Extend,
     Import,
     Milestone,
     NewStudy,
     Recommendation,
+    StateChangeReason,
+    StudyChange,
     StudyClone,
     StudyComparison,
+    StudyExtension,
     StudyId,
     StudyState,
     StudyView,
     SubjectId,
-    TransitionReason,
 )
 from ..transport import Transport
 
@@ -69,9 +69,9 @@ class StudiesMethods(Transport):
 
         Starts the study, unless `start` is false.
 
-        Fields: subject_id; optionally base_bounds, device_id, evaluation, answer_source, gait_settings, learner,
+        Fields: subject_id; optionally base_bounds, device_id, evaluation, feedback_mode, gait_settings, learner,
         muscles, name, parallel_trials, priority, reference_gait_id, repeat_results, restricted, search_space, seed,
-        solve_options, solve_seconds_budget, start, number_of_trials, unchanged_limit, warm_start_from.
+        solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit, warm_start_from.
         """
         return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 
@@ -88,7 +88,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Change],
+        **body: Unpack[StudyChange],
     ) -> StudyView:
         """Update a study.
 
@@ -127,7 +127,7 @@ class StudiesMethods(Transport):
 
         Creates a study with the same set-up, without the trials.
 
-        Fields: optionally answer_source, muscles, name, seed, start, number_of_trials.
+        Fields: optionally feedback_mode, muscles, name, seed, start, trial_budget.
         """
         return cast(
             StudyView,
@@ -157,13 +157,13 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Extend],
+        **body: Unpack[StudyExtension],
     ) -> StudyView:
         """Raise the number of trials of a study.
 
         If the study has ended, it resumes.
 
-        Fields: number_of_trials.
+        Fields: trial_budget.
         """
         return cast(
             StudyView,
@@ -204,7 +204,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Pause a study.
 
@@ -227,7 +227,7 @@ class StudiesMethods(Transport):
     def get_recommendation(self, study_id: StudyId) -> Recommendation:
         """Get the recommendation of a study.
 
-        Of the actions tried, the one with the highest utility.
+        Of the actions tried, the one that the learner believes to be the best.
         """
         return cast(Recommendation, self.request_json("GET", "/api/v1/studies/{id}/recommendation", {"id": study_id}))
 
@@ -244,7 +244,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Resume a study.
 
@@ -270,7 +270,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Start a study.
 
@@ -296,7 +296,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Stop a study.
 

@@ -1,9 +1,9 @@
 //! The part of the study page that changes while the study runs.
 
-use super::answers::{AnswerRow, answers};
+use super::answers_table::{AnswerRow, answers};
 use super::recommended_walker::RecommendedGait;
+use super::state_buttons::{TransitionButton, button};
 use super::time_left::time_left;
-use super::transitions::{TransitionButton, button};
 use super::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use super::without_gait::TrialsWithoutGait;
 use crate::AppState;

@@ -1,16 +1,16 @@
 //! The study page, kept current by events.
 
-mod answers;
+mod answers_table;
 mod live_part;
 mod recommended_walker;
+mod state_buttons;
 mod time_left;
-mod transitions;
 mod trials_table;
 mod without_gait;
 
-pub(super) use self::answers::{answer_in_words, assessment_in_words};
+pub(super) use self::answers_table::{answer_in_words, assessment_in_words};
 use self::live_part::{RunningRow, read_live, running_row};
-pub(super) use self::transitions::post;
+pub(super) use self::state_buttons::post;
 use self::trials_table::TrialsQuery;
 use crate::AppState;
 use crate::accessible::Id;

@@ -4,8 +4,8 @@
 use crate::format::{self, words};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
+use gaitwright_store::trial_query::{self, ListedTrial, Listing, SORTS};
 use gaitwright_store::trials::{TrialCounts, TrialState};
-use gaitwright_store::trials_table::{self, ListedTrial, Listing, SORTS};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 
@@ -124,7 +124,7 @@ impl TrialsTable {
         choice: TrialsQuery,
     ) -> Result<Self, Error> {
         let listing = choice.listing()?;
-        let listed = trials_table::of_study(db, study, &listing).await?;
+        let listed = trial_query::of_study(db, study, &listing).await?;
         let matching = listed.first().map_or(0, |row| row.matching);
         let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
         let page = |page: u32| TrialsQuery { page, ..choice.clone() }.link();

@@ -13,8 +13,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// What exactly was changed. Which fields there are depends on the kind of change; a field without kinds in its
-/// description occurs with several.
+/// What exactly was changed. The fields depend on the kind of change. A field whose description names no kind
+/// occurs with several kinds.
 #[derive(Debug, ToSchema)]
 pub(crate) struct AuditDetail {
     /// `trial.ask`: true if the script was given its open trial again.
@@ -141,7 +141,7 @@ pub(crate) struct AuditDetail {
     /// `lab_session.process`: the measurement files that were processed.
     #[schema(required = false)]
     recordings: Vec<MeasurementFileId>,
-    /// `trial.explain`: name of a bound with a relaxed value of which a gait exists. Null if none was found.
+    /// `trial.explain`: name of the bound that gives a gait if it is relaxed. Null if there is none.
     relaxed_bound: Option<String>,
     /// Whether only members see the study: `study.create`, `study.restrict`.
     #[schema(required = false)]

@@ -5,7 +5,7 @@ use super::next_pair::next_pair;
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
-use crate::studies::answer as answering;
+use crate::studies::pair_answer as answering;
 use crate::studies::pending_comparison::open_question;
 use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::safety_report;

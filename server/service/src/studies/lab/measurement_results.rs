@@ -62,9 +62,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     }
     drop(db);
     if files.first().is_none_or(|(walk, ..)| *walk != 1) {
-        return Err(Error::conflict(
-            "Walk 1 has no EMG recording, with which the other walks are compared. Upload it first.",
-        ));
+        return Err(Error::conflict("Upload the EMG recording of walk 1 first. The other walks are compared with it."));
     }
     let process = move |pool: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();

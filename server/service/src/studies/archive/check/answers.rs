@@ -1,6 +1,6 @@
 //! Checks the answers in an imported archive: each against its trials, and how often a person answered.
 
-use super::super::file::refuse;
+use super::super::archive_file::refuse;
 use super::context::{at, of_gaits};
 use crate::error::Error;
 use crate::printable;

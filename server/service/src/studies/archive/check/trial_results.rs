@@ -1,7 +1,7 @@
 //! Checks the trials of an imported archive: their figures, gaits and results.
 
 use super::context::Context;
-use crate::studies::{search_space, trial_state};
+use crate::studies::{bound_grid, trial_transitions};
 use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::solve::CONVERGED_VIOLATION;
 use gait_optimizer::{Gait, GaitResults, ReferenceGait, WarmStart};
@@ -20,7 +20,7 @@ pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     if trial.action_index.0 >= plan.search_space.len() {
         return Err(format!("action_index {} is not in the search space", trial.action_index.0));
     }
-    let action = search_space::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
+    let action = bound_grid::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
     if action.map_err(|e| e.to_string())? != trial.action {
         return Err("the action does not match its index".to_owned());
     }
@@ -39,7 +39,7 @@ pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         let none = trial.report.is_none() && trial.status.is_none();
         return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
     }
-    let state = trial.status.and_then(trial_state::result_of);
+    let state = trial.status.and_then(trial_transitions::result_of);
     if state != Some(trial.state) {
         return Err(format!("status {:?} contradicts the state {}", trial.status, trial.state.as_str()));
     }

@@ -1,6 +1,6 @@
 //! An execution report as a sentence.
 
-use super::report::{ExecutionReport, SimulatedWalksOnGround};
+use super::execution_report::{ExecutionReport, SimulatedWalksOnGround};
 
 impl SimulatedWalksOnGround {
     /// The ground, as in "ground uneven by ±5 mm".

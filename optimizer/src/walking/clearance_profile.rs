@@ -1,5 +1,5 @@
-//! Swing-foot clearance: `z >= c (4 w (1 - w))^2` for heel and toe, with w from 0 at the start to 1 at the end of the
-//! swing.
+//! The profile of the swing clearance, `z >= c (4 w (1 - w))^2` for heel and toe, with w from 0 at the start to 1 at the
+//! end of the swing.
 
 /// The profile `(4 w (1 - w))^2` with its first two derivatives.
 pub(crate) fn clearance_profile(w: f64) -> [f64; 3] {

@@ -72,14 +72,14 @@ pub(crate) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Op
     }
 }
 
-/// `trial 3 is unsafe`.
+/// `trial 3 was reported as unsafe`.
 pub(crate) fn assessment_in_words(assessment: &Assessment, snapshot: &StudySnapshot) -> Option<String> {
     let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
     let (a, b) = (name(assessment.trial_a)?, name(assessment.trial_b)?);
     Some(match assessment.answer {
-        AssessmentAnswer::UnsafeA => format!("{a} is unsafe (compared with {b})"),
-        AssessmentAnswer::UnsafeB => format!("{b} is unsafe (compared with {a})"),
-        AssessmentAnswer::UnsafeBoth => format!("{a} and {b} are unsafe"),
+        AssessmentAnswer::UnsafeA => format!("{a} was reported as unsafe (in the comparison with {b})"),
+        AssessmentAnswer::UnsafeB => format!("{b} was reported as unsafe (in the comparison with {a})"),
+        AssessmentAnswer::UnsafeBoth => format!("{a} and {b} were reported as unsafe"),
         AssessmentAnswer::CannotTell => format!("cannot tell whether {a} or {b} is better"),
     })
 }

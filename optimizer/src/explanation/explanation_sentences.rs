@@ -104,17 +104,17 @@ impl Conflict {
             [one] => (
                 format!("With {one}"),
                 " and the other bounds at their loosest values".to_owned(),
-                " With it at its loosest value as well, there is a gait.",
+                " If this bound is at its loosest value as well, there is a gait.",
             ),
             [_, _] => (
                 format!("{} conflict with each other", list(&quantities)),
-                ": with both, and the other bounds at their loosest values".to_owned(),
-                " With either of them at its loosest value as well, there is a gait.",
+                ": with both at these values and the other bounds at their loosest".to_owned(),
+                " If either of them is at its loosest value as well, there is a gait.",
             ),
             _ => (
                 format!("{} conflict with each other", list(&quantities)),
-                ": with all of them, and the other bounds at their loosest values".to_owned(),
-                " With any one of them at its loosest value as well, there is a gait.",
+                ": with all of them at these values and the other bounds at their loosest".to_owned(),
+                " If any one of them is at its loosest value as well, there is a gait.",
             ),
         };
         let missed = self.violations.first().map_or(String::new(), |worst| {
@@ -185,7 +185,7 @@ impl BoundValue {
         let limited = TunedBounds::quantity_of(&self.bound);
         let value = TunedBounds::in_unit(&self.bound, self.value);
         let is_lower = TunedBounds::place_of(&self.bound).is_some_and(|place| TunedBounds::IS_LOWER[place]);
-        let quantity = limited.strip_suffix(" lower bound").or_else(|| limited.strip_suffix(" upper bound"));
+        let quantity = limited.strip_prefix("minimum ").or_else(|| limited.strip_prefix("maximum "));
         let quantity = quantity.unwrap_or(limited);
         format!("a {quantity} of at {} {value}", if is_lower { "least" } else { "most" })
     }

@@ -3,7 +3,7 @@
 use super::attempts::Candidate;
 use super::gait_results::GaitResults;
 use super::phases::SolveContext;
-use super::report::{
+use super::solve_report::{
     CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport,
     SolveStatus, StartedFrom, Violation,
 };

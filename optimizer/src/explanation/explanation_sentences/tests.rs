@@ -96,16 +96,16 @@ fn sentences_of_an_explanation_come_in_order() {
     assert_eq!(
         sentences[1..],
         [
-            "a4 = 0.5 m/s (hip velocity upper bound) and a7 = 5° (hip angle) conflict with each other: with both, and \
-             the other bounds at their loosest values, no gait was found from 5 starts; the nearest motion violates \
-             SS1_R node 12, forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
+            "a4 = 0.5 m/s (maximum hip velocity) and a7 = 5° (hip angle) conflict with each other: with both at these values and \
+             the other bounds at their loosest, no gait was found from 5 starts; the nearest motion violates \
+             SS1_R node 12, forward hip velocity by 0.107 m/s. If either of them is at its loosest value as well, \
              there is a gait.",
             "Relaxing a7 (hip angle) alone, to 15° instead of 5°, gives a gait; with 14.6°, no gait was found from 3 \
              starts.",
-            "Relaxing a4 (hip velocity upper bound) alone, up to its loosest value, 3 m/s, is not sufficient: no gait was \
+            "Relaxing a4 (maximum hip velocity) alone, up to its loosest value, 3 m/s, is not sufficient: no gait was \
              found from 3 starts.",
             "a2 = 20 rad/s² (coordinate acceleration) is reached in DS2_L and SS1_L.",
-            "a4 = 0.5 m/s (hip velocity upper bound) is reached in the stride as a whole.",
+            "a4 = 0.5 m/s (maximum hip velocity) is reached in the stride as a whole.",
         ]
     );
 }
@@ -121,10 +121,10 @@ fn conflicts_of_any_number_of_bounds_have_sentences() {
         ),
         "{alone}"
     );
-    assert!(alone.ends_with("With it at its loosest value as well, there is a gait."), "{alone}");
+    assert!(alone.ends_with("If this bound is at its loosest value as well, there is a gait."), "{alone}");
     let three = conflict(&[(1, 20.0), (4, 0.1), (6, 5.0)]).in_words();
     assert!(three.contains("(coordinate acceleration), a5 = 0.1 m (swing-foot clearance) and a7 = 5°"), "{three}");
-    assert!(three.ends_with("With any one of them at its loosest value as well, there is a gait."), "{three}");
+    assert!(three.ends_with("If any one of them is at its loosest value as well, there is a gait."), "{three}");
     let fixed = Conflict { naturalness_terms: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
     assert_eq!(
         fixed,
@@ -140,7 +140,7 @@ fn conflicts_of_any_number_of_bounds_have_sentences() {
 fn joint_relaxations_name_their_bounds_together() {
     assert_eq!(
         together(Some([0.65, 9.1])).in_words(),
-        "Relaxing these bounds together, to a4 = 0.65 m/s (hip velocity upper bound) instead of 0.5 m/s and a8 = 9.1° \
+        "Relaxing these bounds together, to a4 = 0.65 m/s (maximum hip velocity) instead of 0.5 m/s and a8 = 9.1° \
          (ankle angle) instead of 5°, gives a gait; with a4 = 0.61 m/s and a8 = 8.6°, no gait was found from 3 starts."
     );
     let in_vain = together(None).in_words();

@@ -4,7 +4,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
-use crate::studies::trial_state::has_state;
+use crate::studies::trial_transitions::has_state;
 use crate::studies::walkable;
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::OrderedAnswer;
@@ -158,7 +158,7 @@ pub async fn retract(
         return Err(Error::conflict("Only a preference can be retracted. This entry is the label of a solve."));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", reason, " that say why the preference is retracted")?;
+    let reason = printable::reason("reason", reason, ", the reason for the retraction")?;
     if !feedback::retract(writer, &row, author, reason).await? {
         return Err(Error::conflict("This preference was already retracted."));
     }

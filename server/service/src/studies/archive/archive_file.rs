@@ -5,8 +5,8 @@
 
 use super::signature::{PublicKey, SigningKey};
 use crate::error::Error;
-use gaitwright_store::archive::table;
 use gaitwright_store::archived_row::{LARGEST_BLOB_BYTES, LARGEST_TEXT_BYTES, Row};
+use gaitwright_store::archived_rows::table;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::io::{BufRead, BufReader, Read, Write};

@@ -8,8 +8,8 @@ use super::session::{LabSessionProgress, session_progress, still_open, still_sho
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::answer as answering;
 use crate::studies::assessment;
+use crate::studies::pair_answer as answering;
 use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
@@ -99,7 +99,7 @@ async fn report_unsafe(
     let walked = session.walked();
     let (gaits, blinded) = match walked {
         Some(pair) => (new.answer.unsafe_of(pair), ""),
-        None => (vec![session.trial_a, session.trial_b], "; blinded, so either gait"),
+        None => (vec![session.trial_a, session.trial_b], "; blinded, may be either gait"),
     };
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,

@@ -1,9 +1,9 @@
 //! Exports a study as an archive.
 
-use super::file::Packer;
+use super::archive_file::Packer;
 use super::signature::SigningKey;
 use crate::error::Error;
-use gaitwright_store::archive::{self, Read};
+use gaitwright_store::archived_rows::{self, Read};
 use gaitwright_store::{StoreError, StudyId, read_only};
 use std::io::Write;
 use std::path::Path;
@@ -49,7 +49,7 @@ pub async fn export<W: Write + Send + 'static>(
         let mut reader = pool.acquire().await.map_err(StoreError::from)?;
         let (forward, read) = mpsc::channel(1);
         let reading = async {
-            let done = archive::read(&mut reader, study, &forward).await;
+            let done = archived_rows::read(&mut reader, study, &forward).await;
             drop(forward);
             done
         };

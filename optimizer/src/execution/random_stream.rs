@@ -12,9 +12,9 @@ const SIGNIFICANDS: f64 = 9_007_199_254_740_992.0;
 
 /// A stream of random numbers.
 #[derive(Debug, Clone)]
-pub(super) struct Random(ChaCha8Rng);
+pub(super) struct RandomStream(ChaCha8Rng);
 
-impl Random {
+impl RandomStream {
     pub(super) fn new(seed: u64, stream: u64) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(stream);

@@ -18,18 +18,18 @@ use utoipa::ToSchema;
 
 /// Motion of a gait over one stride from right heel strike.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct Motion {
+pub(crate) struct GaitMotion {
     /// Stride time, s.
     stride_time_s: f64,
     /// Stride length, m.
     stride_length_m: f64,
     /// Nodes in order of time. Interpolate linearly between them.
-    frames: Vec<Frame>,
+    frames: Vec<MotionFrame>,
 }
 
 /// Node of a motion.
 #[derive(Debug, Serialize, ToSchema)]
-struct Frame {
+struct MotionFrame {
     #[serde(flatten)]
     figure: StickFigure,
     /// Name of the domain.
@@ -53,26 +53,26 @@ struct Frame {
     operation_id = "get_gait_motion",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
-    responses((status = 200, description = "Motion", body = Motion), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Motion", body = GaitMotion), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
-) -> Result<Json<Motion>, Refusal> {
+) -> Result<Json<GaitMotion>, Refusal> {
     let gait = gaits::get(&mut *app.read().await?, id).await?;
     Ok(Json(app.compute(move |pool| motion(&gait.unpack(pool)?)).await??))
 }
 
-pub(crate) fn motion(gait: &Gait) -> Result<Motion, Error> {
+pub(crate) fn motion(gait: &Gait) -> Result<GaitMotion, Error> {
     let frames = stick_figures(gait)?
         .into_iter()
         .zip(points(gait))
         .map(|(figure, point)| {
             let f = point.forces;
             let forces_n = [[f[0], f[1]], [f[2], f[3]], [f[4], f[5]], [f[6], f[7]]];
-            Frame {
+            MotionFrame {
                 figure: figure.into(),
                 domain: point.domain.to_owned(),
                 forces_n,
@@ -80,5 +80,5 @@ pub(crate) fn motion(gait: &Gait) -> Result<Motion, Error> {
             }
         })
         .collect();
-    Ok(Motion { stride_time_s: gait.stride_time_s, stride_length_m: gait.stride_length_m, frames })
+    Ok(GaitMotion { stride_time_s: gait.stride_time_s, stride_length_m: gait.stride_length_m, frames })
 }
