@@ -286,8 +286,8 @@ create table trials (
     started_at        text,
     finished_at       text,
     constraint trials_number_unique unique (study_id, number),
-    constraint trials_converged_has_figures check (
-        -- A script can report a converged trial without the figures of a solve.
+    constraint trials_converged_has_values check (
+        -- A script can report a converged trial without the values of a solve.
         state <> 'converged' or script is not null
         or (gait_rmse_rad is not null and cost_of_transport is not null and report is not null)
     ),
@@ -347,7 +347,7 @@ create table attempts (
     used        integer not null constraint attempts_used check (used in (0, 1)),
     -- How the solve ended.
     status      text not null,
-    -- The finite figures of the solve.
+    -- The finite values of the solve.
     report      text constraint attempts_report_json check (report is null or json_valid(report)),
     received_at text not null,
     constraint attempts_once primary key (trial_id, attempt)

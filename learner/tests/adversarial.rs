@@ -5,7 +5,7 @@
 
 use gait_learner::{
     ActionIndex, Dimension, Feedback, FeedbackLog, Inference, Labels, Learner, LearnerError, LearnerSettings, Link,
-    Method, SearchSpace, comparisons_to_ask, posterior, propose, propose_batch, what_to_ask,
+    Method, SearchSpace, posterior, propose, propose_batch, proposed_comparison, proposed_comparisons,
 };
 use proptest::prelude::*;
 use std::collections::HashSet;
@@ -65,7 +65,7 @@ fn exercise(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) 
     }
     assert_eq!(posterior.best().is_some(), !log.visited.is_empty());
     assert!(posterior.best().is_none_or(|best| log.visited.contains(&best)));
-    what_to_ask(space, log, settings).unwrap();
+    proposed_comparison(space, log, settings).unwrap();
     let tried: std::collections::HashSet<_> = log.visited.iter().collect();
     match propose(space, log, &[], settings, 3) {
         Ok(proposal) => {
@@ -412,7 +412,7 @@ proptest! {
             match step {
                 0 => {
                     if let Ok(proposal) = learner.propose(&space, &log, &[ActionIndex(4)], &settings, 7) {
-                        learner.comparisons_to_ask(&space, &log, proposal.action, &settings).unwrap();
+                        learner.proposed_comparisons(&space, &log, proposal.action, &settings).unwrap();
                         log.visited.push(proposal.action);
                         log.feedback.push(Feedback::Label { action: proposal.action, category: 1 });
                     }
@@ -455,11 +455,14 @@ fn agrees_with_a_new_one(learner: &mut Learner, space: &SearchSpace, log: &Feedb
         propose_batch(space, log, &[ActionIndex(2)], settings, 5).ok(),
         learner.propose_batch(space, log, &[ActionIndex(2)], settings, 5).ok()
     );
-    assert_eq!(what_to_ask(space, log, settings).unwrap(), learner.what_to_ask(space, log, settings).unwrap());
+    assert_eq!(
+        proposed_comparison(space, log, settings).unwrap(),
+        learner.proposed_comparison(space, log, settings).unwrap()
+    );
     for action in [0, 7, 14].map(ActionIndex) {
         assert_eq!(
-            comparisons_to_ask(space, log, action, settings).unwrap(),
-            learner.comparisons_to_ask(space, log, action, settings).unwrap()
+            proposed_comparisons(space, log, action, settings).unwrap(),
+            learner.proposed_comparisons(space, log, action, settings).unwrap()
         );
     }
 }

@@ -5,7 +5,7 @@
 
 use gait_learner::{
     ActionIndex, Dimension, Feedback, FeedbackLog, Inference, Labels, LearnerError, LearnerSettings, Link, Method,
-    SearchSpace, Start, posterior, propose, propose_batch, what_to_ask,
+    SearchSpace, Start, posterior, propose, propose_batch, proposed_comparison,
 };
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -134,7 +134,7 @@ proptest! {
         for result in [
             propose(&space, &log, &[], &settings, 1).map(drop),
             propose_batch(&space, &log, &[], &settings, 1).map(drop),
-            what_to_ask(&space, &log, &settings).map(drop),
+            proposed_comparison(&space, &log, &settings).map(drop),
             posterior.best_of_visited(5, 1).map(drop),
             posterior.best_of_grid(2, 1).map(drop),
         ] {

@@ -494,8 +494,8 @@ async fn parallel_guesses_are_limited_like_sequential_ones() {
 #[tokio::test]
 async fn programs_are_not_redirected_to_the_sign_in_form() {
     let (_folder, service) = service().await;
-    let figures = service.fetch("/metrics").await;
-    assert_eq!((figures.status, figures.content_type()), (StatusCode::UNAUTHORIZED, "application/problem+json"));
+    let metrics = service.fetch("/metrics").await;
+    assert_eq!((metrics.status, metrics.content_type()), (StatusCode::UNAUTHORIZED, "application/problem+json"));
 }
 
 #[tokio::test]

@@ -56,8 +56,9 @@ async fn responses_to_raters_reveal_no_gait() {
         assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
         if path.contains("/motions/") {
             // The motion has only positions.
-            let figures = answer.text.strip_prefix("{\"figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
-            assert!(figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{figures}");
+            let found =
+                answer.text.strip_prefix("{\"stick_figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
+            assert!(found.chars().all(|c| "[]-.,0123456789".contains(c)), "{found}");
             continue;
         }
         bytes.push_str(&answer.text);
@@ -84,11 +85,11 @@ async fn responses_to_raters_reveal_no_gait() {
     for word in ["trial", "rmse", "bound", "converged", "\"a1\"", "0.026", "stride_", ".csv", ".json", "seed"] {
         assert!(!words.contains(word), "{word}");
     }
-    // Both motions have the same length, number of figures and start position.
+    // Both motions have the same length, number of stick found and start position.
     let motion = |side: &str| {
         let path = format!("/api/v1/blind-pairs/{code}/motions/{side}");
         let service = &service;
-        async move { service.fetch(&path).await.json()["figures"].take() }
+        async move { service.fetch(&path).await.json()["stick_figures"].take() }
     };
     let (first, second) = (motion("first").await, motion("second").await);
     assert_eq!(first.as_array().unwrap().len(), 101);
@@ -145,15 +146,15 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let repeats = shown.iter().filter(|p| p.kind == BlindPairKind::Repeat).count();
     assert!(repeats > 0, "{repeats} repeats of {}", shown.len());
 
-    let figures = format!("/api/v1/studies/{study}/raters");
-    let before = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
+    let found = format!("/api/v1/studies/{study}/raters");
+    let before = send(&service, &admin, &Method::GET, &found, "", "").await.items();
     assert_eq!(before[0]["first_preferred"], Value::Null, "before unblinding it would tell the order of pairs");
     assert_eq!(before[0]["repeats_agree"]["of"], json!(repeats));
     let unblind = json!({"rater": "a rater", "reason": "the study has ended"}).to_string();
     let path = format!("/api/v1/studies/{study}/raters/unblind");
     let told = send(&service, &admin, &Method::POST, &path, "application/json", &unblind).await;
     assert_eq!(told.status, StatusCode::OK, "{}", told.text);
-    let after = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
+    let after = send(&service, &admin, &Method::GET, &found, "", "").await.items();
     assert_eq!(after[0]["first_preferred"]["share"], 1.0, "this rater always says first");
     for (pair, (first, second)) in
         told.json()["pairs"].as_array().unwrap().iter().zip(sides(&service.store, study).await)
@@ -230,7 +231,7 @@ async fn each_side_shows_the_gait_drawn_for_it() {
         let (first, second) = *sides(&service.store, study).await.last().unwrap();
         for (side, trial) in [("first", first), ("second", second)] {
             let motion = service.fetch(&format!("/api/v1/blind-pairs/{code}/motions/{side}")).await.json();
-            let hip = motion["figures"][0][0][1].as_f64().unwrap();
+            let hip = motion["stick_figures"][0][0][1].as_f64().unwrap();
             assert!((hip - of(trial)).abs() < 6e-4, "{side}: {hip} m, drawn: {} m", of(trial));
         }
         if (of(first) - of(second)).abs() > 2e-3 {
@@ -268,10 +269,10 @@ async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() 
         let newest = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
         assert_eq!(newest.could_have_known, unblinded, "{who:?}");
     }
-    let figures = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
+    let found = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
     let marked: Vec<_> =
-        figures.items().as_array().unwrap().iter().map(|rater| rater["could_have_known"].clone()).collect();
-    assert_eq!(marked, [json!(1), json!(1), json!(1), json!(0)], "by name: {}", figures.text);
+        found.items().as_array().unwrap().iter().map(|rater| rater["could_have_known"].clone()).collect();
+    assert_eq!(marked, [json!(1), json!(1), json!(1), json!(0)], "by name: {}", found.text);
     service.stop().await;
 }
 
@@ -409,8 +410,8 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
     let back = service.post_text(&at(&pair, "/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
     assert_eq!(answers_in_force(&service.feedback(study).await), 0);
-    let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.items();
-    assert_eq!((&figures[0]["shown"], &figures[0]["answered"]), (&json!(1), &json!(0)), "{figures}");
+    let found = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.items();
+    assert_eq!((&found[0]["shown"], &found[0]["answered"]), (&json!(1), &json!(0)), "{found}");
     assert_eq!(service.post_text(&at(&pair, "/retract"), FORM, "").await.status, StatusCode::CONFLICT);
 
     // Neither an earlier answer nor a safety report can be retracted.

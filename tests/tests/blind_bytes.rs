@@ -54,7 +54,7 @@ async fn waiting(service: &Service, trials: u32) -> StudyId {
     study
 }
 
-/// Data that a response to a rater must not contain: identifiers, names and figures of what is rated.
+/// Data that a response to a rater must not contain: identifiers, names and values of what is rated.
 async fn secrets(service: &Service, studies_of: &[StudyId]) -> BTreeSet<String> {
     let mut secrets = BTreeSet::new();
     let mut reader = service.store.read().await.unwrap();
@@ -146,9 +146,10 @@ fn check(what: &str, answer: &Answer, id: &str, code: &str, secrets: &BTreeSet<S
     let bytes = bytes.replace(id, "").replace(code, "");
     // A motion is positions to the millimetre, and nothing else.
     if answer.status == StatusCode::OK && what.contains("/motions/") {
-        let figures = answer.text.strip_prefix("{\"figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
-        assert!(figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{what}");
-        let digits = figures.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|n| n.split_once('.'));
+        let stick_figures =
+            answer.text.strip_prefix("{\"stick_figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
+        assert!(stick_figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{what}");
+        let digits = stick_figures.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|n| n.split_once('.'));
         assert!(digits.into_iter().all(|(_, decimals)| decimals.len() <= 3), "{what}");
         return;
     }

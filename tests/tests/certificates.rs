@@ -40,9 +40,9 @@ fn commands_solve_certify_and_convert_a_gait() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let solve = ["solve", "--muscles", "off", "--mesh", "2,2,3,5", "--certify", "--json", "--out", "gait.json"];
-    let figures: Value = serde_json::from_str(&done(folder, &solve)).unwrap();
-    assert_eq!(figures["status"], "converged");
-    let certificate = &figures["certificate"];
+    let printed: Value = serde_json::from_str(&done(folder, &solve)).unwrap();
+    assert_eq!(printed["status"], "converged");
+    let certificate = &printed["certificate"];
     assert_eq!(certificate["passed"].as_bool(), Some(certificate["failures"].as_array().unwrap().is_empty()));
     assert!(certificate["return_map"]["largest"].as_f64().unwrap() < 1.0);
 
@@ -83,8 +83,8 @@ fn commands_solve_certify_and_convert_a_gait() {
     // The Gait RMSE of a gait against itself is only the error of interpolation.
     let warm = ["--warm", "gait.json", "--mesh", "2,2,3,5", "--muscles", "off", "--json"];
     let against = [&["solve", "--reference", "own.json"][..], &warm].concat();
-    let figures: Value = serde_json::from_str(&done(folder, &against)).unwrap();
-    assert!(figures["gait_rmse_rad"].as_f64().unwrap() < 0.02, "{}", figures["gait_rmse_rad"]);
+    let printed: Value = serde_json::from_str(&done(folder, &against)).unwrap();
+    assert!(printed["gait_rmse_rad"].as_f64().unwrap() < 0.02, "{}", printed["gait_rmse_rad"]);
 
     let table = done(folder, &["convert", "gait.json", "--to", "csv"]);
     let mut rows = table.lines();
@@ -403,11 +403,11 @@ async fn command_line_repeats_the_solve_of_a_trial_bit_for_bit() {
         assert!(problem.headers["content-disposition"].to_str().unwrap().contains(&file));
         assert_eq!(problem.json()["warm_start"].is_object(), trial.warm_started_from.is_some());
         std::fs::write(folder.path().join(&file), &problem.text).unwrap();
-        let figures = done(folder.path(), &["solve", "--problem", &file, "--json"]);
-        let figures: Value = serde_json::from_str(&figures).unwrap();
+        let printed = done(folder.path(), &["solve", "--problem", &file, "--json"]);
+        let printed: Value = serde_json::from_str(&printed).unwrap();
         let report = serde_json::to_value(trial.report.unwrap()).unwrap();
         for same in ["status", "started_from", "iterations", "objective", "gait_rmse_rad", "max_violation"] {
-            assert_eq!(figures[same], report[same], "trial {}: {same}", trial.number);
+            assert_eq!(printed[same], report[same], "trial {}: {same}", trial.number);
         }
         let mut wrong = problem.json();
         wrong["problem"]["subject"]["height_m"] = json!(9.0);

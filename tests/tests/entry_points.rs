@@ -106,7 +106,7 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
         | "post /lab/{id}/retract"
         | "post /rate/pair/{code}/retract" => RETRACTS,
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
-            EntryPoint::None("the lab evaluates a trial by itself; figures, and no person's answer")
+            EntryPoint::None("the lab evaluates a trial by itself; values, and no person's answer")
         }
         _ if operation.starts_with("get ") => return reads(operation),
         _ if [
@@ -178,7 +178,7 @@ impl Scene {
         let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
         let without_gait = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap().id;
         let (first, second) = (converged[0], converged[1]);
-        // The same figures to the last bit: what a bound gives that no gait comes near.
+        // The same values to the last bit: what a bound gives that no gait comes near.
         let equal = converged[2].id;
         let scene = Self { _folder: folder, service, study, pair: (first.id, second.id), without_gait, equal };
         let report = serde_json::to_string(first.report.as_ref().unwrap()).unwrap();
@@ -348,7 +348,7 @@ const COMMANDS: [(&str, &str); 25] = [
     ("signing-key", "makes a key to sign archives"),
     ("audit", "reads the record"),
     ("backup", "copies the record"),
-    ("body", "prints the figures of a body"),
+    ("body", "prints the values of a body"),
     ("certify", "certifies a gait file"),
     ("config", "shows settings"),
     ("doctor", "checks machine, settings and record, and changes nothing"),

@@ -1,4 +1,4 @@
-//! Running the service: archives, retention, migrations, figures, HTTPS, restore.
+//! Running the service: archives, retention, migrations, metrics, HTTPS, restore.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_service::studies::pending_comparison::open_question;
+use gaitwright_service::studies::pending_comparison::pending_comparison;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::attempts;
 use gaitwright_store::studies::{AnswerSource, StudyState};
@@ -27,8 +27,8 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
         tokio::time::sleep(thinks).await;
         let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
         let there = snapshot.clone();
-        let question = service.store.clone().compute(move |pool| open_question(pool, &there)).await.unwrap();
-        let Some((a, b)) = question.unwrap().trials() else { continue };
+        let pending = service.store.clone().compute(move |pool| pending_comparison(pool, &there)).await.unwrap();
+        let Some((a, b)) = pending.unwrap().trials() else { continue };
         let rmse = |id| snapshot.trial(id).unwrap().gait_rmse_rad.unwrap();
         let answer = json!({"trial_a": a, "trial_b": b, "answer": if rmse(a) < rmse(b) { "a" } else { "b" }});
         let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;

@@ -115,11 +115,11 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
 }
 
 /// The answer of a solve as those that start from it name it.
-fn ancestor(figures: &Value) -> Value {
-    let lineage = &figures["lineage"];
+fn ancestor(report: &Value) -> Value {
+    let lineage = &report["lineage"];
     json!({
-        "id": lineage["id"], "local_optimum": lineage["local_optimum"], "objective": figures["objective"],
-        "gait_rmse_rad": figures["gait_rmse_rad"]
+        "id": lineage["id"], "local_optimum": lineage["local_optimum"], "objective": report["objective"],
+        "gait_rmse_rad": report["gait_rmse_rad"]
     })
 }
 
@@ -177,9 +177,9 @@ fn solver_settings_are_read_from_a_file() {
     std::fs::write(folder.join("solver.json"), r#"{"bound_push": 0.01}"#).unwrap();
     let solve = ["solve", "--json", "--initial-guesses", "1"];
     let gait = |flags: &[&str]| {
-        let figures = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));
-        assert_eq!(figures["status"], "converged");
-        figures["lineage"]["id"].as_str().unwrap().to_owned()
+        let report = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));
+        assert_eq!(report["status"], "converged");
+        report["lineage"]["id"].as_str().unwrap().to_owned()
     };
     // The start is nearer to its bounds, so the way is another one, and at least the last bits of where it ends.
     let usual = gait(&[]);
@@ -187,9 +187,9 @@ fn solver_settings_are_read_from_a_file() {
     assert_eq!(gait(&[]), usual);
 }
 
-/// If the output folder is removed during the solve, the figures are still printed.
+/// If the output folder is removed during the solve, the report is still printed.
 #[test]
-fn figures_are_printed_although_the_gait_file_cannot_be_written() {
+fn report_is_printed_although_the_gait_file_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path().join("place");
     std::fs::create_dir(&place).unwrap();

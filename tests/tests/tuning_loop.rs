@@ -4,7 +4,7 @@
 
 use axum::http::StatusCode;
 use gait_learner::{LearnerSettings, Method, Partner};
-use gaitwright_service::studies::pending_comparison::open_question;
+use gaitwright_service::studies::pending_comparison::pending_comparison;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::workers::{Attempt, InProcess};
@@ -418,7 +418,7 @@ async fn equal_gaits_are_never_offered_for_comparison() {
     assert_eq!(third.gait_rmse_rad, second.gait_rmse_rad);
     let snapshot =
         StudySnapshot::read(&mut service.store.read().await.unwrap(), service.get(study).await).await.unwrap();
-    let question = service.store.clone().compute(move |pool| open_question(pool, &snapshot)).await.unwrap();
-    assert_eq!(question.unwrap().trials(), Some((third.id, first.id)), "the one before is the same gait");
+    let pending = service.store.clone().compute(move |pool| pending_comparison(pool, &snapshot)).await.unwrap();
+    assert_eq!(pending.unwrap().trials(), Some((third.id, first.id)), "the one before is the same gait");
     service.stop().await;
 }

@@ -12,7 +12,7 @@ use gaitwright_store::studies::AnswerSource;
 use std::fmt::Display;
 
 /// A figure with four decimals, or a dash.
-pub(crate) fn figure(value: Option<f64>) -> String {
+pub(crate) fn decimal(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
 }
 

@@ -30,7 +30,7 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     let told = site.service.fetch(&bounds).await.json();
     assert!(told["bounds"]["a1"].is_number() && told["gait_rmse_rad"].is_number(), "{told}");
     page.click("[data-part=best] a.button").await;
-    page.wait_for(".walker svg.gait-figure").await;
+    page.wait_for(".walker svg.gait-walker").await;
     page.wait_for("[data-phase]").await;
     assert!(page.count("svg.chart").await >= 12);
     page.is_clean(&site.origin).await;
@@ -49,7 +49,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     page.resize(1280, 800).await;
     page.wait_for(".outcome [data-phase]").await;
     assert_eq!(page.value("document.querySelector('.outcome [data-trial]').dataset.trial").await, best["trial_id"]);
-    let (bottom, _, height) = page.lowest(".outcome svg.gait-figure").await;
+    let (bottom, _, height) = page.lowest(".outcome svg.gait-walker").await;
     assert!(bottom <= 800.0 && height >= 300.0, "{bottom} {height}");
     let (bottom, ..) = page.lowest(".outcome [data-part=best] a").await;
     assert!(bottom <= 800.0, "{bottom}");
@@ -70,7 +70,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     page.wait_until(&format!("{phase} !== {before:?}")).await;
     page.is_clean(&site.origin).await;
     let plain = browser.open_without_scripts(&address).await;
-    assert_eq!(plain.count(".outcome svg.gait-figure").await, 1);
+    assert_eq!(plain.count(".outcome svg.gait-walker").await, 1);
     browser.close().await;
 }
 
@@ -114,7 +114,7 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     page.wait_until("/^About .+ left for \\d+ trials/m.test(document.querySelector('[data-part=state]').innerText)")
         .await;
     assert_eq!(page.value("window.same ?? false").await, "true");
-    let (bottom, ..) = page.lowest(".outcome svg.gait-figure").await;
+    let (bottom, ..) = page.lowest(".outcome svg.gait-walker").await;
     assert!(bottom <= 800.0, "{bottom}");
     page.is_clean(&site.origin).await;
     let told = async |trials: u32| {
@@ -278,7 +278,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
         row.cells[3].textContent === (Number(row.cells[1].textContent) > Number(document.querySelector('#best tr.best').cells[1].textContent) \
         ? 'yes, by Gait RMSE' : 'no, by Gait RMSE'))";
     assert_eq!(page.value(by_rmse).await, "true");
-    let bars = "[...document.querySelectorAll('#bounds meter')].map(m => m.value)";
+    let bars = "[...document.querySelectorAll('#main-effects meter')].map(m => m.value)";
     assert_eq!(
         page.value(&format!(
             "{bars}.length === 8 && {bars}[0] === 1 && {bars}.every((v, i, all) => i === 0 || v <= all[i - 1])"
@@ -362,7 +362,7 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     page.click("[aria-labelledby=waits] a").await;
     // Both gaits walk, on one clock.
     page.wait_for(".walker [data-play]").await;
-    assert_eq!(page.count(".walker svg.gait-figure").await, 2);
+    assert_eq!(page.count(".walker svg.gait-walker").await, 2);
     let drawn =
         "[...document.querySelectorAll('.walker [data-segment]')].map(part => part.getAttribute('transform')).join()";
     let before = page.value(drawn).await;
@@ -545,7 +545,7 @@ async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
     assert_eq!(still.count("svg.tiles").await, 2);
     let plain = browser.open_without_scripts(&at).await;
     assert_eq!(plain.count("svg.tiles").await, 2);
-    let seen = "[...document.querySelectorAll('svg.gait-figure, [data-key], [data-keys]')].filter(c => c.getClientRects().length).length";
+    let seen = "[...document.querySelectorAll('svg.gait-walker, [data-key], [data-keys]')].filter(c => c.getClientRects().length).length";
     assert_eq!(plain.value(seen).await, "0", "no empty frames, no keys that do nothing");
     browser.close().await;
 }

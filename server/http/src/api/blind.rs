@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::blind_motion::{BlindFigure, blind_motion, phase};
+use crate::blind_motion::{BlindStickFigure, blind_motion, phase};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
@@ -75,7 +75,7 @@ pub(super) struct BlindMotion {
     /// 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
     /// and of the right leg) as forward and upward coordinates, m.
     #[schema(value_type = Vec<Vec<Vec<f64>>>)]
-    figures: Vec<BlindFigure>,
+    stick_figures: Vec<BlindStickFigure>,
 }
 
 /// Motion of a pair.
@@ -122,7 +122,7 @@ pub(super) async fn motion(
     };
     let motion = motion.flatten();
     // The error must not reveal the trial, the subject or the device.
-    motion.map(|figures| Json(BlindMotion { figures })).map_err(|error| {
+    motion.map(|stick_figures| Json(BlindMotion { stick_figures })).map_err(|error| {
         tracing::error!(%error, "cannot show a gait to a rater");
         Refusal(Error::NotFound { what: "motion of the blind pair".to_owned(), id: "with this code".to_owned() })
     })

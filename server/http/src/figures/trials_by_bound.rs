@@ -1,6 +1,6 @@
 //! Trials by the values of their bounds: parallel coordinates of all bounds, and one chart for a single bound.
 
-use crate::format::{figure, meaning, signed};
+use crate::format::{decimal, meaning, signed};
 use gait_learner::LearnerError;
 use gaitwright_charts::{Chart, Figure, Parallel, ParallelAxis, ParallelLine, PointLink};
 use gaitwright_service::studies::analysis::Analysis;
@@ -35,7 +35,7 @@ impl TrialMeasure {
 
     fn in_words(self, value: f64) -> String {
         match self {
-            Self::GaitRmse => format!("Gait RMSE {} rad", figure(Some(value))),
+            Self::GaitRmse => format!("Gait RMSE {} rad", decimal(Some(value))),
             Self::Utility => format!("utility {}", signed(value)),
         }
     }

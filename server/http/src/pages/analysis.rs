@@ -10,7 +10,7 @@ use crate::figures::analysis::{
     AnalysisState, AxisChoice, DimensionChoice, MAP_NOTES, Maps, analysis_of, chosen, maps, marginals, ranked,
 };
 use crate::figures::trials_by_bound::{DRAWN, by_bound, parallel};
-use crate::format::{self, figure, meaning, percent};
+use crate::format::{self, decimal, meaning, percent};
 use crate::page_error::{PageResult, page};
 use crate::visible::Visible;
 use askama::Template;
@@ -50,7 +50,7 @@ struct ShownAnalysis {
     gaits: Vec<GaitRow>,
     /// So many gaits are not in that list.
     more_gaits: usize,
-    bounds: Vec<BoundEffect>,
+    main_effects: Vec<MainEffectRow>,
     marginals: Vec<PageChart>,
     legend: Vec<(String, String)>,
     maps: Maps,
@@ -76,8 +76,8 @@ struct GaitRow {
     worse: Option<String>,
 }
 
-/// How much a bound matters.
-struct BoundEffect {
+/// The main effect of a bound.
+struct MainEffectRow {
     name: String,
     limited: &'static str,
     /// Share of the largest effect.
@@ -144,7 +144,7 @@ fn show(
         recommends,
         gaits: analysis.gaits.iter().take(LISTED).map(|gait| gait_row(gait, analysis, snapshot)).collect(),
         more_gaits: analysis.gaits.len().saturating_sub(LISTED),
-        bounds: bounds(analysis),
+        main_effects: main_effects(analysis),
         legend: shared_legend(&mut marginals),
         marginals,
         charts,
@@ -165,7 +165,7 @@ fn show(
 fn gait_row(gait: &GaitUtility, analysis: &Analysis, snapshot: &StudySnapshot) -> GaitRow {
     let trials = gait.trials.iter().filter_map(|id| snapshot.trial(*id));
     GaitRow {
-        rmse: figure(trials.clone().next().and_then(|trial| trial.gait_rmse_rad)),
+        rmse: decimal(trials.clone().next().and_then(|trial| trial.gait_rmse_rad)),
         trials: trials.take(NAMED).map(|trial| (trial.id, trial.number)).collect(),
         more_trials: gait.trials.len().saturating_sub(NAMED),
         utility: format::utility(&gait.utility),
@@ -199,14 +199,14 @@ fn worse_by_utility(behind: &Prediction) -> String {
 }
 
 /// The bounds with several values, the one that matters most first.
-fn bounds(analysis: &Analysis) -> Vec<BoundEffect> {
+fn main_effects(analysis: &Analysis) -> Vec<MainEffectRow> {
     let dimensions = analysis.posterior.space().dimensions();
     let ranked = ranked(analysis);
     let largest = ranked.first().map_or(0.0, |place| analysis.main_effects[*place].difference.mean);
     let row = |place: usize| {
         let effect = &analysis.main_effects[place];
         let name = &dimensions[place].name;
-        BoundEffect {
+        MainEffectRow {
             limited: meaning(name),
             name: name.clone(),
             share: if largest > 0.0 { effect.difference.mean / largest } else { 0.0 },

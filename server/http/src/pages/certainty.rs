@@ -1,6 +1,6 @@
-//! How sure a study is of its recommended gait, as one sentence. It uses the figures of the page *Analysis*.
+//! How sure a study is of its recommended gait, as one sentence. It uses the values of the page *Analysis*.
 
-use crate::format::{figure, percent};
+use crate::format::{decimal, percent};
 use gaitwright_service::studies::analysis::Analysis;
 use gaitwright_service::studies::gait_utilities::is_distinguishable;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -32,7 +32,7 @@ fn by_gait_rmse(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String>
             "Trial {} has a lower Gait RMSE, {} rad. The learner recommends the gait with the highest estimated utility. \
              The estimate also uses gaits with similar bounds.",
             other.number,
-            figure(other.gait_rmse_rad)
+            decimal(other.gait_rmse_rad)
         ),
         (Some(_), gaits) => {
             format!(

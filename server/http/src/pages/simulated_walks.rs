@@ -31,7 +31,7 @@ pub(super) struct ShownReport {
     pub(super) sentence: String,
     pub(super) grounds: Vec<GroundRow>,
     /// Label and value.
-    pub(super) figures: Vec<(&'static str, String)>,
+    pub(super) values: Vec<(&'static str, String)>,
     pub(super) program: String,
     pub(super) created_at: Instant,
 }
@@ -76,7 +76,7 @@ impl ShownReport {
             .map(|walk| format!("{} on ground that yields {} mm", walk.strides, format::number(1e3 * walk.yield_m)))
             .collect();
         let [lightest, heaviest] = report.body_mass_kg;
-        let figures = vec![
+        let values = vec![
             ("Strides without any disturbance", of_strides(report.undisturbed_strides)),
             ("Strides on harder and softer ground, otherwise undisturbed", by_yield.join(", ")),
             ("Largest push at the hip survived without other disturbances", pushes(&report)),
@@ -87,7 +87,7 @@ impl ShownReport {
             ("Gait (SHA-256)", report.gait_sha256.clone()),
         ];
         let grounds = report.grounds.iter().map(GroundRow::new).collect();
-        Self { sentence: report.sentence(), grounds, figures, program, created_at }
+        Self { sentence: report.sentence(), grounds, values, program, created_at }
     }
 }
 

@@ -143,10 +143,10 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
     ];
     if comparable {
         let rmse = best.and_then(|trial| trial.gait_rmse_rad);
-        rows.push(("Gait RMSE of the best trial, rad".to_owned(), format::figure(rmse)));
+        rows.push(("Gait RMSE of the best trial, rad".to_owned(), format::decimal(rmse)));
     }
     let cost = best.and_then(|trial| trial.cost_of_transport);
-    rows.push(("Cost of transport of the best trial".to_owned(), format::figure(cost)));
+    rows.push(("Cost of transport of the best trial".to_owned(), format::decimal(cost)));
     let bounds = best.map(|trial| trial.action.to_array());
     for (place, name) in TunedBounds::NAMES.iter().enumerate() {
         let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());

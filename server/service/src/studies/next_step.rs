@@ -1,8 +1,8 @@
-//! Decides what a study needs next (a trial, a question, the end), as a pure function of its snapshot.
+//! Decides what a study needs next (a trial, a comparison, the end), as a pure function of its snapshot.
 
 use super::analysis::Analyses;
 use super::lifecycle::StudyTransition;
-use super::pending_comparison::{self, Question};
+use super::pending_comparison::{self, PendingComparison};
 use super::snapshot::StudySnapshot;
 use super::trial_choice;
 use crate::error::Error;
@@ -28,15 +28,15 @@ pub(super) enum PlanningStep {
 pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Analyses) -> Result<PlanningStep, Error> {
     let study = &snapshot.study;
     if study.plan.answer_source == AnswerSource::People {
-        match (study.state, pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
-            (StudyState::Running, Question::Pair(_)) => {
+        match (study.state, pending_comparison::pending_comparison(pool, snapshot).map_err(Error::Learner)?) {
+            (StudyState::Running, PendingComparison::Pair(_)) => {
                 return Ok(PlanningStep::Transition(StudyTransition::Ask, "A comparison needs an answer.".into()));
             }
-            (StudyState::Waiting, Question::None) => {
+            (StudyState::Waiting, PendingComparison::None) => {
                 return Ok(PlanningStep::Transition(StudyTransition::Answered, String::new()));
             }
             // The comparison follows as soon as the gait is certified. No trial is proposed before.
-            (_, Question::AfterCertificate(_)) => return Ok(PlanningStep::Nothing),
+            (_, PendingComparison::AfterCertificate(_)) => return Ok(PlanningStep::Nothing),
             _ => {}
         }
     }
@@ -95,8 +95,8 @@ fn all_known(snapshot: &StudySnapshot) -> String {
 
 /// The trials that would be proposed next, one for each possible answer to the pending comparison.
 pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
-    let question = pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
-    let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
+    let pending = pending_comparison::pending_comparison(pool, snapshot).map_err(Error::Learner)?;
+    let Some((a, b)) = pending.trials() else { return Ok(Vec::new()) };
     let mut likely: Vec<NewTrial> = Vec::new();
     for content in [
         FeedbackContent::Preference { winner: a, loser: b },

@@ -135,7 +135,7 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &St
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyExtension {
-    /// Total number of trials. Must exceed the current number.
+    /// Number of trials. Must exceed the current number.
     #[schema(minimum = 2, maximum = 10000)]
     pub number_of_trials: u32,
 }

@@ -73,9 +73,9 @@ pub(super) struct Live {
     tree: Option<PageChart>,
     answers: Vec<AnswerRow>,
     unsafe_gaits: Vec<UnsafeGait>,
-    question: bool,
+    comparison_pending: bool,
     /// The trial whose certificate the next comparison waits for.
-    question_after: Option<(TrialId, u32)>,
+    comparison_after: Option<(TrialId, u32)>,
     can_compare: bool,
 }
 
@@ -89,7 +89,7 @@ impl Live {
 
     /// Whether the study has ended and nothing waits for a person, so that the recommended gait comes before the state.
     fn leads_with_outcome(&self) -> bool {
-        self.unsafe_gaits.is_empty() && !self.question && self.study.state.has_ended()
+        self.unsafe_gaits.is_empty() && !self.comparison_pending && self.study.state.has_ended()
     }
 
     /// Whether answers are missing from the list.
@@ -121,7 +121,7 @@ struct BestGait {
     cost: String,
     bounds: Vec<Bound>,
     has_gait: bool,
-    /// Whether a script evaluated it and reported figures only.
+    /// Whether a script evaluated it and reported values only.
     by_script: bool,
     /// The state of its certificate.
     certification: BestCertification,
@@ -298,15 +298,15 @@ fn view(
     let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| BestGait {
         id: trial.id,
         number: trial.number,
-        rmse: format::figure(trial.gait_rmse_rad),
-        cost: format::figure(trial.cost_of_transport),
+        rmse: format::decimal(trial.gait_rmse_rad),
+        cost: format::decimal(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
         has_gait,
         by_script: trial.script.is_some(),
         passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,
-            rmse: format::figure(trial.gait_rmse_rad),
+            rmse: format::decimal(trial.gait_rmse_rad),
         }),
         certification: certification.clone(),
         simulated_walks,
@@ -351,9 +351,9 @@ fn view(
         tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| PageChart::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
-        question: outcome.question,
-        question_after: outcome
-            .question_after
+        comparison_pending: outcome.comparison_pending,
+        comparison_after: outcome
+            .comparison_after
             .filter(|_| !snapshot.study.state.has_ended())
             .and_then(|id| snapshot.trial(id))
             .map(|trial| (trial.id, trial.number)),

@@ -6,7 +6,7 @@ use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
 use crate::studies::pair_answer as answering;
-use crate::studies::pending_comparison::open_question;
+use crate::studies::pending_comparison::pending_comparison;
 use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
@@ -53,7 +53,7 @@ pub struct AnswerReceipt {
 }
 
 /// The pending comparison of a study, the newer gait first. Computed outside any transaction.
-async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, TrialId)>, Error> {
+async fn pending_trials(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, TrialId)>, Error> {
     let mut db = store.read().await?;
     let study = studies::get(&mut db, study).await?;
     consents::may_be_shown(&mut db, study.id).await?;
@@ -63,7 +63,7 @@ async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, 
     }
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let found = store.compute(move |pool| open_question(pool, &snapshot)).await?;
+    let found = store.compute(move |pool| pending_comparison(pool, &snapshot)).await?;
     // The learner's error may name bounds, so the rater sees only an internal error.
     let found =
         found.map_err(|error| Error::Internal(format!("choosing the comparison of study {study_id}: {error}")))?;
@@ -79,7 +79,7 @@ pub async fn next<'a>(
     caller: &Caller,
     study: StudyId,
 ) -> Result<(BorrowedWriter<'a>, Option<PairWithSides>), Error> {
-    let question = question(store, study).await?;
+    let pending = pending_trials(store, study).await?;
     let mut writer = store.write().await?;
     let safety_reports = SafetyReports::read(&mut writer, study).await?;
     let mut own = blind_pairs::of_study(&mut writer, study).await?;
@@ -99,7 +99,7 @@ pub async fn next<'a>(
         }
         cancel(&mut writer, open).await?;
     }
-    let Some(pair) = question.filter(|pair| !safety_reports.is_skipped(*pair)) else { return Ok((writer, None)) };
+    let Some(pair) = pending.filter(|pair| !safety_reports.is_skipped(*pair)) else { return Ok((writer, None)) };
     // The study may go on asking others; this person has answered, here or elsewhere.
     if !walkable::are_walkable(&mut writer, pair).await? || is_answered(&mut writer, study, pair, &caller.name).await? {
         return Ok((writer, None));
