@@ -481,7 +481,7 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
         ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5; it must be 0.05 to 50000"),
         ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0; it must be 0.001 to 2000"),
         ("values_a1=15,x", "values_a1", "\u{201c}Values of a1\u{201d} is "),
-        ("number_of_trials=many", "number_of_trials", "\u{201c}Trials\u{201d} is "),
+        ("number_of_trials=many", "number_of_trials", "\u{201c}Number of trials\u{201d} is "),
         ("seed=x", "seed", "\u{201c}Seed\u{201d} is "),
         ("height_m=1.7", "height_m", "\u{201c}Height, m\u{201d} is "),
     ] {
@@ -683,7 +683,7 @@ async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
         "\u{201c}Pseudonym\u{201d} must be",
         "Did you mean 1.73 m?",
         "Did you mean 65.7 kg?",
-        "\u{201c}Trials\u{201d} is 0",
+        "\u{201c}Number of trials\u{201d} is 0",
         "\u{201c}Seed\u{201d}",
         "\u{201c}Values of a5\u{201d}",
     ] {

@@ -10,6 +10,10 @@ from typing import Any, Literal, Optional, TypedDict, Union
 # Kind of access: `view`, data were shown; `export`, data were downloaded as a file; `refused`, the request was refused.
 AccessKind = Literal["view", "export", "refused"]
 
+# Who answers comparisons: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study waits
+# for them; `both`, Gait RMSE answers, and people can add answers.
+AnswerSource = Literal["gait_rmse", "people", "both"]
+
 # What a person states instead of a preference between two gaits.
 AssessmentAnswer = Literal["cannot_tell", "unsafe_a", "unsafe_b", "unsafe_both"]
 
@@ -51,10 +55,6 @@ Evaluation = Literal["optimizer", "script"]
 # Identifier of an entry of the feedback of a study.
 FeedbackId = str
 
-# Who answers comparisons: `automatic`, Gait RMSE answers every comparison; `human`, people answer, and the study waits
-# for them; `mixed`, Gait RMSE answers, and people can add answers.
-FeedbackMode = Literal["automatic", "human", "mixed"]
-
 # The direction of a force: `x` forwards, `z` upwards.
 ForceAxis = Literal["x", "z"]
 
@@ -91,8 +91,8 @@ MeasurementFileId = str
 # or storage file (.mot, .sto).
 MeasurementFormat = Literal["csv", "opensim"]
 
-# Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
-MeasurementKind = Literal["emg", "motion"]
+# Kind of measurement file: `emg`, an EMG recording; `joint_angles`, joint angles.
+MeasurementKind = Literal["emg", "joint_angles"]
 
 # Identifier of a membership in a study.
 MemberId = str
@@ -166,7 +166,7 @@ Strikes = Literal["force", "kinematics", "ends"]
 StudyId = str
 
 # State of a study: `not_started`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer
-# from a person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied;
+# from a person; `paused`, by a user or a program; `finished`, all trials are made or a stopping rule applied;
 # `stopped`, by a user or a program.
 StudyState = Literal["not_started", "running", "waiting", "paused", "finished", "stopped"]
 
@@ -392,6 +392,8 @@ AuditDetail = TypedDict(
         "notes": "str",
         # Number of the trial, lab session, blind pair or answer.
         "number": "int",
+        # `trial.relax`: number of trials of the study.
+        "number_of_trials": "int",
         # `suggestion.give`: the trial whose gait the suggestion improves.
         "over": "TrialId",
         # `study.change`: maximum number of trials that run at once.
@@ -426,7 +428,7 @@ AuditDetail = TypedDict(
         "scopes": "list[Right]",
         # `trial.ask`: name of the script.
         "script": "str",
-        # Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.simulate`).
+        # Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.report_execution`).
         "seed": "int",
         # `session.end`: the sign-in session.
         "session": "SessionId",
@@ -436,6 +438,8 @@ AuditDetail = TypedDict(
         "sha256": "str",
         # `study.import`: public key of the signature, hexadecimal. Null without a signature.
         "signed_by": "Optional[str]",
+        # Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.report_execution`.
+        "simulated_walks": "int",
         # State, as in `StudyState` (`study.create`, `study.extend`) or `TrialState` (`trial.tell`).
         "state": "str",
         # `subject.withdraw`: studies that were stopped.
@@ -454,16 +458,12 @@ AuditDetail = TypedDict(
         "trial_a": "TrialId",
         # Trial of gait B, as `trial_a`.
         "trial_b": "TrialId",
-        # `trial.relax`: number of trials of the study.
-        "trial_budget": "int",
         # `study.import`: whether the key of the signature is trusted.
         "trusted": "bool",
         # `study.import`: number of gaits whose Gait RMSE could not be computed again.
         "unchecked_rmse": "int",
         # Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.record`, `lab_session.walk`.
         "walk": "int",
-        # Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.simulate`.
-        "walks": "int",
         # `trial.relax`: the trial without a gait whose bounds were relaxed.
         "without_gait": "TrialId",
     },
@@ -566,20 +566,20 @@ class BlindMotion(TypedDict):
 
     # 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
     # and of the right leg) as forward and upward coordinates, m.
-    figures: list[list[list[float]]]
+    stick_figures: list[list[list[float]]]
 
 
 class BlindPair(TypedDict):
     """Pair to compare, as shown to a rater."""
 
+    # Code of the pair.
+    code: str
     # URL of the motion that is shown first.
     first: str
     # Number of the pair for this rater.
     number: int
     # URL of the motion that is shown second.
     second: str
-    # Token of the pair.
-    token: str
 
 
 class BodyMeasures(TypedDict):
@@ -902,7 +902,7 @@ class _PreferenceRequired(TypedDict):
 
 
 class Preference(_PreferenceRequired, total=False):
-    """A preference, a tie or a suggestion of a study."""
+    """A preference or a suggestion of a study."""
 
     # Retraction. Null if it was not retracted.
     retraction: Optional[Retraction]
@@ -1177,20 +1177,21 @@ class EmgView(TypedDict):
 
 
 class _ExecutionReportRequired(TypedDict):
-    # Range from which the body masses of disturbed walks are drawn, kg: ±5 %, limited to the range of the model.
+    # Range from which the body masses of disturbed simulated walks are drawn, kg: ±5 %, limited to the range of the
+    # model.
     body_mass_kg: list[float]
     # Version of this layout and of the simulation.
     format_version: int
     # SHA-256 of the gait as compact JSON, as in its certificate.
     gait_sha256: str
-    # Randomly disturbed walks, for each kind of ground.
-    grounds: list[WalksOnGround]
+    # Randomly disturbed simulated walks, for each kind of ground.
+    grounds: list[SimulatedWalksOnGround]
     # Seed of the disturbances.
     seed: int
     # Strides of a complete simulated walk.
     strides: int
-    # Undisturbed walks on level ground, ordered from hard ground to soft ground. In all other walks the ground yields
-    # 0.01 m under body weight.
+    # Undisturbed simulated walks on level ground, ordered from hard ground to soft ground. In all others the ground
+    # yields 0.01 m under body weight.
     strides_by_yield: list[StridesOnYield]
     # Completed strides without any disturbance.
     undisturbed_strides: int
@@ -1501,6 +1502,20 @@ class Job(_JobRequired, total=False):
     trial_id: Optional[TrialId]
 
 
+class JointAngleReading(TypedDict, total=False):
+    """How to read a file with joint angles."""
+
+    # Cut-off frequency of the low-pass filter before differentiation, Hz.
+    cutoff_hz: float
+    # Name of the file, as it is shown.
+    file_name: Optional[str]
+    # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
+    # knee_R_rad, ankle_R_rad.
+    format: MeasurementFormat
+    # Unit of angles, if the header of an OpenSim file does not state it.
+    unit: Optional[Unit]
+
+
 class JointRelaxation(TypedDict):
     """Effect of relaxing several tuned bounds together, each by the same fraction of the way to its loosest value.
     Computed if no single relaxation gives a gait.
@@ -1548,7 +1563,7 @@ class _LabSessionProgressRequired(TypedDict):
     # Whether the session is closed.
     closed: bool
     # Identifier of the session.
-    session: LabSessionId
+    lab_session_id: LabSessionId
     # Number of walks.
     walks: int
 
@@ -1655,6 +1670,10 @@ class LearnerSettings(TypedDict, total=False):
     # best action of a posterior sample over the whole search space; `information_gain`, the action whose feedback is
     # expected to tell the most about the utility; `random`, a random action that has not been tried.
     method: Literal["linecospar", "eubo", "thompson", "information_gain", "random"]
+    # Noise scale of answers of no difference, in units of utility.
+    no_difference_noise: float
+    # Difference in utility below which two gaits feel equal.
+    no_difference_width: float
     # Variance added to the diagonal of the prior covariance, called *GP noise* in the literature.
     nugget: float
     # Noise scale of labels, in units of utility.
@@ -1674,10 +1693,6 @@ class LearnerSettings(TypedDict, total=False):
     signal_variance: float
     # First action of a study: `random`, a random one; `centre`, the middle value of every dimension.
     start: Literal["random", "centre"]
-    # Noise scale of ties, in units of utility.
-    tie_noise: float
-    # Difference in utility below which two gaits feel equal.
-    tie_width: float
 
 
 class LegPoints(TypedDict):
@@ -1732,10 +1747,10 @@ class _MeasurementFileRequired(TypedDict):
     id: MeasurementFileId
     # Kind of measurement.
     kind: MeasurementKind
+    # Identifier of the lab session.
+    lab_session_id: LabSessionId
     # SHA-256 of the file.
     raw_sha256: str
-    # Identifier of the lab session.
-    session_id: LabSessionId
     # Number of the walk, 1 to 3.
     walk: int
 
@@ -1846,20 +1861,6 @@ class MotionFrame(_MotionFrameRequired, total=False):
     # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
     # muscles.
     activations: Optional[list[float]]
-
-
-class MotionReading(TypedDict, total=False):
-    """How to read a file with joint angles."""
-
-    # Cut-off frequency of the low-pass filter before differentiation, Hz.
-    cutoff_hz: float
-    # Name of the file, as it is shown.
-    file_name: Optional[str]
-    # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
-    # knee_R_rad, ankle_R_rad.
-    format: MeasurementFormat
-    # Unit of angles, if the header of an OpenSim file does not state it.
-    unit: Optional[Unit]
 
 
 class MuscleParametersGas(TypedDict, total=False):
@@ -2065,7 +2066,21 @@ class NewExecutionReport(TypedDict, total=False):
     # Seed of the disturbances. The same seed gives the same report.
     seed: int
     # Number of simulated walks on each kind of ground, 1 to 1000.
-    walks: int
+    simulated_walks: int
+
+
+class _NewJointAnglesRequired(TypedDict):
+    # Content of the file.
+    recording: str
+    # Number of the walk.
+    walk: int
+
+
+class NewJointAngles(_NewJointAnglesRequired, total=False):
+    """Joint angles of a walk."""
+
+    # How to read the file.
+    reading: JointAngleReading
 
 
 class _NewLabAnswerRequired(TypedDict):
@@ -2104,20 +2119,6 @@ class NewMember(TypedDict):
     kind: MemberKind
     # Name of an enabled user or a valid token.
     name: str
-
-
-class _NewMotionRequired(TypedDict):
-    # Content of the file.
-    recording: str
-    # Number of the walk.
-    walk: int
-
-
-class NewMotion(_NewMotionRequired, total=False):
-    """Joint angles of a walk."""
-
-    # How to read the file.
-    reading: MotionReading
 
 
 class _NewPreferenceRequired(TypedDict):
@@ -2216,14 +2217,14 @@ class _NewStudyRequired(TypedDict):
 class NewStudy(_NewStudyRequired, total=False):
     """A study to create. Every field except the subject has a default."""
 
+    # Who answers comparisons.
+    answer_source: AnswerSource
     # Values of the bounds that are not tuned.
     base_bounds: BaseBounds
     # Identifier of the device. The built-in one by default.
     device_id: Optional[DeviceId]
     # What evaluates trials.
     evaluation: Evaluation
-    # Who answers comparisons.
-    feedback_mode: FeedbackMode
     # Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     gait_settings: GaitSettings
     # Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
@@ -2233,6 +2234,8 @@ class NewStudy(_NewStudyRequired, total=False):
     muscles: bool
     # Name shown to users. Made from subject and variant by default.
     name: Optional[str]
+    # Number of trials.
+    number_of_trials: int
     # Number of trials that run in parallel.
     parallel_trials: int
     # Priority, -10 to 10. Studies with a higher priority run first.
@@ -2254,8 +2257,6 @@ class NewStudy(_NewStudyRequired, total=False):
     solve_seconds_budget: Optional[float]
     # Whether to start the study immediately.
     start: bool
-    # Number of trials.
-    trial_budget: int
     # The study finishes when the best action has not changed over this many results.
     unchanged_limit: Optional[int]
     # The gait from which trials are warm-started.
@@ -2372,7 +2373,7 @@ class PreferenceContentPreference(TypedDict):
     winner: TrialId
 
 
-class PreferenceContentTie(TypedDict):
+class PreferenceContentNoDifference(TypedDict):
     """Two trials are equally good."""
 
     # One trial.
@@ -2380,7 +2381,7 @@ class PreferenceContentTie(TypedDict):
     # The other trial.
     b: TrialId
     # Kind of preference.
-    kind: Literal["tie"]
+    kind: Literal["no_difference"]
 
 
 class PreferenceContentSuggestion(TypedDict):
@@ -2852,6 +2853,37 @@ class SignInLink(TypedDict):
     path: str
 
 
+class SimulatedWalksOnGround(TypedDict):
+    """Simulated walks on one kind of ground."""
+
+    # Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
+    # produce.
+    ankle_rate_limited_share: float
+    # Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
+    ankle_saturated_share: float
+    # Simulated walks that completed all strides.
+    completed: int
+    # Share of completed simulated walks.
+    completed_share: float
+    # 95 % confidence interval of this share (Wilson).
+    completed_share_interval: list[float]
+    # Simulated walks that ended with a fall.
+    fell: int
+    # Largest height of bumps and depth of dips in the ground, m.
+    ground_height_m: float
+    # Simulated walks that ended with a halt: the walker took no further step.
+    halted: int
+    # Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
+    # produce.
+    knee_rate_limited_share: float
+    # Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
+    knee_saturated_share: float
+    # Mean number of completed strides.
+    mean_strides: float
+    # Number of simulated walks.
+    simulated_walks: int
+
+
 class _SolveAttemptRequired(TypedDict):
     # Whether its gait is the result of the solve.
     chosen: bool
@@ -3030,6 +3062,8 @@ class StridesOnYield(TypedDict):
 
 
 class _StudyPlanRequired(TypedDict):
+    # Who answers comparisons.
+    answer_source: AnswerSource
     # Values of bounds that are not tuned.
     base_bounds: Bounds
     # Height and mass used by solves, independent of later corrections.
@@ -3038,8 +3072,6 @@ class _StudyPlanRequired(TypedDict):
     device_id: DeviceId
     # What evaluates trials.
     evaluation: Evaluation
-    # Who answers comparisons.
-    feedback_mode: FeedbackMode
     # Settings of the gait problem.
     gait_settings: GaitSettings
     # Settings of the learner.
@@ -3049,6 +3081,8 @@ class _StudyPlanRequired(TypedDict):
     muscles: bool
     # Name shown to users.
     name: str
+    # Number of trials.
+    number_of_trials: int
     # Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     parallel_trials: int
     # Priority, -10 to 10. Studies with a higher priority run first.
@@ -3065,8 +3099,6 @@ class _StudyPlanRequired(TypedDict):
     solve_options: SolveOptions
     # Identifier of the subject.
     subject_id: SubjectId
-    # Number of trials.
-    trial_budget: int
     # The gait from which trials are warm-started.
     warm_start_from: WarmStartFrom
 
@@ -3131,17 +3163,17 @@ class StudyClone(TypedDict, total=False):
     """A new study with the set-up of another one. Absent fields are copied."""
 
     # Who answers comparisons.
-    feedback_mode: Optional[FeedbackMode]
+    answer_source: Optional[AnswerSource]
     # Whether to solve with muscles.
     muscles: Optional[bool]
     # Name shown to users.
     name: Optional[str]
+    # Number of trials.
+    number_of_trials: Optional[int]
     # Seed for all random draws except allocations.
     seed: Optional[int]
     # Whether to start the study immediately.
     start: bool
-    # Number of trials.
-    trial_budget: Optional[int]
 
 
 class _StudyComparisonRequired(TypedDict):
@@ -3182,8 +3214,8 @@ class StudyComparison(_StudyComparisonRequired, total=False):
 class StudyExtension(TypedDict):
     """A larger number of trials."""
 
-    # Total number of trials. Must exceed the current budget.
-    trial_budget: int
+    # Number of trials. Must exceed the current number.
+    number_of_trials: int
 
 
 class StudyRestriction(TypedDict):
@@ -3356,7 +3388,7 @@ class TrialExecutionReport(TypedDict):
     program: str
     # The report, as `gaitwright simulate --json` prints it.
     report: ExecutionReport
-    # How many walks were complete, as a sentence.
+    # How many simulated walks were complete, as a sentence.
     sentence: str
     # Trial of the gait.
     trial_id: TrialId
@@ -3542,37 +3574,6 @@ class WalkerSubject(TypedDict):
     height_m: float
 
 
-class WalksOnGround(TypedDict):
-    """Simulated walks on one kind of ground."""
-
-    # Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
-    # produce.
-    ankle_rate_limited_share: float
-    # Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
-    ankle_saturated_share: float
-    # Walks that completed all strides.
-    completed: int
-    # Share of completed walks.
-    completed_share: float
-    # 95 % confidence interval of this share (Wilson).
-    completed_share_interval: list[float]
-    # Walks that ended with a fall.
-    fell: int
-    # Largest height of bumps and depth of dips in the ground, m.
-    ground_height_m: float
-    # Walks that ended with a halt: the walker took no further step.
-    halted: int
-    # Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
-    # produce.
-    knee_rate_limited_share: float
-    # Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
-    knee_saturated_share: float
-    # Mean number of completed strides.
-    mean_strides: float
-    # Number of simulated walks.
-    walks: int
-
-
 class _WarmStartRequired(TypedDict):
     # Mesh of the earlier solve.
     mesh: MeshIntervals
@@ -3617,5 +3618,5 @@ MarginEntry = Union[int, list[float]]
 
 # Content of a preference, in terms of trials.
 PreferenceContent = Union[
-    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentTie, PreferenceContentSuggestion,
+    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentNoDifference, PreferenceContentSuggestion,
 ]

@@ -21,9 +21,9 @@ from ..schemas import (
     MeasurementFile,
     MeasurementFileId,
     NewEmg,
+    NewJointAngles,
     NewLabAnswer,
     NewLabSession,
-    NewMotion,
     RecordedWalk,
     StudyId,
 )
@@ -199,12 +199,12 @@ class LabMethods(Transport):
             ),
         )
 
-    def add_motion_file(
+    def add_joint_angle_file(
         self,
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewMotion],
+        **body: Unpack[NewJointAngles],
     ) -> MeasurementFile:
         """Upload joint angles of a walk.
 
@@ -216,7 +216,7 @@ class LabMethods(Transport):
             MeasurementFile,
             self.request_json(
                 "POST",
-                "/api/v1/lab-sessions/{id}/measurement-files/motion",
+                "/api/v1/lab-sessions/{id}/measurement-files/joint-angles",
                 {"id": lab_session_id},
                 body=body,
                 key=idempotency_key,

@@ -69,9 +69,9 @@ class StudiesMethods(Transport):
 
         Starts the study, unless `start` is false.
 
-        Fields: subject_id; optionally base_bounds, device_id, evaluation, feedback_mode, gait_settings, learner,
-        muscles, name, parallel_trials, priority, reference_gait_id, repeat_results, restricted, search_space, seed,
-        solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit, warm_start_from.
+        Fields: subject_id; optionally answer_source, base_bounds, device_id, evaluation, gait_settings, learner,
+        muscles, name, number_of_trials, parallel_trials, priority, reference_gait_id, repeat_results, restricted,
+        search_space, seed, solve_options, solve_seconds_budget, start, unchanged_limit, warm_start_from.
         """
         return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 
@@ -127,7 +127,7 @@ class StudiesMethods(Transport):
 
         Creates a study with the same set-up, without the trials.
 
-        Fields: optionally feedback_mode, muscles, name, seed, start, trial_budget.
+        Fields: optionally answer_source, muscles, name, number_of_trials, seed, start.
         """
         return cast(
             StudyView,
@@ -163,7 +163,7 @@ class StudiesMethods(Transport):
 
         If the study has ended, it resumes.
 
-        Fields: trial_budget.
+        Fields: number_of_trials.
         """
         return cast(
             StudyView,
@@ -227,7 +227,7 @@ class StudiesMethods(Transport):
     def get_recommendation(self, study_id: StudyId) -> Recommendation:
         """Get the recommendation of a study.
 
-        Of the actions tried, the one that the learner believes to be the best.
+        Of the actions tried, the one with the highest utility.
         """
         return cast(Recommendation, self.request_json("GET", "/api/v1/studies/{id}/recommendation", {"id": study_id}))
 

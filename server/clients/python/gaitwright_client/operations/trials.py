@@ -158,9 +158,9 @@ class TrialsMethods(Transport):
         """Request the execution report of a trial.
 
         The gait of the trial must have converged. Walks on level ground, and on ground uneven by ±5 mm and by ±10 mm,
-        are simulated. The same number of walks and seed give the same report.
+        are simulated. The same number of simulated walks and seed give the same report.
 
-        Fields: optionally seed, walks.
+        Fields: optionally seed, simulated_walks.
         """
         return cast(
             Job,
