@@ -187,7 +187,8 @@ fn results_of_benchmarks_are_written_by_the_script() {
         assert!(question.ends_with('?'), "{question}");
         let (command, result) = rest.strip_prefix("```sh\n").and_then(|rest| rest.split_once("\n```\n\n")).unwrap();
         assert!(!command.contains('\n'), "{question}: {command}");
-        let (measured, output) = result.split_once("\n\n```text\n").unwrap_or_else(|| panic!("{question} has no result"));
+        let (measured, output) =
+            result.split_once("\n\n```text\n").unwrap_or_else(|| panic!("{question} has no result"));
         let parts = [": ", " cores, load average ", " at the start, version ", ", commit ", ", "];
         let mut left = measured.strip_prefix("Measured on ").unwrap_or_else(|| panic!("{question}: {measured}"));
         for part in parts {
