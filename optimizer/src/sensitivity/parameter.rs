@@ -49,7 +49,8 @@ impl PointSensitivities {
         let parameters: Result<Vec<_>, ModelError> =
             (0..TunedBounds::COUNT).map(|bound| parameter(problem, &program, solution, bound)).collect();
         let parameters = parameters.map_err(SolveError::from)?;
-        let sensitivities = interior_point::sensitivities(&program, &solution.point, &final_settings(options), &parameters)?;
+        let sensitivities =
+            interior_point::sensitivities(&program, &solution.point, &final_settings(options), &parameters)?;
         Ok(Self { program, parameters, sensitivities, unchanged_bounds })
     }
 
